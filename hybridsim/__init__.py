@@ -1,0 +1,80 @@
+"""hybridsim simulates piecewise-smooth (hybrid) systems and compares the integrators that can run them.
+
+The public names are the ones listed here and no others. Each is imported when it is first used, so that
+`import hybridsim` costs little and a program pays only for what it calls.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+__version__ = "0.1.0.dev0"
+
+# The module that defines each public name. `__init__.pyi` tells type checkers the same; a test compares them.
+_HOME = {
+    # declaring
+    "Choice": "hybridsim.model",
+    "Component": "hybridsim.model",
+    "Contact": "hybridsim.model",
+    "Discrete": "hybridsim.model",
+    "FrictionLaw": "hybridsim.model",
+    "Guard": "hybridsim.model",
+    "Input": "hybridsim.model",
+    "Mode": "hybridsim.model",
+    "Model": "hybridsim.model",
+    "Monitor": "hybridsim.model",
+    "Output": "hybridsim.model",
+    "Parameter": "hybridsim.model",
+    "Schedule": "hybridsim.model",
+    "State": "hybridsim.model",
+    "Surface": "hybridsim.model",
+    "list_models": "hybridsim.model",
+    "load": "hybridsim.model",
+    "load_law": "hybridsim.model",
+    # running
+    "Event": "hybridsim.solution",
+    "Solution": "hybridsim.solution",
+    "list_integrators": "hybridsim.integrators",
+    "simulate": "hybridsim.simulate",
+    # asking
+    "Comparison": "hybridsim.analysis",
+    "compare": "hybridsim.analysis",
+    # failing
+    "ExpressionError": "hybridsim.errors",
+    "HybridsimError": "hybridsim.errors",
+    "ModelError": "hybridsim.errors",
+    "Place": "hybridsim.errors",
+    "SimulationError": "hybridsim.errors",
+    "UsageError": "hybridsim.errors",
+}
+
+__all__ = ["__version__", *_HOME]  # noqa: PLE0604
+
+
+class _Package(ModuleType):
+    """A package whose public names are not replaced by the modules of the same name.
+
+    The import system binds every submodule to its package on first import, so that after
+    `import hybridsim.simulate` anywhere, `hs.simulate` would be the module and not the function.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _HOME and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'hybridsim' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})
+
+
+sys.modules[__name__].__class__ = _Package

@@ -1,0 +1,1 @@
+"""The command line: `hybridsim run | compare | check | models | integrators | cache`."""
