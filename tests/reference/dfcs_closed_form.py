@@ -14,7 +14,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from reference.numbers import FLOAT, Numbers, Real
+from reference.arithmetic import FLOAT, Numbers, Real
 from reference.slip import Slip, Undecided
 
 __all__ = ["Change", "Motion", "Oscillator", "Stick", "Undecided"]

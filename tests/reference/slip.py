@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from reference.numbers import Numbers, Real
+from reference.arithmetic import Numbers, Real
 
 
 class Undecided(ArithmeticError):

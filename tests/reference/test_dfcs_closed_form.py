@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from reference.dfcs_closed_form import Motion, Oscillator, Undecided
-from reference.numbers import multiprecision
+from reference.arithmetic import multiprecision
 
 FACTS = json.loads((Path(__file__).parents[1] / "conformance" / "cases.json").read_text())
 OSCILLATORS = [c for c in FACTS if c["id"].startswith(("FLAG-", "DH-", "DHV-", "FREE-", "THR-"))]
