@@ -51,7 +51,7 @@ _HOME = {
     "UsageError": "hybridsim.errors",
 }
 
-__all__ = ["__version__", *_HOME]  # noqa: PLE0604
+__all__ = ["__version__", *_HOME]
 
 
 class _Package(ModuleType):

@@ -1,1 +1,3 @@
-"""The command line: `hybridsim run | compare | check | models | integrators | cache`."""
+"""The command line: one file a command; `main` runs one line and answers for its errors."""
+
+from hybridsim.cli.entry import main as main

@@ -1,0 +1,50 @@
+"""`hybridsim cache`: where compiled functions are kept; clear them, or compile the engine ahead of time."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from hybridsim.cli.output import Written, complain
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "cache",
+        help="show, clear or fill the folder of compiled functions",
+        description=__doc__,
+        epilog="HYBRIDSIM_CACHE=FOLDER puts the cache elsewhere; HYBRIDSIM_JIT=0 runs without compiling.",
+    )
+    parser.add_argument(
+        "action",
+        choices=("path", "clear", "warm"),
+        help="path: print the folder; clear: delete what is in it; warm: compile the engine now",
+    )
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, written: Written) -> int:
+    """Do what `action` says."""
+    from hybridsim.engine.cache import cache_root, clear
+
+    if args.action == "path":
+        print(cache_root())
+    elif args.action == "clear":
+        complain(f"freed {clear() / 1e6:.1f} MB in {cache_root()}")
+    else:
+        _warm()
+    return 0
+
+
+def _warm() -> None:
+    """Compile everything that a run needs, by a short run of the reference model with every integrator."""
+    import hybridsim
+    from hybridsim.engine.period import forcing_period
+
+    model = hybridsim.load("dfcs")
+    period = forcing_period(model)
+    assert period is not None, "the reference model is forced by a sine"
+    for integrator in hybridsim.list_integrators():
+        complain(f"warming {integrator.name}")
+        hybridsim.simulate(model, (0.0, period), integrator=integrator.name)

@@ -1,0 +1,74 @@
+"""`hybridsim compare MODEL`: which integrator buys accuracy cheapest on it: a table, a chart and the data."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from hybridsim.cli import values
+from hybridsim.cli.output import Written, require_folder
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "compare",
+        help="compare integrators on a model: error against cost",
+        description=__doc__,
+        epilog="The folder gets chart.png, table.csv and comparison.json.",
+    )
+    values.add_model_arguments(parser)
+    values.add_span_argument(parser)
+    parser.add_argument(
+        "--integrators", metavar="A,B", type=values.names, help="compare these only (default: all that can)"
+    )
+    parser.add_argument(
+        "--rtol",
+        metavar="TOL,TOL",
+        type=values.positives,
+        help="relative tolerances of the adaptive integrators",
+    )
+    parser.add_argument("--repeat", metavar="N", type=values.count, help="timed repetitions of every run")
+    parser.add_argument(
+        "--out", metavar="FOLDER", type=Path, help="folder of the results (default: compare-MODEL, here)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, written: Written) -> int:
+    """Compare, print the table and fill the folder."""
+    folder: Path | None = args.out
+    if folder is not None:
+        require_folder(folder, "--out")
+    model = values.changed_model(args)
+    t_end = values.end_time(model, args.t_end)
+    folder = folder or Path(f"compare-{model.name}")
+    require_folder(folder, "--out")
+
+    import hybridsim
+
+    settings: dict[str, Any] = {
+        keyword: value
+        for keyword, value in (
+            ("integrators", args.integrators),
+            ("rtol", args.rtol),
+            ("repeat", args.repeat),
+        )
+        if value is not None
+    }
+    comparison = hybridsim.compare(model, t_span=(0.0, t_end), **settings)
+    if args.json:
+        print(comparison.to_json())
+    else:
+        print(comparison.table())
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, write in (
+        ("table.csv", comparison.to_csv),
+        ("comparison.json", comparison.to_json),
+        ("chart.png", comparison.plot),
+    ):
+        write(folder / name)
+        written.add(folder / name)
+    return 0

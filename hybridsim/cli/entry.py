@@ -1,0 +1,93 @@
+"""From a command line to an exit code: no error of the user's ever ends in a traceback.
+
+Exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted (Ctrl-C), 141 the
+reader of the output went away. Data goes to stdout, everything else to stderr.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from hybridsim import __version__
+from hybridsim.cli import cache, check, compare, integrators, models, run
+from hybridsim.cli.output import Written, complain
+from hybridsim.cli.parser import Parser
+from hybridsim.errors import HybridsimError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+COMMANDS: tuple[ModuleType, ...] = (run, compare, check, models, integrators, cache)
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+PIPE_CLOSED = 141  # 128 + SIGPIPE
+
+
+def build_parser() -> Parser:
+    """The parser of the whole command line; every command adds its own part."""
+    parser = Parser(
+        prog="hybridsim",
+        description="Simulate piecewise-smooth systems (dry friction first) and compare integrators on them.",
+        epilog="exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted",
+    )
+    parser.add_argument("--version", action="version", version=f"hybridsim {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
+    for command in COMMANDS:
+        command.add_to(commands)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line (default: that of the process) and return its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # a title with an accent must not stop an ASCII terminal
+    written = Written()
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            args = build_parser().parse_args(argv)
+            code: int = args.execute(args, written)
+            sys.stdout.flush()
+        except SystemExit as done:  # argparse after --help and --version
+            return done.code if isinstance(done.code, int) else 0
+        except KeyboardInterrupt:
+            complain(f"interrupted; {written.summary()}")
+            return INTERRUPTED
+        except BrokenPipeError:
+            # Python flushes stdout once more at exit; give it somewhere to go.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return PIPE_CLOSED
+        except HybridsimError as error:
+            _show_traceback_if_wanted()
+            complain(str(error))
+            return error.exit_code
+        except MemoryError:
+            complain("out of memory; try a shorter --t-end or a looser --rtol")
+            return HybridsimError.exit_code
+        except Exception as bug:  # the last line of defence: whatever arrives here is a bug of ours
+            if not _show_traceback_if_wanted():
+                complain(
+                    f"internal error, please report it: {type(bug).__name__}: {bug}\n"
+                    "set HYBRIDSIM_TRACEBACK=1 to see where it comes from"
+                )
+            return HybridsimError.exit_code
+    return code
+
+
+def _show_traceback_if_wanted() -> bool:
+    wanted = os.environ.get("HYBRIDSIM_TRACEBACK", "0") not in ("", "0")
+    if wanted:
+        traceback.print_exc()
+    return wanted
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
+    complain(f"warning: {message} ({category.__name__})")

@@ -1,0 +1,92 @@
+"""What leaves the program: messages to stderr, data to stdout, and a record of the files written."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hybridsim.errors import UsageError
+
+
+def complain(message: str) -> None:
+    """Print a message for the person at the terminal."""
+    print(f"hybridsim: {message}", file=sys.stderr, flush=True)
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON document; numbers that JSON does not have (nan, inf) become null."""
+    print(json.dumps(_plain(value), indent=2, ensure_ascii=True, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # numpy arrays and numbers
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Iterable):
+        return [_plain(item) for item in value]
+    return str(value)
+
+
+def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print rows under a header, columns aligned to the left."""
+    lines = [tuple(header), *(tuple(row) for row in rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
+    for line in lines:
+        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
+class Written:
+    """The files that a command has written so far, for the message after an interruption."""
+
+    def __init__(self) -> None:
+        self.paths: list[Path] = []
+
+    def add(self, path: Path) -> None:
+        """Record a finished file and say so."""
+        self.paths.append(path)
+        complain(f"wrote {path}")
+
+    def summary(self) -> str:
+        """What was kept, in words."""
+        return "kept " + ", ".join(map(str, self.paths)) if self.paths else "nothing was written"
+
+
+def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:
+    """Refuse a file that cannot be written before the work is done, not after it."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        found = f"the ending {path.suffix!r}" if path.suffix else "no ending"
+        raise UsageError(f"{option}: {path} has {found}", remedy=f"use one of {' '.join(suffixes)}")
+    if path.is_dir():
+        raise UsageError(
+            f"{option}: {path} is a folder", remedy=f"name a file in it, such as {path / 'result'}"
+        )
+    folder = path.parent
+    if not folder.is_dir():
+        raise UsageError(f"{option}: there is no folder {folder}", remedy="create it first, or name another")
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        raise UsageError(
+            f"{option}: {path} may not be written", remedy="choose a place that you may write to"
+        )
+
+
+def require_folder(path: Path, option: str) -> None:
+    """Refuse a folder for results that does not exist and cannot be made."""
+    nearest = path
+    while not nearest.exists() and nearest != nearest.parent:
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise UsageError(f"{option}: {nearest} is a file", remedy="name a folder")
+    if not os.access(nearest, os.W_OK):
+        raise UsageError(
+            f"{option}: {nearest} may not be written", remedy="choose a place that you may write to"
+        )

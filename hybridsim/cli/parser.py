@@ -1,0 +1,35 @@
+"""An argparse parser whose complaints are `UsageError`s that name the nearest known option or command."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from hybridsim.errors import UsageError, nearest
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser that raises instead of exiting, and accepts no abbreviated options."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse, and refuse here what this parser does not know: it has the names that are nearest."""
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self._refuse(unknown)
+        return known, unknown
+
+    def _refuse(self, unknown: Sequence[str]) -> NoReturn:
+        first = unknown[0]
+        if not first.startswith("-"):
+            self.error(f"unexpected argument {first!r}")
+        options = re.findall(r"(?<![\w-])--?[a-z][a-z0-9-]*", self.format_help())
+        self.error(f"unknown option {first!r}", nearest(first.split("=")[0], options, kind="options"))
+
+    def error(self, message: str, remedy: str | None = None) -> NoReturn:
+        """Raise a `UsageError` with the remedy, or with where to read about the command."""
+        raise UsageError(message, remedy=remedy or f"see: {self.prog} --help")

@@ -1,0 +1,181 @@
+"""`hybridsim run MODEL`: simulate a model, say how it went, and write what was asked for."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.cli import values
+from hybridsim.cli.output import Written, complain, print_json, require_writable
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+PICTURES = (".png", ".pdf", ".svg")
+
+_EXAMPLES = """\
+examples:
+  hybridsim run dfcs
+  hybridsim run dfcs -p F0=22 -p 'omega=0.64*sqrt(k/m)' --t-end 20T --plot out.png
+  hybridsim run my.toml --integrator cvode-bdf --rtol 1e-10 --csv out.csv --json > out.json
+"""
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser("run", help="simulate a model", description=__doc__, epilog=_EXAMPLES)
+    values.add_model_arguments(parser)
+    values.add_span_argument(parser)
+    parser.add_argument(
+        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
+    )
+    parser.add_argument(
+        "--rtol", metavar="TOL", type=values.positive, help="relative tolerance (default: 1e-9)"
+    )
+    parser.add_argument(
+        "--atol",
+        metavar="TOL",
+        type=values.positive,
+        help="absolute tolerance of every state (default: rtol * 1e-3 * the state's nominal size)",
+    )
+    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="longest step allowed")
+    parser.add_argument(
+        "--option",
+        metavar="NAME=VALUE",
+        type=values.assignment,
+        action="append",
+        default=[],
+        help="set an option of the integrator itself",
+    )
+    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw the run ({', '.join(PICTURES)})")
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the run as a table")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of the summary")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, written: Written) -> int:
+    """Simulate, print the summary, write the files; 1 where the simulation did not succeed."""
+    if args.plot:
+        require_writable(args.plot, "--plot", PICTURES)
+    if args.csv:
+        require_writable(args.csv, "--csv")
+    settings = _settings(args)
+    model = values.changed_model(args)
+    t_end = values.end_time(model, args.t_end)
+
+    import hybridsim
+
+    solution = hybridsim.simulate(model, (0.0, t_end), integrator=args.integrator, **settings)
+    if args.json:
+        print_json(_record(solution))
+    else:
+        print("\n".join(_summary(solution)))
+    for warning in solution.warnings:
+        complain(f"warning: {warning}")
+    if args.csv:
+        solution.to_csv(args.csv)
+        written.add(args.csv)
+    if args.plot:
+        _draw(solution, args.plot)
+        written.add(args.plot)
+    if not solution.success:
+        complain(f"{solution.status}: {solution.message}")
+        return 1
+    return 0
+
+
+def _settings(args: argparse.Namespace) -> dict[str, Any]:
+    """Keywords for `simulate`; what was not given is left to its defaults."""
+    settings: dict[str, Any] = {
+        name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
+    }
+    for name, text in args.option:
+        if name in settings:
+            raise UsageError(f"--option {name} is given twice", remedy="give one value")
+        settings[name] = values.option_value(text)
+    return settings
+
+
+def _shares(solution: Solution) -> dict[str, dict[str, float]]:
+    """Share of the time that each component spent in each of its modes."""
+    shares: dict[str, dict[str, float]] = {}
+    for component, intervals in solution.modes.items():
+        spent: dict[str, float] = {}
+        for interval in intervals:
+            spent[interval.mode] = spent.get(interval.mode, 0.0) + abs(interval.t1 - interval.t0)
+        total = math.fsum(spent.values()) or 1.0
+        shares[component] = {mode: time / total for mode, time in spent.items()}
+    return shares
+
+
+def _summary(solution: Solution) -> list[str]:
+    model, stats = solution.model, solution.stats
+    final = [
+        f"{state.name} = {value:.9g} {state.unit}".rstrip()
+        for state, value in zip(model.states, solution.y[:, -1], strict=True)
+    ]
+    kinds = Counter(event.kind for event in solution.events)
+    lines = [
+        f"{model.name}: {model.title}" if model.title else model.name,
+        f"  integrator   {solution.integrator}",
+        f"  time         {solution.t[0]:g} to {solution.t[-1]:.9g}",
+        f"  status       {solution.status}",
+        f"  events       {len(solution.events)}"
+        + (f" ({', '.join(f'{n} {kind}' for kind, n in kinds.items())})" if kinds else ""),
+    ]
+    for component, modes in _shares(solution).items():
+        shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
+        lines.append(f"  modes of {component:<4}{shares}")
+    lines.append(f"  final state  {', '.join(final)}")
+    lines.append(
+        f"  cost         {stats['steps']} steps ({stats['rejected']} rejected), "
+        f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s"
+    )
+    return lines
+
+
+def _record(solution: Solution) -> dict[str, Any]:
+    from hybridsim import __version__
+
+    model = solution.model
+    return {
+        "hybridsim": __version__,
+        "model": model.name,
+        "parameters": model.parameter_values(),
+        "integrator": solution.integrator,
+        "success": solution.success,
+        "status": solution.status,
+        "message": solution.message,
+        "warnings": solution.warnings,
+        "t": [solution.t[0], solution.t[-1]],
+        "final": {state.name: value for state, value in zip(model.states, solution.y[:, -1], strict=True)},
+        "modes": _shares(solution),
+        "events": [
+            {
+                "t": event.t,
+                "kind": event.kind,
+                "component": event.component,
+                "guard": event.guard,
+                "source": event.source,
+                "target": event.target,
+                "x_minus": event.x_minus,
+                "x_plus": event.x_plus,
+            }
+            for event in solution.events
+        ],
+        "stats": solution.stats,
+    }
+
+
+def _draw(solution: Solution, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    from hybridsim.plot import time_history
+
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    time_history(solution, figure)
+    figure.savefig(path, dpi=150)

@@ -1,0 +1,179 @@
+"""Values on the command line: models with changed parameters, spans in periods, options of an integrator."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import ModelError, Place, UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+    from hybridsim.model import Model
+
+DEFAULT_PERIODS = 100
+DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
+
+_PERIODS = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*T\s*")
+
+
+def assignment(text: str) -> tuple[str, str]:
+    """Split NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form NAME=VALUE")
+    return name.strip(), value.strip()
+
+
+def positive(text: str) -> float:
+    """A finite number above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not (value > 0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above zero")
+    return value
+
+
+def positives(text: str) -> tuple[float, ...]:
+    """Numbers above zero, separated by commas."""
+    return tuple(positive(part) for part in text.split(","))
+
+
+def count(text: str) -> int:
+    """A whole number above zero."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above zero")
+    return int(text)
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names, separated by commas."""
+    found = tuple(part.strip() for part in text.split(","))
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"{text!r} holds an empty name")
+    return found
+
+
+def add_model_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments that say which model, with which parameters, from where and for how long."""
+    parser.add_argument(
+        "model", metavar="MODEL", help="name of a model (see: hybridsim models) or a .toml file"
+    )
+    parser.add_argument(
+        "-p",
+        "--param",
+        metavar="NAME=VALUE",
+        type=assignment,
+        action="append",
+        default=[],
+        help="set a parameter; VALUE may be an expression of others, such as 'omega=0.6*sqrt(k/m)'",
+    )
+    parser.add_argument(
+        "--x0",
+        metavar="NAME=VALUE",
+        type=assignment,
+        action="append",
+        default=[],
+        help="set the initial value of a state",
+    )
+
+
+def add_span_argument(parser: argparse.ArgumentParser) -> None:
+    """The argument that says how long to run."""
+    parser.add_argument(
+        "--t-end",
+        metavar="TIME",
+        help="end of the run: a time, an expression of the parameters, or '100T' for 100 periods of forcing "
+        f"(default: {DEFAULT_PERIODS}T, or {DEFAULT_SECONDS:g} where there is no period)",
+    )
+
+
+def changed_model(args: argparse.Namespace) -> Model:
+    """The model that `args` names, with its parameters and initial values changed."""
+    import hybridsim
+
+    model: Model = hybridsim.load(args.model)
+    with _blaming_the_command_line():
+        if args.param:
+            model = model.with_(**_expressions(args.param, "-p"))
+        if args.x0:
+            model = model.with_start(**_expressions(args.x0, "--x0"))
+        model.parameter_values()
+        model.start_values()
+    return model
+
+
+@contextmanager
+def _blaming_the_command_line() -> Iterator[None]:
+    """Turn a bad expression into bad usage: the model was sound before the command line changed it."""
+    try:
+        yield
+    except ModelError as error:
+        raise UsageError(error.message, place=error.place, remedy=error.remedy) from error
+
+
+def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Expression]:
+    from hybridsim.expr import parse
+
+    found: dict[str, Expression] = {}
+    for name, text in pairs:
+        if name in found:
+            raise UsageError(f"{option} {name} is given twice", remedy="give one value")
+        found[name] = parse(text, Place(file=f"{option} {name}", text=text))
+    return found
+
+
+def end_time(model: Model, text: str | None) -> float:
+    """The end of the run in the model's unit of time.
+
+    Raises `UsageError` where the text is no time, the time is not above zero, or periods are asked for and
+    the model has none.
+    """
+    from hybridsim.engine.period import forcing_period
+
+    if text is None:
+        period = forcing_period(model)
+        return DEFAULT_PERIODS * period if period is not None else DEFAULT_SECONDS
+    periods = _PERIODS.fullmatch(text)
+    if periods:
+        period = forcing_period(model)
+        if period is None:
+            raise UsageError(
+                f"--t-end {text}: {model.name} has no single forcing period",
+                remedy="give the time itself, such as --t-end 10",
+            )
+        value = float(periods[1]) * period
+    else:
+        value = _time(model, text)
+    if not (value > 0 and math.isfinite(value)):
+        raise UsageError(f"--t-end {text} is {value:g}", remedy="give a finite time above zero")
+    return value
+
+
+def _time(model: Model, text: str) -> float:
+    from hybridsim.expr import evaluate, parse, require_names
+
+    with _blaming_the_command_line():
+        values = model.parameter_values()
+        expression = parse(text, Place(file="--t-end", text=text))
+        require_names(expression, values)
+        return float(evaluate(expression, values))
+
+
+def option_value(text: str) -> bool | int | float | str:
+    """The value of an integrator's option: a whole number, a number, true, false, or a word."""
+    lowered = text.lower()
+    if lowered in ("true", "false"):
+        return lowered == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
