@@ -1,0 +1,142 @@
+"""The one tree of errors: every message says what is wrong, where (file, line, caret) and what to do about it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something was written.
+
+    Parameters
+    ----------
+    file : path as the user gave it, or None for what was built in Python.
+    line : line of the file, counted from 1.
+    column : offset into ``text``, counted from 0, under which the caret is drawn.
+    text : the offending piece of source text, one line.
+    """
+
+    file: str | None = None
+    line: int | None = None
+    column: int | None = None
+    text: str | None = None
+
+    def at(self, text: str, column: int | None = None) -> Place:
+        """The same file and line, pointing at a piece of text."""
+        return replace(self, text=text, column=column)
+
+    @property
+    def prefix(self) -> str:
+        """The head of a message: ``file:line: ``, or nothing where neither is known."""
+        parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
+        if not parts and self.line is not None:
+            parts = [f"line {self.line}"]
+        return ":".join(parts) + ": " if parts else ""
+
+
+class HybridsimError(Exception):
+    """Anything hybridsim refuses or fails to do.
+
+    Parameters
+    ----------
+    message : what is wrong, naming the object and the value.
+    place : where it is written, if it is written anywhere.
+    remedy : what the user can do about it.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, place: Place | None = None, remedy: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.place = place
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        place = self.place or Place()
+        lines = [place.prefix + self.message]
+        if place.text is not None:
+            text, column = _window(place.text, place.column)
+            lines.append("    " + text)
+            if column is not None:
+                lines.append("    " + " " * column + "^")
+        if self.remedy:
+            lines.append(self.remedy)
+        return "\n".join(lines)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.__dict__)
+
+
+class ModelError(HybridsimError):
+    """A model that cannot be: ``errors`` holds every fault that was found, each with its own place and remedy."""
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        place: Place | None = None,
+        remedy: str | None = None,
+        errors: Iterable[ModelError] = (),
+    ) -> None:
+        super().__init__(message, place=place, remedy=remedy)
+        self.errors: tuple[ModelError, ...] = tuple(errors) or (self,)
+
+    @classmethod
+    def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
+        """One error out of many: the only one itself, or a list of all under a title."""
+        found = tuple(single for error in errors for single in error.errors)
+        if len(found) == 1:
+            return found[0]
+        message = "\n".join([f"{title}: {len(found)} errors", *(str(error) for error in found)])
+        return ModelError(message, errors=found)
+
+
+class ExpressionError(ModelError):
+    """A text that is no expression, or an expression that has no value."""
+
+
+class UsageError(HybridsimError, ValueError):
+    """A call or a command line that asks for something that does not exist."""
+
+    exit_code = 2
+
+
+class SimulationError(HybridsimError):
+    """A run that could not be carried out."""
+
+
+def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
+    """The remedy for an unknown name: the near ones, else a list of what there is."""
+    names = sorted(set(known))
+    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    folded = [other for other in names if other.lower() == name.lower() and other not in close]
+    if folded or close:
+        return "did you mean " + " or ".join(f"'{other}'" for other in (folded + close)[:3]) + "?"
+    if not names:
+        return f"there are no {kind} here."
+    shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
+    return f"known {kind}: {shown}."
+
+
+def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int | None]:
+    """A long line is cut to what is around the caret, so that a message stays readable."""
+    if len(text) <= width:
+        return text, column
+    start = max(0, min((column or 0) - width // 2, len(text) - width))
+    head, tail = ("..." if start else ""), ("..." if start + width < len(text) else "")
+    shifted = None if column is None else column - start + len(head)
+    return head + text[start : start + width] + tail, shifted
+
+
+def _rebuild(kind: type[HybridsimError], state: dict[str, object]) -> HybridsimError:
+    """Carry an error between processes whole (the default would lose place and remedy)."""
+    error = kind.__new__(kind)
+    error.__dict__.update(state)
+    error.args = (state["message"],)
+    return error

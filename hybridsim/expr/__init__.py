@@ -1,0 +1,6 @@
+"""Text to checked expression: parsing by a whitelist, evaluation, substitution, conversion to SymPy."""
+
+from hybridsim.expr.evaluate import evaluate, resolve
+from hybridsim.expr.parse import Expression, parse, require_names, substitute
+
+__all__ = ["Expression", "evaluate", "parse", "require_names", "resolve", "substitute"]

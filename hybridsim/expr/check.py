@@ -1,0 +1,212 @@
+"""The whitelist: walks a syntax tree, refuses what is not an expression of ours, and collects the names."""
+
+from __future__ import annotations
+
+import ast
+import math
+
+from hybridsim.errors import ExpressionError, Place, nearest
+from hybridsim.expr.grammar import BINARY, COMPARISONS, CONSTANTS, FUNCTIONS, MAX_INTEGER, MAX_POWER
+from hybridsim.expr.walk import NoValue, value_of
+
+_KINDS = {
+    ast.Attribute: "access to attributes (a dot after a name)",
+    ast.Lambda: "a lambda",
+    ast.Tuple: "a tuple (a comma outside a call)",
+    ast.Starred: "an unpacking with *",
+    ast.NamedExpr: "an assignment",
+    ast.GeneratorExp: "a generator",
+    ast.Await: "await",
+    ast.Yield: "yield",
+    ast.YieldFrom: "yield",
+    ast.Subscript: "a subscript",
+}
+
+
+class _Checker:
+    """One pass over one tree; `number` and `truth` say which kind of value a node must have."""
+
+    def __init__(self, text: str, place: Place, columns: bool) -> None:
+        self.text = text
+        self.place = place
+        self.columns = columns
+        self.names: set[str] = set()
+
+    def fail(self, node: ast.AST, message: str, remedy: str) -> ExpressionError:
+        column = getattr(node, "col_offset", None) if self.columns else None
+        return ExpressionError(message, place=self.place.at(self.text, column), remedy=remedy)
+
+    def number(self, node: ast.expr) -> bool:
+        """Check a node whose value must be a number; returns whether it is constant."""
+        constant, boolean = self.any(node)
+        if boolean:
+            raise self.fail(
+                node, "a number is needed here, this is true or false", "write '1 if ... else 0'."
+            )
+        return constant
+
+    def truth(self, node: ast.expr) -> bool:
+        """Check a node whose value must be true or false; returns whether it is constant."""
+        constant, boolean = self.any(node)
+        if not boolean:
+            raise self.fail(node, "a condition is needed here, this is a number", "compare it, e.g. 'x > 0'.")
+        return constant
+
+    def any(self, node: ast.expr) -> tuple[bool, bool]:
+        """Check a node; returns (is constant, is boolean). A constant must have a finite real value."""
+        constant, boolean = self.kind(node)
+        if constant and not isinstance(node, ast.Constant):
+            try:
+                value_of(node, {})
+            except NoValue as fault:
+                raise self.fail(
+                    fault.node,
+                    f"the constant has no finite real value: {fault.reason}",
+                    "correct the numbers.",
+                ) from None
+        return constant, boolean
+
+    def kind(self, node: ast.expr) -> tuple[bool, bool]:
+        match node:
+            case ast.Constant():
+                return True, self.literal(node)
+            case ast.Name(id=name):
+                return self.name(node, name), False
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
+                return self.number(operand), False
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return self.truth(operand), True
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in BINARY:
+                base, other = self.number(left), self.number(right)
+                if isinstance(op, ast.Pow) and other:
+                    self.power(node, left, right, base)
+                return base and other, False
+            case ast.BoolOp(values=values):
+                return all([self.truth(value) for value in values]), True
+            case ast.Compare(left=left, ops=ops, comparators=others) if all(
+                type(op) in COMPARISONS for op in ops
+            ):
+                return all([self.number(part) for part in (left, *others)]), True
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                return self.conditional(test, body, orelse)
+            case ast.Call():
+                return self.call(node), False
+        what = _KINDS.get(type(node), "this operation")
+        raise self.fail(
+            node,
+            f"{what} is not allowed in an expression",
+            "allowed are numbers, names, + - * / **, comparisons, and/or/not, 'a if c else b' and functions.",
+        )
+
+    def literal(self, node: ast.Constant) -> bool:
+        value = node.value
+        if isinstance(value, bool):
+            return True
+        if isinstance(value, int):
+            if value > MAX_INTEGER:
+                raise self.fail(
+                    node, "the whole number is too large to be exact", "write it as a decimal: 1e20."
+                )
+        elif not isinstance(value, float):
+            raise self.fail(node, f"{type(value).__name__} values are not allowed", "write a real number.")
+        elif not math.isfinite(value):
+            raise self.fail(node, "the number is too large for a double", "give a number below 1.8e308.")
+        return False
+
+    def name(self, node: ast.expr, name: str) -> bool:
+        if name in CONSTANTS:
+            return True
+        if name in FUNCTIONS:
+            raise self.fail(node, f"'{name}' is a function", f"call it: {name}(...).")
+        if name.startswith("__"):
+            raise self.fail(
+                node, f"the name '{name}' is not allowed", "names do not begin with two underscores."
+            )
+        self.names.add(name)
+        return False
+
+    def power(self, node: ast.expr, base: ast.expr, exponent: ast.expr, constant_base: bool) -> None:
+        try:
+            value = float(value_of(exponent, {}))
+        except NoValue as fault:
+            raise self.fail(
+                node, f"the exponent has no finite value: {fault.reason}", "correct it."
+            ) from None
+        if abs(value) > MAX_POWER:
+            raise self.fail(
+                exponent,
+                f"the exponent {value:g} is out of bounds, {MAX_POWER} is the largest",
+                "write large constants as decimals (1e-12), and fast decay as exp(...).",
+            )
+        if constant_base:
+            self.underflow(node, base)
+
+    def underflow(self, node: ast.expr, base: ast.expr) -> None:
+        try:
+            vanished = value_of(node, {}) == 0 and value_of(base, {}) != 0
+        except NoValue as fault:
+            raise self.fail(
+                fault.node, f"the constant has no finite real value: {fault.reason}", "correct it."
+            ) from None
+        if vanished:
+            raise self.fail(node, "the power is too small for a double", "write 0, or scale it.")
+
+    def conditional(self, test: ast.expr, body: ast.expr, orelse: ast.expr) -> tuple[bool, bool]:
+        constant = self.truth(test)
+        (first, boolean), (second, other) = self.any(body), self.any(orelse)
+        if boolean != other:
+            raise self.fail(
+                orelse, "one branch is a number, the other is true or false", "make both numbers."
+            )
+        return constant and first and second, boolean
+
+    def call(self, node: ast.Call) -> bool:
+        if not isinstance(node.func, ast.Name):
+            raise self.fail(node, "only the functions by their names can be called", _functions())
+        name = node.func.id
+        function = FUNCTIONS.get(name)
+        if function is None:
+            hint = nearest(name, FUNCTIONS, kind="functions")
+            raise self.fail(node, f"'{name}' is no function of expressions", hint)
+        if node.keywords:
+            raise self.fail(node, f"{name} takes no named arguments", f"{name} takes {function.arity}.")
+        for argument in node.args:
+            if isinstance(argument, ast.Starred):
+                raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments.")
+        count = len(node.args)
+        if count < function.least or (function.most is not None and count > function.most):
+            raise self.fail(node, f"{name} takes {function.arity}, {count} given", "correct the call.")
+        return all([self.number(argument) for argument in node.args])
+
+
+def check_tree(
+    tree: ast.expr, text: str, place: Place, max_depth: int, max_nodes: int, *, columns: bool = True
+) -> frozenset[str]:
+    """Refuse a tree that is not whitelisted, too deep or too large; returns the names it depends on.
+
+    ``columns`` says whether the nodes' columns are offsets into ``text`` (they are not after a substitution).
+    """
+    checker = _Checker(text, place, columns)
+    level: list[ast.AST] = [tree]
+    depth = nodes = 0
+    while level:
+        depth, nodes = depth + 1, nodes + len(level)
+        if depth > max_depth or nodes > max_nodes:
+            what = "nested too deeply" if depth > max_depth else "too large"
+            raise ExpressionError(
+                f"the expression is {what} ({max_depth} levels and {max_nodes} parts are allowed)",
+                place=place.at(text),
+                remedy="name parts of it in [definitions], or add with parentheses: (a + b + ...) + (c + d + ...).",
+            )
+        level = [
+            child
+            for node in level
+            for child in ast.iter_child_nodes(node)
+            if isinstance(child, (ast.expr, ast.keyword, ast.comprehension))
+        ]
+    checker.any(tree)
+    return frozenset(checker.names)
+
+
+def _functions() -> str:
+    return "functions: " + ", ".join(FUNCTIONS) + "."

@@ -1,0 +1,116 @@
+"""A checked expression as a SymPy object: the only file of the floor that imports SymPy, and only when called."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+import sympy
+
+from hybridsim.expr.parse import Expression, require_names
+
+_FUNCTIONS: dict[str, Any] = {
+    "sin": sympy.sin,
+    "cos": sympy.cos,
+    "tan": sympy.tan,
+    "asin": sympy.asin,
+    "acos": sympy.acos,
+    "atan": sympy.atan,
+    "atan2": sympy.atan2,
+    "sinh": sympy.sinh,
+    "cosh": sympy.cosh,
+    "tanh": sympy.tanh,
+    "exp": sympy.exp,
+    "log": sympy.log,
+    "sqrt": sympy.sqrt,
+    "abs": sympy.Abs,
+    "sign": sympy.sign,
+    "min": sympy.Min,
+    "max": sympy.Max,
+}
+_RELATIONS: dict[type[ast.cmpop], Any] = {
+    ast.Lt: sympy.Lt,
+    ast.LtE: sympy.Le,
+    ast.Gt: sympy.Gt,
+    ast.GtE: sympy.Ge,
+    ast.Eq: sympy.Eq,
+    ast.NotEq: sympy.Ne,
+}
+
+
+def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
+    """SymPy form of an expression (an Expr, or a Boolean for a condition).
+
+    Whole numbers are exact, decimal numbers are the double itself with all its 53 bits; a conditional becomes a
+    Piecewise, abs/min/max/sign stay what they are.
+
+    Parameters
+    ----------
+    symbols : a SymPy object for every name of the expression, real symbols as a rule (``t`` among them if used).
+
+    Errors
+    ------
+    ExpressionError for a name without a symbol, or a comparison of what is not real.
+    """
+    require_names(expr, symbols)
+    try:
+        return _convert(expr.tree, symbols)
+    except (TypeError, ValueError, OverflowError) as fault:
+        raise expr.error(
+            f"'{expr.text}' has no symbolic form: {fault}", remedy="write it otherwise."
+        ) from None
+
+
+def _convert(node: ast.expr, symbols: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.Constant(value=bool() as truth):
+            return sympy.true if truth else sympy.false
+        case ast.Constant(value=int() as number):
+            return sympy.Integer(number)
+        case ast.Constant(value=float() as number):
+            return sympy.Float(number, precision=53)
+        case ast.Name(id="pi"):
+            return sympy.pi
+        case ast.Name(id=name):
+            return symbols[name]
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _convert(operand, symbols)
+            return (
+                sympy.Not(value) if isinstance(op, ast.Not) else -value if isinstance(op, ast.USub) else value
+            )
+        case ast.BinOp(left=left, op=op, right=right):
+            return _binary(op, _convert(left, symbols), _convert(right, symbols))
+        case ast.BoolOp(op=op, values=values):
+            parts = [_convert(value, symbols) for value in values]
+            return sympy.And(*parts) if isinstance(op, ast.And) else sympy.Or(*parts)
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            terms = [_convert(part, symbols) for part in (left, *others)]
+            pairs = zip(ops, terms[:-1], terms[1:], strict=True)
+            return sympy.And(*(_RELATIONS[type(op)](a, b) for op, a, b in pairs))
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            condition, first, second = (_convert(part, symbols) for part in (test, body, orelse))
+            if first.is_Boolean or second.is_Boolean:
+                return sympy.ITE(condition, first, second)
+            return sympy.Piecewise((first, condition), (second, True))
+        case ast.Call(func=ast.Name(id=name), args=args):
+            return _FUNCTIONS[name](*(_convert(arg, symbols) for arg in args))
+    raise TypeError(f"an unchecked node: {ast.dump(node)}")
+
+
+def _binary(op: ast.operator, left: Any, right: Any) -> Any:
+    match op:
+        case ast.Add():
+            return left + right
+        case ast.Sub():
+            return left - right
+        case ast.Mult():
+            return left * right
+        case ast.Div():
+            return left / right
+    if right.is_Float and right == int(right):
+        right = sympy.Integer(int(right))  # x**2.0 differentiates like x**2
+    if left.is_Rational and right.is_Rational and not (left.is_Integer and right.is_Integer and right >= 0):
+        # Exact powers of fractions can be made to grow without bound; a double cannot.
+        return sympy.Float(float(left) ** float(right), precision=53)
+    return left**right

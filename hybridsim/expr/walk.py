@@ -1,0 +1,82 @@
+"""The value of a checked tree in double precision: a plain walk, no code is made."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+
+from hybridsim.expr.grammar import CONSTANTS, FUNCTIONS
+
+_BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: math.pow,
+}
+_COMPARE: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+
+
+class NoValue(Exception):
+    """A node that has no finite real value, and why."""
+
+    def __init__(self, node: ast.expr, reason: str) -> None:
+        super().__init__(reason)
+        self.node = node
+        self.reason = reason
+
+
+def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
+    """Value of a checked node; `NoValue` where it is not a finite real number, KeyError for a missing name."""
+    match node:
+        case ast.Constant(value=bool() as truth):
+            return truth
+        case ast.Constant(value=(int() | float()) as number):
+            return float(number)
+        case ast.Name(id=name):
+            return CONSTANTS[name] if name in CONSTANTS else float(values[name])
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            return not value_of(operand, values)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -value_of(operand, values)
+        case ast.UnaryOp(operand=operand):
+            return value_of(operand, values)
+        case ast.BinOp(left=left, op=op, right=right):
+            first, second = value_of(left, values), value_of(right, values)
+            return _finite(node, _BINARY[type(op)], first, second)
+        case ast.BoolOp(op=ast.And(), values=parts):
+            return all(value_of(part, values) for part in parts)
+        case ast.BoolOp(values=parts):
+            return any(value_of(part, values) for part in parts)
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            terms = [value_of(part, values) for part in (left, *others)]
+            return all(_COMPARE[type(op)](a, b) for op, a, b in zip(ops, terms[:-1], terms[1:], strict=True))
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            return value_of(body if value_of(test, values) else orelse, values)
+        case ast.Call(func=ast.Name(id=name), args=args):
+            return _finite(node, FUNCTIONS[name].value, *(value_of(arg, values) for arg in args))
+    raise TypeError(f"an unchecked node reached the evaluation: {ast.dump(node)}")
+
+
+def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -> float:
+    try:
+        value = float(function(*arguments))
+    except ZeroDivisionError:
+        raise NoValue(node, "division by zero") from None
+    except OverflowError:
+        raise NoValue(node, "it is too large for a double") from None
+    except ValueError:
+        shown = ", ".join(f"{argument:g}" for argument in arguments)
+        raise NoValue(node, f"it is not defined at ({shown})") from None
+    if not math.isfinite(value):
+        raise NoValue(node, f"it is {value}")
+    return value
