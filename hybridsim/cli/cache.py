@@ -13,7 +13,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "cache",
         help="show, clear or fill the folder of compiled functions",
-        description=__doc__,
+        description="Show, clear or fill the folder where compiled functions are kept.",
         epilog="HYBRIDSIM_CACHE=FOLDER puts the cache elsewhere; HYBRIDSIM_JIT=0 runs without compiling.",
     )
     parser.add_argument(

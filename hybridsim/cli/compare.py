@@ -15,7 +15,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "compare",
         help="compare integrators on a model: error against cost",
-        description=__doc__,
+        description="Compare integrators on a model, error against cost: a table, a chart and the data.",
         epilog="The folder gets chart.png, table.csv and comparison.json.",
     )
     values.add_model_arguments(parser)

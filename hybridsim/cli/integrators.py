@@ -12,7 +12,9 @@ from hybridsim.cli.output import Written, print_json
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "integrators", help="list the integrators and when to choose which", description=__doc__
+        "integrators",
+        help="list the integrators and when to choose which",
+        description="List what can run a model, when to choose which, and what each one lacks.",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)

@@ -11,7 +11,9 @@ from hybridsim.cli.output import Written, print_json, print_table
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        "models", help="list the models that come with hybridsim", description=__doc__
+        "models",
+        help="list the models that come with hybridsim",
+        description="List the models that can be run by name.",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -18,7 +19,8 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse, and refuse here what this parser does not know: it has the names that are nearest."""
-        known, unknown = super().parse_known_args(args, namespace)
+        line = sys.argv[1:] if args is None else list(args)
+        known, unknown = super().parse_known_args(_join_negative_values(line), namespace)
         if unknown:
             self._refuse(unknown)
         return known, unknown
@@ -33,3 +35,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str, remedy: str | None = None) -> NoReturn:
         """Raise a `UsageError` with the remedy, or with where to read about the command."""
         raise UsageError(message, remedy=remedy or f"see: {self.prog} --help")
+
+
+def _join_negative_values(line: Sequence[str]) -> list[str]:
+    """Write `--t-end -5T` as `--t-end=-5T`: argparse would take `-5T` for an option, and not say what is wrong."""
+    joined: list[str] = []
+    for word in line:
+        if re.match(r"-\.?\d", word) and joined and re.fullmatch(r"--[a-z][a-z0-9-]*", joined[-1]):
+            joined[-1] += "=" + word
+        else:
+            joined.append(word)
+    return joined

@@ -27,7 +27,12 @@ examples:
 
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
-    parser = commands.add_parser("run", help="simulate a model", description=__doc__, epilog=_EXAMPLES)
+    parser = commands.add_parser(
+        "run",
+        help="simulate a model",
+        description="Simulate a model, say how it went, and write what was asked for.",
+        epilog=_EXAMPLES,
+    )
     values.add_model_arguments(parser)
     values.add_span_argument(parser)
     parser.add_argument(
