@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reference.dfcs_closed_form import Motion, Oscillator, Undecided
 from reference.arithmetic import multiprecision
+from reference.dfcs_closed_form import Motion, Oscillator, Undecided
 
 FACTS = json.loads((Path(__file__).parents[1] / "conformance" / "cases.json").read_text())
 OSCILLATORS = [c for c in FACTS if c["id"].startswith(("FLAG-", "DH-", "DHV-", "FREE-", "THR-"))]
