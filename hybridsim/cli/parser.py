@@ -38,7 +38,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def _join_negative_values(line: Sequence[str]) -> list[str]:
-    """Write `--t-end -5T` as `--t-end=-5T`: argparse would take `-5T` for an option, and not say what is wrong."""
+    """Write `--t-end -5T` as `--t-end=-5T`, which argparse does not take for an option named `-5T`."""
     joined: list[str] = []
     for word in line:
         if re.match(r"-\.?\d", word) and joined and re.fullmatch(r"--[a-z][a-z0-9-]*", joined[-1]):

@@ -1,0 +1,118 @@
+"""The manners of every command: exit codes, streams, interruption, a closed pipe, and how a bug is reported."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+
+import pytest
+
+import hybridsim as hs
+from hybridsim import __version__
+
+
+def run(*argv: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run the program in a process of its own, with environment variables set."""
+    return subprocess.run(
+        [sys.executable, "-m", "hybridsim", *argv],
+        capture_output=True,
+        text=True,
+        env=dict(os.environ) | variables,
+        check=False,
+    )
+
+
+def raising(error: BaseException) -> Callable:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    return fail
+
+
+def test_version(hybridsim: Callable) -> None:
+    assert hybridsim("--version") == (0, f"hybridsim {__version__}\n", "")
+
+
+def test_help_names_every_command(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("--help")
+    assert (code, err) == (0, "")
+    assert all(name in out for name in ("run", "compare", "check", "models", "integrators", "cache"))
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (hs.SimulationError("the step became too small", remedy="loosen rtol"), 1),
+        (hs.UsageError("no such thing", remedy="take another"), 2),
+        (hs.ModelError("no such state", place=hs.Place("m.toml", 3), remedy="add it"), 3),
+    ],
+)
+def test_exit_code_and_message_of_an_error(
+    error: hs.HybridsimError, code: int, hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hs, "load", raising(error))
+    outcome = hybridsim("check", "dfcs")
+    assert outcome == (code, "", f"hybridsim: {error}\n")
+
+
+def test_a_bug_is_one_line_and_how_to_see_more(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hs, "load", raising(KeyError("omega")))
+    code, out, err = hybridsim("check", "dfcs")
+    assert (code, out) == (1, "")
+    assert "KeyError: 'omega'" in err and "HYBRIDSIM_TRACEBACK=1" in err
+    assert "Traceback" not in err
+
+    monkeypatch.setenv("HYBRIDSIM_TRACEBACK", "1")
+    code, _, err = hybridsim("check", "dfcs")
+    assert code == 1
+    assert "Traceback" in err
+
+
+def test_interruption(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hs, "simulate", raising(KeyboardInterrupt()))
+    code, out, err = hybridsim("run", "dfcs", "--csv", "out.csv")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err and "nothing was written" in err
+
+
+def test_warnings_go_to_stderr_in_one_line(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    models = hs.list_models()
+
+    def warn() -> object:
+        warnings.warn("mind the step", RuntimeWarning, stacklevel=1)
+        return models
+
+    monkeypatch.setattr(hs, "list_models", warn)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        code, out, err = hybridsim("models")
+    assert code == 0
+    assert err == "hybridsim: warning: mind the step (RuntimeWarning)\n"
+    assert "mind" not in out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes break otherwise on Windows")
+def test_closed_pipe() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "hybridsim", "models"],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_ascii_terminal() -> None:
+    done = run("check", "dfcs", PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_same_program_as_a_module() -> None:
+    assert run("--version").stdout == f"hybridsim {__version__}\n"
