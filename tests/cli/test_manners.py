@@ -1,4 +1,4 @@
-"""The manners of every command: exit codes, streams, interruption, a closed pipe, and how a bug is reported."""
+"""Manners of every command: exit codes, streams, interruption, a closed pipe, how a bug is reported."""
 
 from __future__ import annotations
 
