@@ -1,0 +1,30 @@
+"""What a system is: models and their parts, read from TOML or built in Python. Knows no numerics."""
+
+from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
+from hybridsim.model.contact import Contact
+from hybridsim.model.frozen_map import FrozenMap
+from hybridsim.model.inputs import Input
+from hybridsim.model.law import FrictionLaw
+from hybridsim.model.model import Model
+from hybridsim.model.monitor import Monitor
+from hybridsim.model.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.schedule import Schedule
+
+__all__ = [
+    "Choice",
+    "Component",
+    "Contact",
+    "Discrete",
+    "FrictionLaw",
+    "FrozenMap",
+    "Guard",
+    "Input",
+    "Mode",
+    "Model",
+    "Monitor",
+    "Output",
+    "Parameter",
+    "Schedule",
+    "State",
+    "Surface",
+]

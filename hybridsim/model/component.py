@@ -1,0 +1,119 @@
+"""A small automaton: modes with their flows, guards that last while they are >= 0, and choices of what comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from hybridsim.expr import Expression
+from hybridsim.model.declared import Declared
+from hybridsim.model.frozen_map import FrozenMap
+
+
+@dataclass(frozen=True)
+class Choice(Declared):
+    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both are evaluated at x-."""
+
+    to: str
+    when: Expression | None = None
+    reset: Mapping[str, Expression] = field(default_factory=FrozenMap)
+
+    def __post_init__(self) -> None:
+        self._expressions("when")
+        self._maps("reset")
+
+
+@dataclass(frozen=True)
+class Guard(Declared):
+    """A scalar that must stay >= 0 while its mode lasts.
+
+    Parameters
+    ----------
+    expr : the scalar, smooth in its mode.
+    then : choices in order, the first whose condition holds is taken; empty where a surface decides.
+    fatal : a message instead of choices: the run ends with status ``inconsistent`` where the guard would go negative.
+    """
+
+    name: str
+    expr: Expression
+    then: tuple[Choice, ...] = ()
+    fatal: str | None = None
+
+    def __post_init__(self) -> None:
+        self._expressions("expr")
+        if isinstance(self.then, str):
+            object.__setattr__(self, "then", Choice(self.then, place=self.place))
+        self._tuples("then")
+
+
+@dataclass(frozen=True)
+class Mode(Declared):
+    """A flow and its domain: ``der`` replaces rates of states, ``set`` gives the component's variables."""
+
+    name: str
+    guards: tuple[Guard, ...] = ()
+    der: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    set: Mapping[str, Expression] = field(default_factory=FrozenMap)
+
+    def __post_init__(self) -> None:
+        self._tuples("guards")
+        self._maps("der", "set")
+
+
+@dataclass(frozen=True)
+class Surface(Declared):
+    """A scalar s(t, x) with a mode on either side and one that holds s = 0.
+
+    Parameters
+    ----------
+    function : s.
+    unknown : the variable that holds it, solved for from ds/dt = 0, in which it must be linear.
+    above, below, hold : mode for s > 0, for s < 0, and on s = 0.
+    jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s = 0+ (in
+        ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
+    """
+
+    function: Expression
+    unknown: str
+    above: str
+    below: str
+    hold: str
+    jump_above: Expression
+    jump_below: Expression
+
+    def __post_init__(self) -> None:
+        self._expressions("function", "jump_above", "jump_below")
+
+
+@dataclass(frozen=True)
+class Component(Declared):
+    """An automaton of its own: one of its modes is active at any time.
+
+    Parameters
+    ----------
+    initial : mode at t0; None where a surface decides it from x0. With a single mode it is that one.
+    surface : given, the guards have no choices: the decisions go by admissibility.
+    """
+
+    name: str
+    modes: tuple[Mode, ...]
+    initial: str | None = None
+    surface: Surface | None = None
+
+    def __post_init__(self) -> None:
+        self._tuples("modes")
+        if self.initial is None and self.surface is None and len(self.modes) == 1:
+            object.__setattr__(self, "initial", self.modes[0].name)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """The names that its modes set, in order of appearance, the surface's unknown first."""
+        unknown = [self.surface.unknown] if self.surface else []
+        return tuple(dict.fromkeys(unknown + [name for mode in self.modes for name in mode.set]))
+
+    def mode(self, name: str) -> Mode:
+        """The mode of that name; KeyError if there is none."""
+        for mode in self.modes:
+            if mode.name == name:
+                return mode
+        raise KeyError(name)

@@ -1,0 +1,75 @@
+"""A known signal: a table over time, a periodic wave or a chirp; its jumps and knots are scheduled events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hybridsim.expr import Expression
+from hybridsim.model.declared import Declared
+
+KINDS = ("table", "wave", "chirp")
+SHAPES = ("square", "triangle", "sawtooth", "sine")
+INTERPOLATIONS = ("linear", "cubic")
+# The fields that each kind has; the first group must be given, the second has defaults.
+NEEDED = {"table": ("times", "values"), "wave": ("shape", "period"), "chirp": ("f0", "f1", "duration")}
+OPTIONAL = {
+    "table": ("interpolation",),
+    "wave": ("amplitude", "phase", "offset", "duty"),
+    "chirp": ("amplitude", "phase"),
+}
+_DEFAULTS: dict[str, dict[str, object]] = {
+    "table": {"interpolation": "linear"},
+    "wave": {"amplitude": 1, "phase": 0, "offset": 0},
+    "chirp": {"amplitude": 1, "phase": 0},
+}
+
+
+@dataclass(frozen=True)
+class Input(Declared):
+    """A function of time under a name.
+
+    table  Values at increasing times, between them linear or (natural) cubic; before the first and after the last the
+           end values hold. Two equal times are a jump (linear only).
+    wave   offset + amplitude*s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
+           square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1 at 1/4,
+           -1 at 3/4; sawtooth: from -1 rising to 1, where it jumps back.
+    chirp  amplitude*sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; frequency rises
+           from f0 to f1 and then stays. ``phase`` is an angle.
+
+    Parameters
+    ----------
+    times, values : numbers of a table.
+    amplitude, period, phase, offset, duty, f0, f1, duration : expressions of parameters.
+    """
+
+    name: str
+    kind: str
+    times: tuple[float, ...] = ()
+    values: tuple[float, ...] = ()
+    interpolation: str | None = None
+    shape: str | None = None
+    amplitude: Expression | None = None
+    period: Expression | None = None
+    phase: Expression | None = None
+    offset: Expression | None = None
+    duty: Expression | None = None
+    f0: Expression | None = None
+    f1: Expression | None = None
+    duration: Expression | None = None
+
+    def __post_init__(self) -> None:
+        defaults = dict(_DEFAULTS.get(self.kind, {}))
+        if self.shape == "square":
+            defaults["duty"] = 0.5
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+        self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
+        for name in ("times", "values"):
+            object.__setattr__(self, name, tuple(float(number) for number in getattr(self, name)))
+
+    @property
+    def expressions(self) -> dict[str, Expression]:
+        """Its expressions of parameters by field name."""
+        fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
+        return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}

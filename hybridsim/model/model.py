@@ -1,0 +1,202 @@
+"""What a system is: states, parameters, automata, contacts, inputs, events and outputs, all frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from hybridsim.errors import ModelError, UsageError, nearest
+from hybridsim.expr import Expression, evaluate, parse, resolve
+from hybridsim.model.component import Component
+from hybridsim.model.contact import Contact
+from hybridsim.model.declared import Declared, as_tuple
+from hybridsim.model.inputs import Input
+from hybridsim.model.monitor import Monitor
+from hybridsim.model.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.schedule import Schedule
+
+
+@dataclass(frozen=True)
+class Model(Declared):
+    """A piecewise-smooth system.
+
+    Parameters
+    ----------
+    states : continuous states with their rates.
+    parameters : `Parameter` objects, or a dict of name to number or expression.
+    discrete : states changed by resets and ticks only.
+    components, contacts : the automata; their modes together are the discrete state z.
+    inputs, monitors, schedules : known signals, events that change no mode, events at known times.
+    outputs : `Output` objects, or a dict of name to expression.
+    definitions : named intermediate expressions, a dict or pairs; they may use one another and what components set.
+    title, source, description, look : what it is, where it comes from, more, and what to look at.
+    path : the file it was read from.
+
+    Examples
+    --------
+    >>> free = Model("free", states=[State("x", 1, der="v"), State("v", 0, der="-k*x")], parameters={"k": 4})
+    >>> free.with_(k=9).parameter_values()
+    {'k': 9.0}
+    """
+
+    name: str
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...] = ()
+    discrete: tuple[Discrete, ...] = ()
+    components: tuple[Component, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    monitors: tuple[Monitor, ...] = ()
+    schedules: tuple[Schedule, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    definitions: tuple[tuple[str, Expression], ...] = ()
+    title: str = ""
+    source: str = ""
+    description: str = ""
+    look: str = ""
+    path: str | None = None
+
+    def __post_init__(self) -> None:
+        self._named("parameters", Parameter)
+        self._named("discrete", Discrete)
+        self._named("outputs", Output)
+        self._tuples("states", "parameters", "discrete", "components", "contacts", "inputs")
+        self._tuples("monitors", "schedules", "outputs")
+        pairs = self.definitions.items() if isinstance(self.definitions, Mapping) else self.definitions
+        object.__setattr__(self, "definitions", tuple((name, parse(text)) for name, text in pairs))
+
+    def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
+        given = getattr(self, field)
+        if isinstance(given, Mapping):
+            object.__setattr__(self, field, tuple(kind(name, value) for name, value in given.items()))
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when everything declared is; where it was read from does not count."""
+        if not isinstance(other, Model):
+            return NotImplemented
+        return _content(self) == _content(other)
+
+    def __hash__(self) -> int:
+        return hash(_content(self))
+
+    def __repr__(self) -> str:
+        automata = [part.name for part in (*self.contacts, *self.components)]
+        names = ", ".join(state.name for state in self.states)
+        return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
+
+    def with_(self, /, **changes: Expression | str | float) -> Model:
+        """A copy with parameter values changed: ``model.with_(N=40, omega="0.7*sqrt(k/m)")``.
+
+        Errors
+        ------
+        UsageError for a name that is no parameter; ExpressionError for a value that is no expression.
+        """
+        _known(changes, (parameter.name for parameter in self.parameters), "parameter", self.name)
+        changed = (
+            replace(p, value=parse(changes[p.name])) if p.name in changes else p for p in self.parameters
+        )
+        return replace(self, parameters=tuple(changed))
+
+    def with_start(self, /, **changes: Expression | str | float) -> Model:
+        """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
+        names = [part.name for part in (*self.states, *self.discrete)]
+        _known(changes, names, "state", self.name)
+
+        def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
+            return tuple(
+                replace(part, start=parse(changes[part.name])) if part.name in changes else part
+                for part in parts
+            )
+
+        return replace(self, states=changed(self.states), discrete=changed(self.discrete))
+
+    def parameter_values(self) -> dict[str, float]:
+        """Numbers of all parameters; a circle among them, or a value that is not finite, is an error."""
+        return resolve({parameter.name: parameter.value for parameter in self.parameters})
+
+    def start_values(self) -> dict[str, float]:
+        """Initial values of the states at the parameters' values."""
+        values = self.parameter_values()
+        return {state.name: evaluate(state.start, values) for state in self.states}
+
+    def discrete_values(self) -> dict[str, float]:
+        """Initial values of the discrete states at the parameters' values."""
+        values = self.parameter_values()
+        return {part.name: evaluate(part.start, values) for part in self.discrete}
+
+    def all_components(self) -> tuple[Component, ...]:
+        """All automata: the contacts expanded, then the components, each in order of declaration."""
+        return self._all_components
+
+    @cached_property
+    def _all_components(self) -> tuple[Component, ...]:
+        constants = self.constant_names()
+        return (*(contact.component(constants) for contact in self.contacts), *self.components)
+
+    def constant_names(self) -> frozenset[str]:
+        """Names that cannot change during a run: parameters, and definitions over these alone."""
+        constants = {parameter.name for parameter in self.parameters}
+        for _ in self.definitions:
+            constants |= {name for name, expr in self.definitions if expr.names <= constants}
+        return frozenset(constants)
+
+    def variables(self) -> dict[str, Component]:
+        """Variables that components set (contact forces among them), each with its component."""
+        return {name: component for component in self.all_components() for name in component.variables}
+
+    def structure(self) -> str:
+        """Canonical text of all that generated code depends on.
+
+        Parameter values, initial values, units, titles and the numbers of tables are not in it, so models that differ
+        only in these share their code.
+        """
+        from hybridsim.model.structure import structure
+
+        return structure(self)
+
+    def validate(self) -> Model:
+        """See to it that the declaration holds together; returns the model itself.
+
+        Errors
+        ------
+        ModelError with all faults in ``errors``.
+        """
+        from hybridsim.model.validate import find_errors
+
+        errors = find_errors(self)
+        if errors:
+            raise ModelError.collect(errors, f"model {self.name}")
+        return self
+
+    def to_toml(self) -> str:
+        """The model as a TOML text that stands on its own: laws and tables are written into it."""
+        from hybridsim.model.toml_write import write_model
+
+        return write_model(self)
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | None = None) -> Model:
+        """Read and validate a model from TOML text; ``path`` names the file in messages and finds its tables."""
+        from hybridsim.model.toml_read import read_model
+
+        return read_model(text, path)
+
+
+def _content(model: Model) -> tuple[object, ...]:
+    parts = (
+        model.states, model.parameters, model.discrete, model.components, model.contacts, model.inputs,
+        model.monitors, model.schedules, model.outputs, model.definitions,
+    )  # fmt: skip
+    return (model.name, *parts, model.title, model.source, model.description, model.look)
+
+
+def _known(changes: Iterable[str], names: Iterable[str], kind: str, model: str) -> None:
+    allowed = as_tuple(names)
+    for name in changes:
+        if name not in allowed:
+            raise UsageError(
+                f"the model '{model}' has no {kind} '{name}'",
+                remedy=nearest(name, allowed, kind=f"{kind}s"),
+            )

@@ -1,0 +1,76 @@
+"""The part of a model that generated code depends on, as a canonical text: the key of the code's cache."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from hybridsim.expr import Expression
+from hybridsim.model.component import Component
+from hybridsim.model.inputs import Input
+from hybridsim.model.schedule import Schedule
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+
+def structure(model: Model) -> str:
+    """One line for each thing that matters; equal texts mean that the same code serves both models."""
+    return "\n".join(_lines(model)) + "\n"
+
+
+def _lines(model: Model) -> Iterator[str]:
+    for parameter in model.parameters:
+        yield f"parameter {parameter.name}"
+    for state in model.states:
+        yield f"state {state.name}: {state.der}"
+    for discrete in model.discrete:
+        yield f"discrete {discrete.name}"
+    for signal in model.inputs:
+        yield _input(signal)
+    for name, expr in model.definitions:
+        yield f"definition {name}: {expr}"
+    for component in model.all_components():
+        yield from _component(component)
+    for monitor in model.monitors:
+        yield f"monitor {monitor.name} {monitor.direction} {monitor.action}: {monitor.expr}" + _map(
+            monitor.reset
+        )
+    for schedule in model.schedules:
+        yield _schedule(schedule)
+    for output in model.outputs:
+        modes = "; ".join(f"{name} = {expr}" for name, expr in output.modes.items())  # their order counts
+        yield f"output {output.name}: {output.expr} {{{modes}}}"
+
+
+def _component(component: Component) -> Iterator[str]:
+    yield f"component {component.name} initial {component.initial}"
+    surface = component.surface
+    if surface:
+        yield (
+            f"  surface {surface.function}; {surface.unknown}; {surface.above}; {surface.below}; {surface.hold}; "
+            f"{surface.jump_above}; {surface.jump_below}"
+        )
+    for mode in component.modes:
+        yield f"  mode {mode.name}: set" + _map(mode.set) + " der" + _map(mode.der)
+        for guard in mode.guards:
+            yield f"    guard {guard.name}: {guard.expr} fatal {guard.fatal!r}"
+            for choice in guard.then:
+                yield f"      to {choice.to} when {choice.when}" + _map(choice.reset)
+
+
+def _input(signal: Input) -> str:
+    return f"input {signal.name}: {signal.kind} {signal.interpolation} {signal.shape}" + _map(
+        signal.expressions
+    )
+
+
+def _schedule(schedule: Schedule) -> str:
+    times = ", ".join(str(time) for time in schedule.times)
+    clock = f"{schedule.start} {schedule.period} {schedule.count}"
+    return f"schedule {schedule.name} [{times}] {clock} {schedule.terminate}" + _map(schedule.reset)
+
+
+def _map(items: Mapping[str, Expression]) -> str:
+    """Sorted, since the order of rates, variables and resets means nothing."""
+    return " {" + "; ".join(f"{name} = {items[name]}" for name in sorted(items)) + "}"
