@@ -11,7 +11,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TextIO
 
 from hybridsim import __version__
 from hybridsim.cli import cache, check, compare, integrators, models, run
@@ -89,5 +89,12 @@ def _show_traceback_if_wanted() -> bool:
     return wanted
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     complain(f"warning: {message} ({category.__name__})")
