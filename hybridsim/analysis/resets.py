@@ -1,0 +1,42 @@
+"""Which events of a model make its states jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hybridsim.analysis.trajectory import EventLike
+from hybridsim.model import Model
+
+
+@dataclass(frozen=True)
+class Resets:
+    """The events with a declared reset of a state; ``event in resets``.
+
+    Parameters
+    ----------
+    transitions : (component, source, target) of mode changes.
+    names : names of monitors and schedules.
+    """
+
+    transitions: frozenset[tuple[str, str, str]] = frozenset()
+    names: frozenset[str] = frozenset()
+
+    def __contains__(self, event: EventLike) -> bool:
+        if event.kind == "transition":
+            return (event.component, event.source, event.target) in self.transitions
+        return bool({event.guard, event.component} & self.names)
+
+
+def resets_of(model: Model) -> Resets:
+    """The events that reset a state, as the model declares them."""
+    states = {state.name for state in model.states}
+    transitions = frozenset(
+        (component.name, mode.name, choice.to)
+        for component in model.all_components()
+        for mode in component.modes
+        for guard in mode.guards
+        for choice in guard.then
+        if states & choice.reset.keys()
+    )
+    declared = (*model.monitors, *model.schedules)
+    return Resets(transitions, frozenset(item.name for item in declared if states & item.reset.keys()))
