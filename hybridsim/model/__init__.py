@@ -5,6 +5,7 @@ from hybridsim.model.contact import Contact
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.inputs import Input
 from hybridsim.model.law import FrictionLaw
+from hybridsim.model.library import ModelInfo, list_laws, list_models, load, load_law
 from hybridsim.model.model import Model
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
@@ -21,10 +22,15 @@ __all__ = [
     "Input",
     "Mode",
     "Model",
+    "ModelInfo",
     "Monitor",
     "Output",
     "Parameter",
     "Schedule",
     "State",
     "Surface",
+    "list_laws",
+    "list_models",
+    "load",
+    "load_law",
 ]

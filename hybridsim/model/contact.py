@@ -65,10 +65,10 @@ class Contact(Declared):
         """
         force = parse(self.name, self.place)
         backward = self._form("-v", v=self.velocity)
-        forward_slip = self._slip(self.velocity)
-        backward_slip = self._form("-f", f=self._slip(backward))
-        at_rest = self._slip(parse(0))
-        limit = substitute(self._form("limit", limit=self.law.stick), self._values())
+        forward_slip = self.slip_force(self.velocity)
+        backward_slip = self._form("-f", f=self.slip_force(backward))
+        at_rest = self.slip_force(parse(0))
+        limit = self.limit_force()
         loaded: tuple[Guard, ...] = ()
         if self.normal.names - set(constants):
             message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
@@ -91,13 +91,17 @@ class Contact(Declared):
         )
         return Component(self.name, modes, surface=surface, place=self.place)
 
+    def slip_force(self, speed: Expression) -> Expression:
+        """Magnitude of the force when sliding at a speed >= 0, over the model's names."""
+        return substitute(self._form("slip", slip=self.law.slip), {SPEED: speed, **self._values()})
+
+    def limit_force(self) -> Expression:
+        """The most that stick can carry, over the model's names."""
+        return substitute(self._form("stick", stick=self.law.stick), self._values())
+
     def _form(self, template: str, **parts: Expression) -> Expression:
         """An expression built from parts, placed where the contact stands."""
         return substitute(parse(template, self.velocity.place or self.place), parts)
-
-    def _slip(self, speed: Expression) -> Expression:
-        placed = self._form("slip", slip=self.law.slip)
-        return substitute(placed, {SPEED: speed, **self._values()})
 
     def _values(self) -> dict[str, Expression]:
         """Normal load and law parameters as expressions over the model's names."""

@@ -1,0 +1,119 @@
+"""Checks of components: modes, guards, choices, variables, initial mode, surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hybridsim.errors import nearest
+from hybridsim.model.check_names import check_labels
+from hybridsim.model.component import Component, Guard, Mode
+from hybridsim.model.declared import Declared
+from hybridsim.model.scope import Scope
+
+
+def check_automata(scope: Scope) -> None:
+    """Report every component that is no automaton, and rates that two components both claim."""
+    owner: dict[str, str] = {}
+    for component in scope.components:
+        _component(scope, component)
+        for state in dict.fromkeys(name for mode in component.modes for name in mode.der):
+            if state in owner:
+                message = f"components {owner[state]} and {component.name} both give the rate of '{state}'"
+                scope.fail(component, message, "let one set a variable that the other's rate uses.")
+            owner.setdefault(state, component.name)
+    for output in scope.model.outputs:
+        for key in output.modes:
+            _mode_key(scope, output, f"output {output.name}", key)
+
+
+def _component(scope: Scope, component: Component) -> None:
+    what = f"component {component.name}"
+    names = [mode.name for mode in component.modes]
+    if not names:
+        scope.fail(component, f"{what} has no modes", "declare at least one.")
+        return
+    check_labels(scope, f"{what}: mode", component.modes)
+    if component.initial is not None and component.initial not in names:
+        scope.unknown(component, f"{what}: no initial mode", component.initial, names, "modes")
+    if component.initial is None and component.surface is None:
+        remedy = f"write initial = true in one of: {', '.join(names)}."
+        scope.fail(component, f"{what} does not say in which of its {len(names)} modes it starts", remedy)
+    _surface(scope, component, what, names)
+    for mode in component.modes:
+        _variables(scope, component, mode, what)
+        for state in mode.der:
+            known = [part.name for part in scope.model.states]
+            if state not in known:
+                scope.unknown(
+                    mode, f"{what}, mode {mode.name}: a rate of an unknown state", state, known, "states"
+                )
+        check_labels(scope, f"{what}, mode {mode.name}: guard", mode.guards)
+        for guard in mode.guards:
+            _guard(scope, component, guard, f"{what}, mode {mode.name}, guard {guard.name}", names)
+
+
+def _variables(scope: Scope, component: Component, mode: Mode, what: str) -> None:
+    surface = component.surface
+    solved = surface.unknown if surface and mode.name == surface.hold else None
+    for name in component.variables:
+        if name == solved:
+            if name in mode.set:
+                message = f"{what}, mode {mode.name}: '{name}' is set, but this mode solves for it"
+                scope.fail(mode, message, f"leave out set = {{ {name} = ... }}.")
+        elif name not in mode.set:
+            others = [other.name for other in component.modes if name in other.set]
+            where = (
+                f"though mode {others[0]} sets it" if others else "though it is the unknown of the surface"
+            )
+            message = f"{what}, mode {mode.name} does not set '{name}', {where}"
+            scope.fail(mode, message, f"write set = {{ {name} = ... }} in every mode.")
+
+
+def _guard(scope: Scope, component: Component, guard: Guard, what: str, names: list[str]) -> None:
+    if component.surface is not None:
+        if guard.then:
+            scope.fail(guard, f"{what} has choices, but a surface decides", "leave out 'then'.")
+    elif bool(guard.then) == (guard.fatal is not None):
+        found = "both choices and a fatal message" if guard.then else "no choices"
+        scope.fail(
+            guard, f"{what} has {found}", 'write then = [{ to = "..." }], or fatal = "why the run ends".'
+        )
+    closed = False
+    for choice in guard.then:
+        if closed:
+            message = f"{what}: the choice of '{choice.to}' is never reached"
+            scope.fail(choice, message, "an unconditional choice comes last.")
+        closed = closed or choice.when is None
+        if choice.to not in names:
+            scope.unknown(choice, f"{what}: there is no mode", choice.to, names, "modes")
+        check_reset(scope, choice, what, choice.reset)
+
+
+def check_reset(scope: Scope, part: Declared, what: str, names: Iterable[str]) -> None:
+    """Report a reset of what is neither a state nor a discrete state."""
+    for name in names:
+        if name not in scope.changed_by_reset:
+            kind = scope.kinds.get(name)
+            remedy = (
+                f"'{name}' is a {kind}." if kind else nearest(name, scope.changed_by_reset, kind="states")
+            )
+            scope.fail(part, f"{what} resets '{name}', which is no state", remedy)
+
+
+def _surface(scope: Scope, component: Component, what: str, names: list[str]) -> None:
+    surface = component.surface
+    if surface is None:
+        return
+    sides = (surface.above, surface.below, surface.hold)
+    for name in sides:
+        if name not in names:
+            scope.unknown(surface, f"{what}, surface: there is no mode", name, names, "modes")
+    if set(sides) <= set(names) and (len(set(sides)) < 3 or len(names) != 3):
+        message = f"{what}: a surface has three modes, above, below and hold; these are {', '.join(names)}"
+        scope.fail(surface, message, "give it exactly three.")
+
+
+def _mode_key(scope: Scope, part: Declared, what: str, key: str) -> None:
+    known = [f"{component.name}.{mode.name}" for component in scope.components for mode in component.modes]
+    if key not in known:
+        scope.unknown(part, f"{what}: there is no component.mode", key, known, "modes")

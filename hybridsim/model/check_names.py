@@ -1,0 +1,75 @@
+"""Checks of names: well formed, not reserved, one meaning each."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable
+
+from hybridsim.expr.grammar import RESERVED
+from hybridsim.model.declared import Declared
+from hybridsim.model.scope import Scope
+
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+-]*")
+
+
+def check_names(scope: Scope) -> None:
+    """Report every name that cannot be, and every one that stands for two things."""
+    model = scope.model
+    _label(scope, model, "model", model.name)
+    if not model.states and not model.discrete:
+        scope.fail(
+            model, f"model {model.name} has no states", "declare at least one in [states] or [discrete]."
+        )
+    seen: dict[str, str] = {}
+    for kind, name, part in scope.declarations():
+        check_identifier(scope, part, kind, name)
+        if name in seen:
+            message = f"the name '{name}' is used twice, for a {seen[name]} and for a {kind}"
+            scope.fail(part, message, "rename one of them.")
+        seen.setdefault(name, kind)
+    check_labels(scope, "component", [*model.contacts, *model.components])
+    check_labels(scope, "event", [*model.monitors, *model.schedules])
+    check_labels(scope, "output", model.outputs)
+    for output in model.outputs:
+        check_identifier(scope, output, "output", output.name)
+        if output.name in scope.all_names and output.expr.text != output.name:
+            message = f"the output '{output.name}' is {output.expr.text}, but the model has a {seen[output.name]} of that name"
+            scope.fail(output, message, "rename the output.")
+
+
+def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> bool:
+    """Whether a name can stand in expressions; reported if not."""
+    good = isinstance(name, str) and _IDENTIFIER.fullmatch(name) and not name.startswith("__")
+    if not isinstance(name, str) or not good:
+        scope.fail(
+            part,
+            f"{kind} '{name}': not a name",
+            "a name is made of ASCII letters, digits and _, no digit first.",
+        )
+        return False
+    if name in RESERVED or keyword.iskeyword(name):
+        scope.fail(
+            part,
+            f"{kind} '{name}': the name is reserved",
+            "functions, pi, t (time) and Python's words are taken.",
+        )
+        return False
+    return True
+
+
+def _label(scope: Scope, part: Declared, kind: str, name: object) -> None:
+    if not isinstance(name, str) or not _LABEL.fullmatch(name):
+        scope.fail(part, f"{kind} {name!r}: not a name", "use ASCII letters, digits, _, - and +.")
+
+
+def check_labels(scope: Scope, kind: str, parts: Iterable[Declared]) -> None:
+    """Report labels (of components, modes, guards, events) that are no names, or that occur twice."""
+    seen = set()
+    for part in parts:
+        name = getattr(part, "name", "")
+        _label(scope, part, kind, name)
+        if name in seen:
+            scope.fail(part, f"{kind} '{name}' is declared twice", "rename one of them.")
+        seen.add(name)

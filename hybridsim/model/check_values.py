@@ -1,0 +1,104 @@
+"""Checks of numbers at the parameters as given: finite, periods above zero, loads and limits not negative."""
+
+from __future__ import annotations
+
+from hybridsim.errors import ModelError
+from hybridsim.expr import Expression, evaluate, parse
+from hybridsim.expr.evaluate import dependency_order
+from hybridsim.model.contact import Contact
+from hybridsim.model.declared import Declared
+from hybridsim.model.inputs import Input
+from hybridsim.model.scope import Scope
+
+# A limit below the force at the onset of slip by less than this share is rounding in a law such as Stribeck's, whose
+# two coefficients were set equal: a few operations, each off by 1e-16.
+ROUNDING = 1e-12
+
+
+def check_values(scope: Scope) -> None:
+    """Report parameters that have no value, and values that mean nothing."""
+    model = scope.model
+    try:
+        values = model.parameter_values()
+    except ModelError as fault:
+        scope.errors.append(fault)
+        return
+    for state in (*model.states, *model.discrete):
+        _value(scope, state.start, values)
+    for state in model.states:
+        if state.nominal is not None and not 0 < state.nominal < float("inf"):
+            scope.fail(state, f"state {state.name}: nominal is {state.nominal!r}", "give a size above zero.")
+    for schedule in model.schedules:
+        for time in (*schedule.times, *([schedule.start] if schedule.start else [])):
+            _value(scope, time, values)
+        _positive(scope, schedule, f"schedule {schedule.name}", "period", schedule.period, values)
+    for signal in model.inputs:
+        _input(scope, signal, values)
+    constants = _constant_definitions(scope, values)
+    for contact in model.contacts:
+        _contact(scope, contact, constants)
+
+
+def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:
+    """Value of an expression; None, reported, where it has none."""
+    try:
+        return evaluate(expr, values)
+    except ModelError as fault:
+        scope.errors.append(fault)
+        return None
+
+
+def _positive(
+    scope: Scope, part: Declared, what: str, field: str, expr: Expression | None, values: dict[str, float]
+) -> None:
+    value = None if expr is None else _value(scope, expr, values)
+    if expr is not None and value is not None and value <= 0:
+        shown = "" if expr.is_constant else f" ({expr.text})"
+        scope.fail(part, f"{what}: {field} is {value:g}{shown}", "it must be above zero.")
+
+
+def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
+    what = f"input {signal.name}"
+    for field, expr in signal.expressions.items():
+        if field in ("period", "duration"):
+            _positive(scope, signal, what, field, expr, values)
+            continue
+        value = _value(scope, expr, values)
+        if field == "duty" and value is not None and not 0 < value < 1:
+            scope.fail(signal, f"{what}: duty is {value:g}", "it must lie between 0 and 1.")
+
+
+def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, float]:
+    """Parameters and definitions over them, with values; the latter only as far as they have one."""
+    found = dict(values)
+    definitions = dict(scope.model.definitions)
+    for name in dependency_order(definitions, "definitions"):
+        if definitions[name].names <= found.keys():
+            value = _value(scope, definitions[name], found)
+            if value is not None:
+                found[name] = value
+    return found
+
+
+def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
+    """Loads, and forces at the onset of slip, as far as they are constant."""
+    what = f"contact {contact.name}"
+    if contact.normal.names <= values.keys():
+        load = _value(scope, contact.normal, values)
+        if load is not None and load < 0:
+            shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
+            scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative.")
+            return
+    forces = contact.limit_force(), contact.slip_force(parse(0))
+    if not all(force.names <= values.keys() for force in forces):
+        return
+    limit, onset = (_value(scope, force, values) for force in forces)
+    if limit is None or onset is None:
+        return
+    for name, force in (("limit of stick", limit), ("slip force at v = 0", onset)):
+        if force < 0:
+            scope.fail(contact, f"{what}: the {name} is {force:g}", "a friction force must not be negative.")
+            return
+    if onset - limit > ROUNDING * onset:
+        message = f"{what}: the limit of stick {limit:g} is below the slip force at v = 0, {onset:g}"
+        scope.fail(contact, message, "static friction is at least kinetic friction: mu_s >= mu_k.")

@@ -1,0 +1,139 @@
+"""Models and laws by name or path: what comes with the package, and files of the user."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from hybridsim.errors import ModelError, Place, nearest
+from hybridsim.model.law import FrictionLaw
+from hybridsim.model.model import Model
+
+# A model of a thousand states takes some 100 kB; what is larger is no model.
+MAX_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """What the list of packaged models says of each."""
+
+    name: str
+    title: str
+    source: str
+    path: Path
+
+
+def load(name_or_path: str | os.PathLike[str]) -> Model:
+    """A model by the name of one that comes with the package, or by the path of a ``.toml`` file.
+
+    Errors
+    ------
+    ModelError: no such model (the nearest names are listed) or file; the file is empty, too large, no text, no TOML;
+    or all its faults in one.
+    """
+    text = os.fspath(name_or_path)
+    if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or os.sep in text:
+        path = Path(text)
+    else:
+        path = models_folder() / f"{text}.toml"
+        names = [info.stem for info in _model_files()]
+        if text not in names:
+            raise ModelError(
+                f"there is no model '{text}'",
+                remedy=nearest(text, names, kind="models")
+                + " A file of yours is given by its path, ending in .toml.",
+            )
+    return Model.from_toml(read_text(path), str(path))
+
+
+def list_models() -> tuple[ModelInfo, ...]:
+    """The models that come with the package, by name."""
+    found = []
+    for path in _model_files():
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        found.append(ModelInfo(path.stem, data.get("title", ""), data.get("source", ""), path))
+    return tuple(found)
+
+
+def list_laws() -> tuple[str, ...]:
+    """Names of the friction laws that come with the package."""
+    return tuple(path.stem for path in sorted((models_folder() / "laws").glob("*.toml")))
+
+
+@lru_cache(maxsize=64)
+def load_law(name: str) -> FrictionLaw:
+    """A friction law of the package by name, ready for a `Contact`.
+
+    Errors
+    ------
+    ModelError with the nearest names.
+    """
+    from hybridsim.model.toml_laws import read_laws
+    from hybridsim.model.toml_read import open_text
+
+    if name not in list_laws():
+        raise ModelError(f"there is no law '{name}'", remedy=nearest(name, list_laws(), kind="laws"))
+    path = models_folder() / "laws" / f"{name}.toml"
+    root = open_text(read_text(path), str(path), "the law")
+    root.only("schema", "look", "laws")
+    laws = read_laws(root)
+    if root.source.errors:
+        raise ModelError.collect(root.source.errors, str(path))
+    return laws[name]
+
+
+def models_folder() -> Path:
+    """Where the packaged models are: inside the wheel, or beside the package in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "models"
+    return inside if inside.is_dir() else package.parent / "models"
+
+
+def read_text(path: Path) -> str:
+    """Text of a model file; ModelError naming what is wrong with the file."""
+    place = Place(str(path))
+    try:
+        if path.is_dir():
+            raise ModelError("this is a folder", place=place, remedy="give the .toml file in it.")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            remedy = "put tables into CSV files beside the model."
+            raise ModelError(
+                f"the file has {size} bytes, {MAX_BYTES} are allowed", place=place, remedy=remedy
+            )
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise ModelError("there is no such file", place=place, remedy=_beside(path)) from None
+    except (OSError, ValueError) as fault:
+        reason = getattr(fault, "strerror", None) or str(fault)
+        raise ModelError(
+            f"the file cannot be read: {reason}", place=place, remedy="give a readable file."
+        ) from None
+    if len(data) > MAX_BYTES:
+        raise ModelError(f"the file has over {MAX_BYTES} bytes", place=place, remedy="give a model file.")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        line = data.count(b"\n", 0, fault.start) + 1
+        raise ModelError(
+            f"this is no text: byte {data[fault.start]:#04x} at offset {fault.start} is not UTF-8",
+            place=Place(str(path), line),
+            remedy="a model is a TOML file in UTF-8.",
+        ) from None
+
+
+def _beside(path: Path) -> str:
+    """Near names in the same folder and among the packaged models."""
+    try:
+        names = [other.name for other in path.parent.glob("*.toml")]
+    except OSError:
+        names = []
+    return nearest(path.name, [*names, *(known.stem for known in _model_files())], kind="models")
+
+
+def _model_files() -> list[Path]:
+    return sorted(models_folder().glob("*.toml"))

@@ -1,0 +1,125 @@
+"""Where things stand in a TOML text: from the path of a key to its line, which `tomllib` forgets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+Path = tuple[str | int, ...]
+_BLANK = " \t"
+
+
+def positions(text: str) -> Mapping[Path, int]:
+    """Line (from 1) of every key and array element of a valid TOML text.
+
+    The text must have passed `tomllib`: nothing is checked again here, and an escape in a quoted key is not resolved.
+    """
+    return _Scanner(text).scan()
+
+
+class _Scanner:
+    """Reads keys and skips values; `at` is the place in the text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text + "\n"
+        self.at = 0
+        self.line = 1
+        self.found: dict[Path, int] = {}
+        self.elements: dict[Path, int] = {}
+
+    def scan(self) -> dict[Path, int]:
+        table: Path = ()
+        while self.skip(_BLANK + "\r\n"):
+            if self.text[self.at] == "[":
+                table = self.header()
+            else:
+                self.pair(table)
+        return self.found
+
+    def skip(self, characters: str) -> bool:
+        """Go past the given characters and comments; False at the end."""
+        while self.at < len(self.text):
+            character = self.text[self.at]
+            if character == "#":
+                self.move(self.text.index("\n", self.at))
+            elif character in characters:
+                self.move(self.at + 1)
+            else:
+                return True
+        return False
+
+    def move(self, to: int) -> None:
+        self.line += self.text.count("\n", self.at, to)
+        self.at = to
+
+    def note(self, path: Path) -> None:
+        for length in range(1, len(path) + 1):
+            self.found.setdefault(path[:length], self.line)
+
+    def header(self) -> Path:
+        array = self.text.startswith("[[", self.at)
+        self.move(self.at + (2 if array else 1))
+        path = self.key()
+        if array:
+            count = self.elements[path] = self.elements.get(path, -1) + 1
+            path = (*path, count)
+        self.note(path)
+        self.skip(_BLANK + "]")
+        return path
+
+    def pair(self, table: Path) -> None:
+        path = (*table, *self.key())
+        self.note(path)
+        self.move(self.at + 1)  # the equals sign
+        self.value(path)
+
+    def key(self) -> Path:
+        parts: list[str | int] = []
+        while True:
+            self.skip(_BLANK)
+            start = self.at
+            quote = self.text[start]
+            if quote in "\"'":
+                self.string(quote)
+                parts.append(self.text[start + 1 : self.at - 1])
+            else:
+                while self.text[self.at] not in " \t.=]\n":
+                    self.at += 1
+                parts.append(self.text[start : self.at])
+            self.skip(_BLANK)
+            if self.text[self.at] != ".":
+                return tuple(parts)
+            self.move(self.at + 1)
+
+    def value(self, path: Path) -> None:
+        self.skip(_BLANK)
+        character = self.text[self.at]
+        if character in "\"'":
+            triple = character * 3
+            self.string(triple if self.text.startswith(triple, self.at) else character)
+        elif character == "{":
+            self.move(self.at + 1)
+            while self.skip(_BLANK + ",\r\n") and self.text[self.at] != "}":
+                self.pair(path)
+            self.move(self.at + 1)
+        elif character == "[":
+            self.move(self.at + 1)
+            index = 0
+            while self.skip(_BLANK + ",\r\n") and self.text[self.at] != "]":
+                self.note((*path, index))
+                self.value((*path, index))
+                index += 1
+            self.move(self.at + 1)
+        else:
+            while self.text[self.at] not in ",]}#\n":
+                self.at += 1
+
+    def string(self, quote: str) -> None:
+        """Go past a string that begins here; a quote that is escaped, or one of several at the end, is inside."""
+        end = self.at + len(quote)
+        while not self.text.startswith(quote, end):
+            end += 2 if self.text[end] == "\\" and quote[0] == '"' else 1
+        end += len(quote)
+        if len(quote) == 3:
+            while self.text[end] == quote[0]:
+                end += 1
+        self.move(end)

@@ -1,0 +1,122 @@
+"""What the names of a model mean, and the list of faults that the checks add to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import ExpressionError, ModelError, Place, nearest
+from hybridsim.expr import Expression, require_names
+from hybridsim.expr.grammar import TIME
+from hybridsim.model.component import Component
+from hybridsim.model.declared import Declared
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+
+class Scope:
+    """The names of one model by kind; checks report to it."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.errors: list[ModelError] = []
+        self.components = tuple(self._expanded())
+
+    def _expanded(self) -> Iterator[Component]:
+        """The components that could be built; a contact that could not is reported."""
+        constants = self.model.constant_names()
+        for contact in self.model.contacts:
+            try:
+                yield contact.component(constants)
+            except ModelError as fault:
+                self.errors.append(fault)
+        yield from self.model.components
+
+    def fail(self, part: Declared, message: str, remedy: str) -> None:
+        self.errors.append(part.error(message, remedy))
+
+    def unknown(self, part: Declared, what: str, name: str, known: Iterable[str], kind: str) -> None:
+        """Report a name that is not among the known ones."""
+        self.fail(part, f"{what} '{name}'", nearest(name, known, kind=kind))
+
+    @cached_property
+    def kinds(self) -> dict[str, str]:
+        """Kind of every quantity, for messages: ``{"k": "parameter", ...}``."""
+        return {name: kind for kind, name, _ in self.declarations()}
+
+    def declarations(self) -> Iterator[tuple[str, str, Declared]]:
+        """(kind, name, part) of everything that expressions can name."""
+        model = self.model
+        for kind, parts in (
+            ("parameter", model.parameters),
+            ("state", model.states),
+            ("discrete state", model.discrete),
+            ("input", model.inputs),
+        ):
+            for part in parts:
+                yield kind, part.name, part
+        for name, expr in model.definitions:
+            yield "definition", name, Declared(place=expr.place)
+        for contact in model.contacts:
+            yield "contact force", contact.name, contact
+        for component in model.components:
+            for name in component.variables:
+                yield f"variable of component {component.name}", name, component
+
+    @cached_property
+    def changed_by_reset(self) -> tuple[str, ...]:
+        return tuple(part.name for part in (*self.model.states, *self.model.discrete))
+
+    @cached_property
+    def all_names(self) -> frozenset[str]:
+        return frozenset({*self.kinds, TIME})
+
+    @cached_property
+    def parameters(self) -> frozenset[str]:
+        return frozenset(parameter.name for parameter in self.model.parameters)
+
+    def need(self, expr: Expression, what: str, known: Iterable[str], *, boolean: bool = False) -> None:
+        """Report unknown names in an expression, and a number where a condition is wanted or the reverse."""
+        allowed = frozenset(known)
+        misplaced = sorted((expr.names - allowed) & self.all_names)
+        try:
+            if misplaced:
+                name = misplaced[0]
+                kind = "the time" if name == TIME else f"the {self.kinds[name]}"
+                remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
+                raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
+            require_names(expr, allowed)
+            if boolean and not expr.is_boolean:
+                raise expr.error(f"'{expr.text}' is a number", remedy="a condition is needed, e.g. 'x > 0'.")
+            if expr.is_boolean and not boolean:
+                raise expr.error(f"'{expr.text}' is true or false", remedy="a number is needed.")
+        except ExpressionError as fault:
+            place = fault.place or Place(text=expr.text)
+            self.errors.append(ExpressionError(f"{what}: {fault.message}", place=place, remedy=fault.remedy))
+
+    def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
+        """The same for a law, which sees its own names and nothing of the model."""
+        foreign = sorted(expr.names - frozenset(known))
+        if foreign or expr.is_boolean:
+            reason = f"the law has no '{foreign[0]}'" if foreign else f"'{expr.text}' is true or false"
+            remedy = (
+                f"it knows {', '.join(sorted(known))}; declare a parameter of the law, and give its value in the contact."
+                if foreign
+                else "a number is needed."
+            )
+            fault = expr.error(f"{what}: {reason}", node=None, remedy=remedy)
+            self.errors.append(fault)
+
+    def reached(self, expr: Expression) -> frozenset[str]:
+        """Names that an expression depends on, those behind definitions included."""
+        definitions = dict(self.model.definitions)
+        found: set[str] = set()
+        open_names = set(expr.names)
+        while open_names:
+            name = open_names.pop()
+            if name not in found:
+                found.add(name)
+                open_names |= definitions[name].names if name in definitions else frozenset()
+        return frozenset(found)

@@ -1,0 +1,84 @@
+"""Components out of TOML: modes, guards and choices, and which mode is the initial one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
+from hybridsim.model.toml_table import Table
+
+# A file with one automaton needs no name for it: its modes stand in [modes.*].
+SINGLE = "mode"
+
+
+def read_components(root: Table) -> Iterable[Component]:
+    """The automaton of the top-level [modes.*], then those of [components.*]."""
+    if "modes" in root.data or "initial" in root.data:
+        yield _component(SINGLE, root)
+    for name, table in root.entries("components", "component"):
+        table.only("modes", "initial", "surface")
+        yield _component(name, table)
+
+
+def _component(name: str, table: Table) -> Component:
+    tables = dict(table.entries("modes", "mode"))
+    if not tables:
+        table.fail("it has no modes", f"write [components.{name}.modes.NAME].")
+    marked = [mode for mode, part in tables.items() if part.flag("initial")]
+    named = table.text("initial") if "initial" in table.data else None
+    for mode in marked:
+        if mode != (named or marked[0]):
+            remedy = "a component starts in one mode: mark one."
+            table.fail(
+                f"two initial modes, '{named or marked[0]}' and '{mode}'", remedy, "modes", mode, "initial"
+            )
+    surface = _surface(table)
+    modes = [_mode(mode, part) for mode, part in tables.items()]
+    return Component(name, tuple(modes), named or (marked[0] if marked else None), surface, place=table.place)
+
+
+def _mode(name: str, table: Table) -> Mode:
+    table.only("guards", "der", "set", "initial")
+    guards = tuple(
+        _guard(guard, part) for guard, part in table.entries("guards", f"mode {name}, guard", "expr")
+    )
+    return Mode(name, guards, table.expressions("der"), table.expressions("set"), place=table.place)
+
+
+def _guard(name: str, table: Table) -> Guard:
+    table.only("expr", "then", "fatal")
+    expr = table.needed("expr", 'write expr = "what stays >= 0 while the mode lasts".')
+    given = table.data.get("then", [])
+    then = []
+    for index, value in enumerate(given if isinstance(given, list) else [given]):
+        keys = ("then", index) if isinstance(given, list) else ("then",)
+        part = table.sub(value, f"{table.kind}, then", "to", *keys)
+        if part is not None:
+            then.append(_choice(part))
+    fatal = table.text("fatal") if "fatal" in table.data else None
+    return Guard(name, expr, tuple(then), fatal, place=table.place)
+
+
+def _choice(table: Table) -> Choice:
+    table.only("to", "when", "reset")
+    table.require("to", 'write to = "the next mode".')
+    return Choice(table.text("to"), table.expression("when"), table.expressions("reset"), place=table.place)
+
+
+def _surface(parent: Table) -> Surface | None:
+    if "surface" not in parent.data or not parent.path:
+        return None
+    table = parent.sub(parent.data["surface"], f"{parent.kind}, surface", None, "surface")
+    if table is None:
+        return None
+    names = ("unknown", "above", "below", "hold")
+    table.only("function", *names, "jump_above", "jump_below")
+    for key in names:
+        table.require(key, f'write {key} = "...".')
+    return Surface(
+        table.needed("function", 'write function = "s(t, x)".'),
+        *(table.text(key) for key in names),
+        table.needed("jump_above", "write jump_above = 0 where nothing jumps at a release."),
+        table.needed("jump_below", "write jump_below = 0 where nothing jumps at a release."),
+        place=table.place,
+    )

@@ -1,0 +1,175 @@
+"""A model out of a TOML text: the tables of the file form, one function each."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from hybridsim.errors import ModelError, Place
+from hybridsim.expr import Expression
+from hybridsim.model.contact import Contact
+from hybridsim.model.law import FrictionLaw
+from hybridsim.model.model import Model
+from hybridsim.model.monitor import Monitor
+from hybridsim.model.positions import positions
+from hybridsim.model.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.schedule import Schedule
+from hybridsim.model.toml_automata import read_components
+from hybridsim.model.toml_inputs import read_inputs
+from hybridsim.model.toml_laws import read_law_of_contact, read_laws
+from hybridsim.model.toml_table import Source, Table
+
+SCHEMA = 1
+KEYS = (
+    "schema", "name", "title", "source", "description", "look", "parameters", "states", "discrete", "definitions",
+    "inputs", "laws", "contacts", "initial", "modes", "components", "monitors", "schedules", "clocks", "outputs",
+)  # fmt: skip
+
+
+def read_model(text: str, path: str | None = None) -> Model:
+    """Read and validate a model.
+
+    Errors
+    ------
+    ModelError: not TOML (with line and column), or all faults of form in one, or all faults of content in one.
+    """
+    root = open_text(text, path, "the model")
+    model = _model(root, Path(path).parent if path else Path())
+    if root.source.errors:
+        raise ModelError.collect(root.source.errors, path or f"model {model.name}")
+    return model.validate()
+
+
+def open_text(text: str, path: str | None, kind: str) -> Table:
+    """The top table of a TOML text; ModelError where the text is empty or no TOML."""
+    if not text.strip():
+        raise ModelError("the file is empty", place=Place(path), remedy="a model has at least [states].")
+    try:
+        data = tomllib.loads(text)
+        source = Source(path, text.splitlines(), positions(text))
+    except tomllib.TOMLDecodeError as fault:
+        raise _not_toml(fault, text, path) from None
+    except (ValueError, RecursionError) as fault:
+        reason = "it is nested too deeply" if isinstance(fault, RecursionError) else str(fault)
+        raise ModelError(f"not TOML: {reason}", place=Place(path), remedy="simplify the file.") from None
+    return Table(source, (), data, kind)
+
+
+def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> ModelError:
+    found = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
+    message = re.sub(r"\s*\(at [^)]*\)", "", str(fault))
+    lines = text.splitlines()
+    line, column = (int(found[1]), int(found[2]) - 1) if found else (len(lines), 0)
+    shown = lines[line - 1] if 0 < line <= len(lines) else ""
+    return ModelError(
+        f"not TOML: {message[:1].lower()}{message[1:]}",
+        place=Place(path, line, column, shown),
+        remedy='TOML wants key = value, expressions in double quotes: der = "-k*x".',
+    )
+
+
+def _model(root: Table, folder: Path) -> Model:
+    root.only(*KEYS)
+    if root.data.get("schema", SCHEMA) != SCHEMA:
+        root.fail(f"schema {root.data['schema']!r} is not known", f"write schema = {SCHEMA}.", "schema")
+    name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
+    laws = read_laws(root)
+    return Model(
+        name=name,
+        states=tuple(_states(root)),
+        parameters=tuple(_parameters(root)),
+        discrete=tuple(_discrete(root)),
+        components=tuple(read_components(root)),
+        contacts=tuple(_contacts(root, laws)),
+        inputs=tuple(read_inputs(root, folder)),
+        monitors=tuple(_monitors(root)),
+        schedules=(*_schedules(root), *_clocks(root)),
+        outputs=tuple(_outputs(root)),
+        definitions=tuple(root.expressions("definitions").items()),
+        title=root.text("title"),
+        source=root.text("source"),
+        description=root.text("description"),
+        look=root.text("look"),
+        path=root.source.file,
+        place=Place(root.source.file),
+    )
+
+
+def _parameters(root: Table) -> Iterable[Parameter]:
+    for name, table in root.entries("parameters", "parameter", "value"):
+        table.only("value", "unit", "title")
+        value = table.needed("value", "write value = a number or an expression.")
+        yield Parameter(name, value, table.text("unit"), table.text("title"), place=table.place)
+
+
+def _states(root: Table) -> Iterable[State]:
+    for name, table in root.entries("states", "state"):
+        table.only("start", "der", "unit", "nominal")
+        start = table.needed("start", "write start = the initial value.")
+        der = table.needed("der", 'write der = "..." (the modes may override it in their own der).')
+        yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
+
+
+def _discrete(root: Table) -> Iterable[Discrete]:
+    for name, table in root.entries("discrete", "discrete state", "start"):
+        table.only("start", "unit")
+        start = table.needed("start", "write start = the initial value.")
+        yield Discrete(name, start, table.text("unit"), place=table.place)
+
+
+def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
+    for name, table in root.entries("contacts", "contact"):
+        table.only("velocity", "normal", "law")
+        velocity = table.needed("velocity", 'write velocity = "the relative velocity".')
+        normal = table.needed("normal", 'write normal = "the normal load".')
+        law = read_law_of_contact(table, laws)
+        if law is not None:
+            yield Contact(name, velocity, normal, *law, place=table.place)
+
+
+def _monitors(root: Table) -> Iterable[Monitor]:
+    for name, table in root.entries("monitors", "monitor", "expr"):
+        table.only("expr", "direction", "action", "reset")
+        expr = table.needed("expr", 'write expr = "the scalar to watch".')
+        action = table.text("action", "reset" if "reset" in table.data else "record")
+        direction = table.text("direction", "both")
+        yield Monitor(name, expr, direction, action, table.expressions("reset"), place=table.place)
+
+
+def _schedules(root: Table) -> Iterable[Schedule]:
+    for name, table in root.entries("schedules", "schedule", "times"):
+        table.only("times", "start", "period", "count", "reset", "terminate")
+        yield Schedule(
+            name,
+            tuple(_times(table)),
+            table.expression("start"),
+            table.expression("period"),
+            table.count("count"),
+            table.expressions("reset"),
+            table.flag("terminate"),
+            place=table.place,
+        )
+
+
+def _times(table: Table) -> Iterable[Expression]:
+    times: Any = table.data.get("times", [])
+    for index, time in enumerate(times if isinstance(times, list) else [times]):
+        yield table.parsed(time, "times", index)
+
+
+def _clocks(root: Table) -> Iterable[Schedule]:
+    for name, table in root.entries("clocks", "clock"):
+        table.only("period", "offset", "set")
+        period = table.needed("period", "write period = the time between ticks.")
+        start = table.expression("offset")
+        yield Schedule(name, start=start, period=period, reset=table.expressions("set"), place=table.place)
+
+
+def _outputs(root: Table) -> Iterable[Output]:
+    for name, table in root.entries("outputs", "output", "expr"):
+        table.only("expr", "unit", "modes")
+        expr = table.needed("expr", 'write expr = "what to look at".')
+        yield Output(name, expr, table.text("unit"), table.expressions("modes"), place=table.place)

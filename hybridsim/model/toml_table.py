@@ -1,0 +1,145 @@
+"""One TOML table while it is read: hands out checked values, collects every fault with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from hybridsim.errors import ExpressionError, ModelError, Place, nearest
+from hybridsim.expr import Expression, parse
+from hybridsim.model.positions import Path
+
+_ZERO = parse(0)
+
+
+@dataclass
+class Source:
+    """The text that is read, where its keys stand, and the faults found so far."""
+
+    file: str | None
+    lines: list[str]
+    positions: Mapping[Path, int]
+    errors: list[ModelError] = field(default_factory=list)
+
+    def place(self, path: Path) -> Place:
+        """Place of a key, or of the nearest table around it that has a line."""
+        while path and path not in self.positions:
+            path = path[:-1]
+        line = self.positions.get(path)
+        text = self.lines[line - 1] if line else None
+        key = str(path[-1]) if path else ""
+        column = text.find(key) if text and key in text else None
+        return Place(self.file, line, column, text)
+
+
+class Table:
+    """A table at a path; every getter reports a wrong type and returns a stand-in, so that reading goes on."""
+
+    def __init__(self, source: Source, path: Path, data: Mapping[str, Any], kind: str) -> None:
+        self.source = source
+        self.path = path
+        self.data = data
+        self.kind = kind
+        self.place = source.place(path)
+
+    def fail(self, message: str, remedy: str, *keys: str | int) -> None:
+        """Note a fault at this table, or at a key of it."""
+        place = self.source.place((*self.path, *keys))
+        self.source.errors.append(ModelError(f"{self.kind}: {message}", place=place, remedy=remedy))
+
+    def only(self, *known: str) -> None:
+        """Report every key that is not known here."""
+        for key in self.data:
+            if key not in known:
+                self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
+
+    def require(self, key: str, remedy: str) -> bool:
+        """Whether the key is there; reports it if not."""
+        if key not in self.data:
+            self.fail(f"'{key}' is missing", remedy)
+        return key in self.data
+
+    def text(self, key: str, default: str = "") -> str:
+        return str(self._typed(key, str, "a text in quotes", default))
+
+    def flag(self, key: str) -> bool:
+        return bool(self._typed(key, bool, "true or false", False))
+
+    def count(self, key: str) -> int | None:
+        value = self.data.get(key)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int):
+            self.fail(f"'{key}' is {_shown(value)}", "it must be a whole number.", key)
+            return None
+        return value
+
+    def real(self, key: str) -> float | None:
+        value = self.data.get(key)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.fail(f"'{key}' is {_shown(value)}", "it must be a number.", key)
+            return None
+        return float(value)
+
+    def expression(self, key: str, remedy: str | None = None) -> Expression | None:
+        """The expression under a key; None where it is absent, which is a fault if a remedy is given."""
+        if key not in self.data:
+            if remedy is None:
+                return None
+            self.fail(f"'{key}' is missing", remedy)
+            return _ZERO
+        return self.parsed(self.data[key], key)
+
+    def needed(self, key: str, remedy: str) -> Expression:
+        return self.expression(key, remedy) or _ZERO
+
+    def parsed(self, value: Any, *keys: str | int) -> Expression:
+        """An expression out of a TOML value that stands at a key of this table."""
+        place = self.source.place((*self.path, *keys))
+        try:
+            return parse(value, Place(place.file, place.line))
+        except ExpressionError as fault:
+            what = ".".join(str(key) for key in keys if key != "value")
+            message = f"{self.kind}{', ' + what if what else ''}: {fault.message}"
+            if fault.place is None or fault.place.text is None:
+                fault = ExpressionError(fault.message, place=place, remedy=fault.remedy)
+            self.source.errors.append(ExpressionError(message, place=fault.place, remedy=fault.remedy))
+            return _ZERO
+
+    def expressions(self, key: str) -> dict[str, Expression]:
+        """A table of expressions under a key; empty where it is absent."""
+        found = self._typed(key, dict, "a table of expressions", {})
+        return {name: self.parsed(value, key, name) for name, value in found.items()}
+
+    def entries(self, key: str, kind: str, shorthand: str | None = None) -> Iterator[tuple[str, Table]]:
+        """Named sub-tables under a key; a plain value stands for a table with the ``shorthand`` key alone."""
+        for name, value in self._typed(key, dict, "a table", {}).items():
+            table = self.sub(value, f"{kind} {name}", shorthand, key, name)
+            if table is not None:
+                yield name, table
+
+    def sub(self, value: Any, kind: str, shorthand: str | None, *keys: str | int) -> Table | None:
+        """A table out of a value at a key; None, reported, where it is none."""
+        if not isinstance(value, dict):
+            if shorthand is None or isinstance(value, list):
+                self.fail(f"{kind} is {_shown(value)}", "it must be a table { ... }.", *keys)
+                return None
+            value = {shorthand: value}
+        return Table(self.source, (*self.path, *keys), value, kind)
+
+    def _typed(self, key: str, kind: type, wanted: str, default: Any) -> Any:
+        value = self.data.get(key, default)
+        if not isinstance(value, kind):
+            self.fail(f"'{key}' is {_shown(value)}", f"it must be {wanted}.", key)
+            return default
+        return value
+
+
+def _shown(value: Any) -> str:
+    names = {bool: "true or false", dict: "a table", list: "a list", str: "a text"}
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    what = names.get(type(value), type(value).__name__)
+    return f"{what} ({text if len(text) <= 40 else text[:37] + '...'})"

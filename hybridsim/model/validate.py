@@ -1,0 +1,34 @@
+"""Whether a declaration holds together: every check, all faults collected."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import ModelError
+from hybridsim.model.check_automata import check_automata
+from hybridsim.model.check_contacts import check_contacts
+from hybridsim.model.check_expressions import check_expressions
+from hybridsim.model.check_names import check_names
+from hybridsim.model.check_signals import check_signals
+from hybridsim.model.check_values import check_values
+from hybridsim.model.scope import Scope
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+
+def find_errors(model: Model) -> tuple[ModelError, ...]:
+    """All faults of a model, in the order of the checks.
+
+    Names come first, then how the parts fit together, then the expressions; values are only looked at where all of
+    that is sound, since they would repeat the same faults in other words.
+    """
+    scope = Scope(model)
+    check_names(scope)
+    check_automata(scope)
+    check_contacts(scope)
+    check_signals(scope)
+    check_expressions(scope)
+    if not scope.errors:
+        check_values(scope)
+    return tuple(scope.errors)
