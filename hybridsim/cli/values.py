@@ -104,9 +104,7 @@ def changed_model(args: argparse.Namespace) -> Model:
             model = model.with_(**_expressions(args.param, "-p"))
         if args.x0:
             model = model.with_start(**_expressions(args.x0, "--x0"))
-        model.parameter_values()
-        model.start_values()
-    return model
+        return model.validate()
 
 
 @contextmanager

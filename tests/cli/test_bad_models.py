@@ -85,13 +85,21 @@ BAD = {
     "walrus": (swapped(GOOD, '"v" }', '"(q := v)" }'), ["q := v"], 11),
     "power bomb": (swapped(GOOD, '"v" }', '"v + 9**9**9**9" }'), ["9**9"], 11),
     "power bomb in a parameter": (swapped(GOOD, "m = 1.0", 'm = "2**10**10"'), ["2**10**10"], 5),
-    "nested a thousand deep": (
-        swapped(GOOD, '"v" }', '"' + "(" * 1000 + "v" + ")" * 1000 + '" }'),
-        ["deep"],
+    "nested nine hundred deep": (
+        swapped(GOOD, '"v" }', '"' + "(" * 900 + "v" + ")" * 900 + '" }'),
+        ["nested"],
         11,
     ),
-    "a megabyte of expression": (swapped(GOOD, '"v" }', '"v' + "+1" * 500_000 + '" }'), ["long"], 11),
-    "a number of a million digits": (swapped(GOOD, '"v" }', '"v + ' + "9" * 1_000_000 + '" }'), ["long"], 11),
+    "a hundred kilobytes of expression": (
+        swapped(GOOD, '"v" }', '"v' + "+1" * 50_000 + '" }'),
+        ["characters"],
+        11,
+    ),
+    "a number of a hundred thousand digits": (
+        swapped(GOOD, '"v" }', '"v + ' + "9" * 100_000 + '" }'),
+        ["characters"],
+        11,
+    ),
     "not an expression": (swapped(GOOD, '"v" }', '"v +* 2" }'), ["v +* 2"], 11),
     "caret for power": (swapped(GOOD, '"v" }', '"v^2" }'), ["**"], 11),
     "NaN parameter": (swapped(GOOD, "m = 1.0", "m = nan"), ["m", "nan"], 5),
@@ -99,8 +107,8 @@ BAD = {
     "division by zero in a parameter": (swapped(GOOD, '"4*m"', '"4/(m - 1)"'), ["4/(m - 1)"], 6),
     "root of a negative parameter": (swapped(GOOD, '"4*m"', '"sqrt(-m)"'), ["sqrt(-m)"], 6),
     "negative normal load": (swapped(GOOD, "N = 2.0", "N = -2.0"), ["N", "-2"], None),
-    "unknown friction law": (swapped(GOOD, '"coulomb"', '"coulom"'), ["coulom", "coulomb"], 18),
-    "unknown argument of a law": (swapped(GOOD, 'mu = "mu" }', 'mu = "mu", nu = "mu" }'), ["nu"], 18),
+    "unknown friction law": (swapped(GOOD, '"coulomb"', '"coulom"'), ["coulom", "coulomb"], 17),
+    "unknown argument of a law": (swapped(GOOD, 'mu = "mu" }', 'mu = "mu", nu = "mu" }'), ["nu"], 17),
     "two things of one name": (swapped(GOOD, "mu = 0.3", "mu = 0.3\nx = 2"), ["x"], None),
     "reserved name": (swapped(GOOD, "mu = 0.3", "mu = 0.3\npi = 3"), ["pi"], 8),
     "newer schema": (swapped(GOOD, "schema = 1", "schema = 99"), ["99"], 1),
@@ -151,11 +159,11 @@ def test_other_commands_refuse_alike(command: str, hybridsim: Callable, tmp_path
 
 def test_all_faults_are_reported_together(hybridsim: Callable, tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
-    text = swapped(swapped(GOOD, "(-k*x - f)/m", "(-k*x - f)/mm"), "mu = 0.3", "mu = nan")
+    text = swapped(swapped(GOOD, "(-k*x - f)/m", "(-k*x - f)/mm"), "start = 0", "start = 'nn'")
     path.write_text(text, encoding="utf-8")
     code, _, err = hybridsim("check", path)
     assert code == 3
-    assert "bad.toml:12" in err and "bad.toml:7" in err
+    assert "bad.toml:12" in err and "bad.toml:11" in err
 
 
 def test_binary_file(hybridsim: Callable, tmp_path: Path) -> None:
@@ -181,7 +189,7 @@ def test_huge_file_is_refused_before_it_is_read(hybridsim: Callable, tmp_path: P
         file.truncate(3 << 30)  # sparse: takes no room on disk
     code, _, err = hybridsim("check", path)
     assert code == 3
-    assert "bad.toml" in err and "large" in err
+    assert "bad.toml" in err and str(3 << 30) in err
 
 
 @pytest.mark.parametrize("name", ["GOOD", "THERMOSTAT"])

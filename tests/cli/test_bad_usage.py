@@ -13,8 +13,6 @@ BAD = {
     "no command": ([], ["COMMAND", "--help"]),
     "unknown command": (["rum", "dfcs"], ["rum", "run"]),
     "no model": (["run"], ["MODEL"]),
-    "unknown model": (["run", "dfsc"], ["dfsc", "dfcs"]),
-    "no such file": (["run", "nowhere/my.toml"], ["nowhere/my.toml"]),
     "two models": (["run", "dfcs", "belt"], ["belt"]),
     "unknown option of the command": (
         ["run", "dfcs", "--intgrator", "auto"],
@@ -70,7 +68,6 @@ BAD = {
     "no number among tolerances": (["compare", "dfcs", "--rtol", "1e-4,fine"], ["fine"]),
     "no repetition": (["compare", "dfcs", "--repeat", "0"], ["--repeat", "0"]),
     "unknown action on the cache": (["cache", "empty"], ["empty", "clear"]),
-    "check of an unknown model": (["check", "thermostats"], ["thermostats", "thermostat"]),
 }
 
 
@@ -84,6 +81,25 @@ def test_bad_usage(case: str, hybridsim: Callable, tmp_path: Path) -> None:
     assert all(fragment in err for fragment in fragments), err
     assert len(err.splitlines()) > 1, f"no remedy: {err}"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["run", "compare", "check"])
+@pytest.mark.parametrize(
+    ("model", "fragments"),
+    [
+        ("dfsc", ["dfsc", "'dfcs'"]),
+        ("nowhere/my.toml", ["nowhere/my.toml", "no such file"]),
+        ("", ["''"]),
+        ("../dfcs", ["../dfcs"]),
+        ("my\0.toml", ["my", "null"]),
+    ],
+)
+def test_no_such_model(command: str, model: str, fragments: list[str], hybridsim: Callable) -> None:
+    code, out, err = hybridsim(command, model)
+    assert (code, out) == (3, "")
+    assert "Traceback" not in err and "internal error" not in err
+    assert all(fragment in err for fragment in fragments), err
+    assert len(err.splitlines()) > 1, f"no remedy: {err}"
 
 
 def test_folder_in_place_of_a_model(hybridsim: Callable, tmp_path: Path) -> None:
