@@ -1,0 +1,49 @@
+"""Running backward in time: inside modes and through transversal crossings; anything else has no unique past."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.decide import LEAVES
+from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.system import System
+
+
+def held(system: System, z: np.ndarray) -> str:
+    """Why a state that is held at a surface has no unique past; empty if none is held."""
+    names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
+    return f"{', '.join(names)} held: many motions come to rest in the same state" if names else ""
+
+
+def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
+    """Why a guard of a component without a surface cannot be crossed backward; empty if none fired."""
+    for g in fired:
+        automaton = system.automata[int(system.owner[g])]
+        if not automaton.has_surface:
+            mode = automaton.modes[z[system.owner[g]]]
+            return f"mode {mode} of {automaton.name} began here or came through a transition: its past is not unique"
+    return ""
+
+
+def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:
+    """Cross a surface backward, if the motion came through it; status ``backward-nonunique`` otherwise.
+
+    The motion is unique when it enters from the other side, leaves on this one, and could not have been
+    held in between: for a force with a limit that is a passage of the velocity through zero.
+    """
+    before = at.z.copy()
+    outcome = Settling(system, at, before, forward=False).run(fired, [])
+    for g in fired:
+        c = int(system.owner[g])
+        automaton = system.automata[c]
+        other = automaton.below if before[c] == automaton.above else automaton.above
+        rest = before.copy()
+        rest[c] = automaton.hold
+        forward = Settling(system, at, rest, forward=True)
+        forward.on_surface[c] = True
+        could_rest = forward.verdict(rest, [c]) != LEAVES
+        if outcome.status or could_rest or outcome.z[c] != other:
+            outcome.status = "backward-nonunique"
+            outcome.message = f"{automaton.name} reaches a surface from which more than one past leads away"
+            break
+    return outcome

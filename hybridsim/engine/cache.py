@@ -1,0 +1,70 @@
+"""Where compiled things live on disk: one folder for generated model modules, one for the engine's own kernels."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+from functools import cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_KERNEL_FLOORS = ("engine", "integrators")  # the floors that define kernels
+
+
+def cache_root() -> Path:
+    """Folder of everything hybridsim keeps between runs: ``$HYBRIDSIM_CACHE``, else the user's cache folder."""
+    chosen = os.environ.get("HYBRIDSIM_CACHE")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return base / "hybridsim"
+
+
+@cache
+def engine_key() -> str:
+    """Hash of the engine's sources and of the versions that shape its machine code.
+
+    numba notices an edit in the file of a cached function, but not in a file that it calls into
+    (numba issue 1833); a folder named after all the sources leaves nothing stale.
+    """
+    from importlib.metadata import version
+
+    digest = hashlib.sha256()
+    for floor in _KERNEL_FLOORS:
+        for path in sorted((_PACKAGE / floor).glob("**/*.py")):
+            digest.update(path.name.encode())
+            digest.update(path.read_bytes())
+    versions = f"{sys.version_info[:3]} {version('numba')} {version('numpy')}"
+    digest.update(versions.encode())
+    return digest.hexdigest()[:16]
+
+
+def kernel_folder() -> Path:
+    """Folder of the engine's compiled kernels, valid for these sources and versions only."""
+    return cache_root() / f"engine-{engine_key()}"
+
+
+def model_folder() -> Path:
+    """Folder of generated model modules and their compiled functions."""
+    return kernel_folder() / "models"
+
+
+def clear() -> int:
+    """Delete the whole cache; return the number of bytes freed."""
+    root = cache_root()
+    freed = size()
+    for entry in root.glob("engine-*"):
+        shutil.rmtree(entry, ignore_errors=True)
+    return freed
+
+
+def size() -> int:
+    """Bytes the cache holds now."""
+    return sum(path.stat().st_size for path in cache_root().glob("engine-*/**/*") if path.is_file())

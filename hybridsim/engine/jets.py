@@ -1,0 +1,287 @@
+"""Taylor coefficients of states and guards along a flow, each with a running bound of its rounding error.
+
+The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
+doi:10.1080/10586458.2005.10128904); each error bound follows its recurrence to first order in the unit
+roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.jit import kernel
+from hybridsim.engine.tape import (
+    ABS,
+    ACOS,
+    ADD,
+    AND,
+    ANGLE,
+    ASIN,
+    ATAN,
+    COPY,
+    DIV,
+    EQUAL,
+    EXP,
+    INTEGRAL,
+    LESS,
+    LESS_EQUAL,
+    LOG,
+    MAX,
+    MIN,
+    MUL,
+    NEG,
+    NOT,
+    OR,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+
+UNIT = 2.0**-53  # unit roundoff of a double
+ORDER = 3  # guards are judged by their derivatives up to the third
+
+
+@kernel
+def _product(V: Any, E: Any, a: int, b: int, k: int, first: int, last: int) -> tuple[float, float]:
+    """sum_{i=first}^{last} a_i b_{k-i} and its error bound."""
+    total, error = 0.0, 0.0
+    for i in range(first, last + 1):
+        term = V[a, i] * V[b, k - i]
+        total += term
+        error += abs(V[a, i]) * E[b, k - i] + E[a, i] * abs(V[b, k - i]) + UNIT * abs(term)
+        error += E[a, i] * E[b, k - i]
+        if i > first:
+            error += UNIT * abs(total)
+    return total, error
+
+
+@kernel
+def _weighted(V: Any, E: Any, a: int, b: int, k: int, last: int) -> tuple[float, float]:
+    """sum_{i=1}^{last} i a_i b_{k-i} and its error bound: the product a' b, times k."""
+    total, error = 0.0, 0.0
+    for i in range(1, last + 1):
+        term = i * V[a, i] * V[b, k - i]
+        total += term
+        error += i * (abs(V[a, i]) * E[b, k - i] + E[a, i] * (abs(V[b, k - i]) + E[b, k - i]))
+        error += 2.0 * UNIT * abs(term) + UNIT * abs(total)
+    return total, error
+
+
+@kernel
+def _first_sign(V: Any, a: int, k: int) -> float:
+    """Sign of a series just after its origin, from its leading non-zero coefficient up to order k."""
+    for i in range(k + 1):
+        if V[a, i] > 0.0:
+            return 1.0
+        if V[a, i] < 0.0:
+            return -1.0
+    return 0.0
+
+
+@kernel
+def _first_difference(V: Any, a: int, b: int, k: int) -> float:
+    for i in range(k + 1):
+        if V[a, i] != V[b, i]:
+            return V[a, i] - V[b, i]
+    return 0.0
+
+
+@kernel
+def _put(V: Any, E: Any, out: int, k: int, value: float, error: float) -> None:
+    V[out, k] = value
+    E[out, k] = error
+
+
+@kernel
+def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b: int) -> None:
+    """V[out, k] = numerator / b_0 with the bound of a quotient."""
+    divisor = V[b, 0]
+    value = numerator / divisor
+    V[out, k] = value
+    E[out, k] = (error + abs(value) * E[b, 0]) / abs(divisor) + UNIT * abs(value)
+
+
+@kernel
+def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
+    """Order 0 of the operations whose higher orders follow from a differential equation."""
+    u, du = V[a, 0], E[a, 0]
+    if op == EXP:
+        y = math.exp(u) if u < 709.0 else math.inf
+        _put(V, E, out, 0, y, abs(y) * (du + 2.0 * UNIT))
+    elif op == SINCOS:
+        s, co = math.sin(u), math.cos(u)
+        _put(V, E, out, 0, s, abs(co) * du + 0.5 * du * du + 2.0 * UNIT * abs(s))
+        _put(V, E, out + 1, 0, co, abs(s) * du + 0.5 * du * du + 2.0 * UNIT * abs(co))
+    elif op == SINHCOSH:
+        s, co = math.sinh(u), math.cosh(u)
+        _put(V, E, out, 0, s, abs(co) * du + 2.0 * UNIT * abs(s))
+        _put(V, E, out + 1, 0, co, abs(s) * du + 2.0 * UNIT * abs(co))
+    elif op == TANGENT:
+        sign = 1.0 if b == 0 else -1.0  # tan: w = 1 + y^2; tanh: w = 1 - y^2
+        y = math.tan(u) if b == 0 else math.tanh(u)
+        w = 1.0 + sign * y * y
+        _put(V, E, out, 0, y, abs(w) * du + 2.0 * UNIT * abs(y))
+        _put(V, E, out + 1, 0, w, 2.0 * abs(y) * E[out, 0] + 3.0 * UNIT * (1.0 + y * y))
+    elif op == INTEGRAL:
+        v, dv = V[b, 0], E[b, 0]
+        y = 0.0
+        slope = dv / abs(u) if u != 0.0 else math.inf
+        if c == LOG:
+            y = math.log(v) if v > 0.0 else math.nan
+        elif c == ASIN:
+            y = math.asin(v) if abs(v) <= 1.0 else math.nan
+        elif c == ACOS:
+            y = math.acos(v) if abs(v) <= 1.0 else math.nan
+        elif c == ATAN:
+            y = math.atan(v)
+        else:
+            y = math.atan2(v, u)
+            square = u * u + v * v
+            slope = (abs(u) * dv + abs(v) * du) / square if square > 0.0 else math.inf
+        _put(V, E, out, 0, y, slope + 2.0 * UNIT * abs(y))
+
+
+@kernel
+def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
+    """Order k >= 1 of the operations that follow a differential equation."""
+    if op == EXP:
+        y, e = _weighted(V, E, a, out, k, k)
+        _put(V, E, out, k, y / k, e / k + UNIT * abs(y))
+    elif op == SINCOS:
+        s, e = _weighted(V, E, a, out + 1, k, k)
+        co, d = _weighted(V, E, a, out, k, k)
+        _put(V, E, out, k, s / k, e / k + UNIT * abs(s))
+        _put(V, E, out + 1, k, -co / k, d / k + UNIT * abs(co))
+    elif op == SINHCOSH:
+        s, e = _weighted(V, E, a, out + 1, k, k)
+        co, d = _weighted(V, E, a, out, k, k)
+        _put(V, E, out, k, s / k, e / k + UNIT * abs(s))
+        _put(V, E, out + 1, k, co / k, d / k + UNIT * abs(co))
+    elif op == TANGENT:
+        y, e = _weighted(V, E, a, out + 1, k, k)
+        _put(V, E, out, k, y / k, e / k + UNIT * abs(y))
+        w, d = _product(V, E, out, out, k, 0, k)
+        _put(V, E, out + 1, k, w if b == 0 else -w, d)
+    elif op == INTEGRAL and c != ANGLE:
+        # y' a = b'  =>  k y_k a_0 = k b_k - sum_{j<k} j y_j a_{k-j}
+        s, e = _weighted(V, E, out, a, k, k - 1)
+        _divide(V, E, out, k, V[b, k] - s / k, E[b, k] + e / k + UNIT * (abs(V[b, k]) + abs(s)), a)
+    elif op == INTEGRAL:
+        # y = angle of (a, b):  y' (a^2 + b^2) = a b' - b a'
+        left, e = _weighted(V, E, b, a, k, k)
+        right, d = _weighted(V, E, a, b, k, k)
+        total, error = left - right, e + d + UNIT * (abs(left) + abs(right))
+        for j in range(1, k):
+            w1, e1 = _product(V, E, a, a, k - j, 0, k - j)
+            w2, e2 = _product(V, E, b, b, k - j, 0, k - j)
+            total -= j * V[out, j] * (w1 + w2)
+            error += j * (abs(V[out, j]) * (e1 + e2) + E[out, j] * abs(w1 + w2)) + 3 * UNIT * abs(total)
+        square = V[a, 0] ** 2 + V[b, 0] ** 2
+        y = total / (k * square)
+        relative = 2.0 * (abs(V[a, 0]) * E[a, 0] + abs(V[b, 0]) * E[b, 0]) / square
+        _put(V, E, out, k, y, error / (k * square) + abs(y) * (relative + 4.0 * UNIT))
+
+
+@kernel
+def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
+    """Order k of comparisons, choices and corners; a corner takes the side its argument goes to."""
+    if op == ABS:
+        sign = _first_sign(V, a, k)
+        _put(V, E, out, k, sign * V[a, k], E[a, k])
+    elif op in (MIN, MAX):
+        difference = _first_difference(V, a, b, k)
+        take_a = (difference <= 0.0) == (op == MIN)
+        source = a if take_a else b
+        _put(V, E, out, k, V[source, k], max(E[a, k], E[b, k]))
+    elif op == SELECT:
+        source = b if V[a, 0] != 0.0 else c
+        _put(V, E, out, k, V[source, k], E[source, k])
+    elif k > 0:
+        _put(V, E, out, k, 0.0, 0.0)
+    else:
+        value = 0.0
+        if op == SIGN:
+            value = 1.0 if V[a, 0] > 0.0 else (-1.0 if V[a, 0] < 0.0 else 0.0)
+        elif op == LESS:
+            value = 1.0 if V[a, 0] < V[b, 0] else 0.0
+        elif op == LESS_EQUAL:
+            value = 1.0 if V[a, 0] <= V[b, 0] else 0.0
+        elif op == EQUAL:
+            value = 1.0 if V[a, 0] == V[b, 0] else 0.0
+        elif op == AND:
+            value = 1.0 if V[a, 0] != 0.0 and V[b, 0] != 0.0 else 0.0
+        elif op == OR:
+            value = 1.0 if V[a, 0] != 0.0 or V[b, 0] != 0.0 else 0.0
+        elif op == NOT:
+            value = 1.0 if V[a, 0] == 0.0 else 0.0
+        _put(V, E, out, k, value, 0.0)
+
+
+@kernel
+def _advance(row: Any, V: Any, E: Any, k: int) -> None:
+    """Order k of one operation."""
+    op, a, b, c, out = row[0], row[1], row[2], row[3], row[4]
+    if op == COPY:
+        _put(V, E, out, k, V[a, k], E[a, k])
+    elif op == ADD:
+        y = V[a, k] + V[b, k]
+        _put(V, E, out, k, y, E[a, k] + E[b, k] + UNIT * abs(y))
+    elif op == SUB:
+        y = V[a, k] - V[b, k]
+        _put(V, E, out, k, y, E[a, k] + E[b, k] + UNIT * abs(y))
+    elif op == NEG:
+        _put(V, E, out, k, -V[a, k], E[a, k])
+    elif op == MUL:
+        y, e = _product(V, E, a, b, k, 0, k)
+        _put(V, E, out, k, y, e)
+    elif op == DIV:
+        y, e = _product(V, E, out, b, k, 0, k - 1)
+        n = V[a, k] - y
+        _divide(V, E, out, k, n, E[a, k] + e + (UNIT * abs(n) if k > 0 else 0.0), b)
+    elif op == SQRT:
+        if k == 0:
+            y = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
+            e = E[a, 0] / (2.0 * y) if y > 0.0 else math.sqrt(E[a, 0])
+            _put(V, E, out, 0, y, e + UNIT * abs(y))
+        else:
+            y, e = _product(V, E, out, out, k, 1, k - 1)
+            n = 0.5 * (V[a, k] - y)
+            if V[out, 0] == 0.0 and n == 0.0 and E[a, k] + e == 0.0:
+                _put(V, E, out, k, 0.0, 0.0)
+            else:
+                _divide(V, E, out, k, n, 0.5 * (E[a, k] + e) + UNIT * abs(n), out)
+    elif op >= ABS:
+        _logic(op, V, E, a, b, c, out, k)
+    elif k == 0:
+        _leading(op, V, E, a, b, c, out)
+    else:
+        _higher(op, V, E, a, b, c, out, k)
+
+
+@kernel
+def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: Any) -> None:
+    """Fill the Taylor coefficients V[register, k] and bounds E for k = 0..order along the flow.
+
+    `rows` (m, 5) int64; registers of constants, time, parameters and the states' order 0 are set by the caller;
+    states[i] is the register of x_i, derivatives[i] that of dx_i/dt.
+    """
+    for k in range(order + 1):
+        for r in range(rows.shape[0]):
+            _advance(rows[r], V, E, k)
+        if k < order:
+            for i in range(states.shape[0]):
+                value = V[derivatives[i], k] / (k + 1)
+                V[states[i], k + 1] = value
+                E[states[i], k + 1] = E[derivatives[i], k] / (k + 1) + (UNIT * abs(value) if k > 0 else 0.0)
+
+
+def new_registers(count: int, order: int = ORDER) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficient and error arrays for `count` registers."""
+    return np.zeros((count, order + 1)), np.zeros((count, order + 1))

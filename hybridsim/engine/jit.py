@@ -1,0 +1,106 @@
+"""The one door to numba: compiled kernels, and calls of model functions through their addresses.
+
+A model function has one signature, ``f(t, x, p, z, out) -> status``. With the compiler on it is a C function
+reached through its address, so that a kernel is compiled once and never per model; with ``HYBRIDSIM_JIT=0`` the
+"address" is the Python function itself and every kernel runs as plain Python.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from hybridsim.engine.cache import kernel_folder
+
+ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
+
+
+def _fill_nan(out: Any) -> None:
+    for i in range(len(out)):
+        out[i] = math.nan
+
+
+if ENABLED:
+    import numba
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    _DOUBLES = types.CPointer(types.float64)
+    _LONGS = types.CPointer(types.int64)
+    SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
+
+    def _with_cache_folder(folder: str, define: Callable[[], Any]) -> Any:
+        """Run `define` while numba's cache folder is ours, and give the setting back to the user's own code."""
+        previous = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = folder
+        try:
+            return define()
+        finally:
+            numba.config.CACHE_DIR = previous
+
+    def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """Compile a function of the engine once, cached on disk; division by zero gives inf or nan, as in numpy."""
+        return _with_cache_folder(
+            str(kernel_folder()),
+            lambda: numba.njit(cache=True, nogil=True, error_model="numpy")(function),
+        )
+
+    def compile_model_function(function: Callable[..., int]) -> tuple[int, Any]:
+        """Compile one generated function; return its address and the object that keeps it alive."""
+        compiled = _with_cache_folder(
+            str(kernel_folder() / "models"),
+            lambda: numba.cfunc(SIGNATURE, cache=True, error_model="numpy")(function),
+        )
+        return compiled.address, compiled
+
+    @intrinsic
+    def call(typingctx: Any, function: Any, t: Any, x: Any, p: Any, z: Any, out: Any) -> Any:
+        """Call the model function at an address with contiguous arrays; return its status."""
+        signature = types.int32(types.int64, types.float64, x, p, z, out)
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            double, long, status = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+            pointers = [ir.PointerType(double)] * 2 + [ir.PointerType(long), ir.PointerType(double)]
+            kind = ir.FunctionType(status, [double, *pointers])
+            target = builder.inttoptr(args[0], ir.PointerType(kind))
+            data = [
+                context.make_array(ty)(context, builder, value).data
+                for ty, value in zip(sig.args[2:], args[2:], strict=True)
+            ]
+            data = [builder.bitcast(d, want) for d, want in zip(data, pointers, strict=True)]
+            return builder.call(target, [args[1], *data])
+
+        return signature, generate
+
+else:
+
+    def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """Leave the function as it is: the compiler is switched off."""
+        return function
+
+    def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
+        """Guard the function as compiled code is: what raises in Python is NaN there."""
+
+        def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
+            try:
+                return function(t, x, p, z, out)
+            except (ZeroDivisionError, ValueError, OverflowError):
+                _fill_nan(out)
+                return 1
+
+        return guarded, guarded
+
+    def call(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> int:
+        """Call the model function."""
+        return function(t, x, p, z, out)
+
+
+def announce_compilation() -> None:
+    """Say once, on stderr, that the engine is being compiled, if no kernel of it is on disk yet."""
+    if ENABLED and not kernel_folder().exists():
+        kernel_folder().mkdir(parents=True, exist_ok=True)
+        print("hybridsim: compiling the engine, once (some 20 s) ...", file=sys.stderr, flush=True)

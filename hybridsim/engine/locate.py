@@ -1,0 +1,122 @@
+"""Where along a step the first event is: guards and monitors searched on the dense output, roots polished."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybridsim.engine.roots import POINTS, Crossing, Grazing, find_roots
+from hybridsim.engine.stepping import Flow, Step, Watch
+
+_POLISH = 200  # iterations: bisection alone needs 52; the search ends when the bracket is down to neighbours
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A located zero: theta in (0, 1] of the step, guard or monitor number, direction of the crossing."""
+
+    theta: float
+    number: int
+    direction: int
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a step holds: first exit of each guard, all crossings of monitors, near-grazings, signs at its end."""
+
+    exits: tuple[Hit, ...]
+    crossings: tuple[Hit, ...]
+    grazings: tuple[tuple[int, Grazing], ...]
+    guard_ends: np.ndarray
+    monitor_ends: np.ndarray
+
+
+def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> float:
+    """The zero inside a crossing's bracket, to rounding: secant steps kept inside a shrinking bracket."""
+    left, right = crossing.left, crossing.right
+
+    def value(theta: float) -> float:
+        return crossing.direction * float(sample(np.array([theta]))[0])
+
+    high = value(right)
+    low = min(value(left), 0.0)  # the side at the left is known, whatever rounding makes of the value
+    kept = 0
+    for _ in range(_POLISH):
+        if right - left <= math.ulp(right) or high == 0.0:
+            break
+        theta = left + (right - left) * (low / (low - high)) if low < high else math.nan
+        if not left < theta < right or kept > 2:  # noqa: PLR2004 - one end stays put: halve instead
+            theta, kept = 0.5 * (left + right), 0
+            if not left < theta < right:
+                break
+        found = value(theta)
+        if found > 0.0:
+            right, high = theta, found
+            kept = kept + 1 if kept >= 0 else 0
+            low *= 0.5  # Illinois: the weight of the end that stays is halved
+        elif found < 0.0:
+            left, low = theta, found
+            high *= 0.5
+        else:
+            return theta
+    return right
+
+
+def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
+    return tuple(sorted(hits, key=lambda hit: (hit.theta, hit.number)))
+
+
+class Locator:
+    """Searches the steps of one segment; remembers on which side each guard and monitor is."""
+
+    def __init__(self, flow: Flow, watch: Watch) -> None:
+        self.flow = flow
+        self.numbers = watch.guards
+        self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
+        self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
+
+    def search(self, step: Step) -> Findings:
+        """All that happens in a step."""
+        flow, width = self.flow, step.s1 - step.s0
+        times = step.s0 + width * POINTS
+        times[-1] = step.s1
+        states = flow.project(times, step.dense(times))
+        exits, crossings, grazings = [], [], []
+        guard_ends = np.ones_like(self.sides)
+        if len(self.numbers):
+            values = flow.guards(times, states)
+            for g in self.numbers:
+                sample = self._sampler(step, flow.guards, int(g))
+                side = int(self.sides[g])
+                found, grazed, end = find_roots(
+                    sample, values[:, g], int(self.orders[g]) if side else 0, side or 1, stop_at_first=-1
+                )
+                guard_ends[g] = end
+                grazings += [(int(g), z) for z in grazed]
+                exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
+        monitor_ends = self.monitor_sides.copy()
+        if len(self.monitor_sides):
+            values = flow.monitors(times, states)
+            for k in range(values.shape[1]):
+                sample = self._sampler(step, flow.monitors, k)
+                side = int(self.monitor_sides[k])
+                found, _, end = find_roots(
+                    sample, values[:, k], int(self.monitor_orders[k]) if side else 0, side, stop_at_first=0
+                )
+                monitor_ends[k] = end
+                crossings += [Hit(polish(sample, c), k, c.direction) for c in found]
+        return Findings(_in_order(exits), _in_order(crossings), tuple(grazings), guard_ends, monitor_ends)
+
+    def _sampler(
+        self, step: Step, function: Callable[[np.ndarray, np.ndarray], np.ndarray], column: int
+    ) -> Callable[[np.ndarray], np.ndarray]:
+        width = step.s1 - step.s0
+
+        def sample(theta: np.ndarray) -> np.ndarray:
+            times = step.s0 + width * theta
+            return function(times, self.flow.project(times, step.dense(times)))[:, column]
+
+        return sample

@@ -1,0 +1,234 @@
+"""The mode loop: integrate to the first event, settle it, go on; it knows no method and no law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from hybridsim.engine.backward import cross_backward, entered_here, held
+from hybridsim.engine.decide import side_after
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.segment import Arrival, SegmentRun
+from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.stepping import Method, StepFailure, Watch
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.engine.timetable import Appointment, Timetable
+from hybridsim.engine.trajectory import Occurrence, Task, Trajectory
+
+# Transitions closer than this many ulps of the time, so many in a row, are an accumulation: no clock resolves more.
+_ACCUMULATION_ULPS, _ACCUMULATION_COUNT = 16.0, 12
+
+
+class ModeLoop:
+    """One run of a system with one stepping method."""
+
+    def __init__(
+        self, system: System, method: Method, task: Task, progress: Callable[[float], None] | None = None
+    ) -> None:
+        self.system, self.method, self.task = system, method, task
+        self.forward = task.forward
+        self.timetable = Timetable(system)
+        self.record = Trajectory()
+        self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.short = 0  # transitions in a row that followed at once
+        self.progress: Callable[[Instant], None] | None = None
+        if progress is not None:
+            span = task.t1 - task.t0
+            self.progress = lambda instant: progress((float(instant) - task.t0) / span)
+
+    def run(self) -> Trajectory:
+        """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
+        try:
+            self._run()
+        except StepFailure as failure:
+            self.record.status, self.record.message = "step-failure", f"after t = {float(self.origin)!r}: {failure}"
+        except KeyboardInterrupt:
+            self.record.status = "interrupted"
+            self.record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
+        return self.record
+
+    def _run(self) -> None:
+        task, system = self.task, self.system
+        p = system.vector(self.origin, task.discrete, self.forward)
+        due = self.timetable.due_at_start(self.origin) if self.forward else ()
+        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
+        outcome = Settling(system, at, task.z0.copy(), self.forward).run((), [("schedule", k) for k in due])
+        stop = self._adopt(self.origin, outcome, task.x0, due, ())
+        step_size = task.tolerances.first_step
+        while not stop and self.origin != self.end:
+            appointment = self.timetable.next(self.origin, self.forward)
+            if appointment and abs(appointment.instant.minus(self.origin)) > abs(self.end.minus(self.origin)):
+                appointment = None
+            target = appointment.instant if appointment else self.end
+            segment = self._segment_run()
+            bound = target.minus(self.origin)
+            try:
+                arrival = segment.run(bound, step_size)
+            finally:
+                self._keep(segment)
+            at_target = arrival.s == bound
+            instant = target if at_target else self.origin.plus(arrival.s)
+            stop = self._settle(instant, arrival, appointment if at_target else None, segment)
+            step_size = segment.last_step if self.outcome.continuous else None
+
+    def _segment_run(self) -> SegmentRun:
+        system, outcome = self.system, self.outcome
+        numbers = np.flatnonzero(system.active(outcome.z))
+        watch = Watch(numbers, outcome.sides, outcome.orders, outcome.monitor_sides, outcome.monitor_orders)
+        return SegmentRun(
+            system, self.method, self.origin, self.p, outcome.z, outcome.x, watch, self.task.tolerances,
+            self.record.counters, self.forward, self.progress,
+        )  # fmt: skip
+
+    def _keep(self, run: SegmentRun) -> None:
+        """Append a segment and what was seen on the way."""
+        record = self.record
+        if len(run.knots) > 1:
+            record.segments.append(run.segment())
+        for seen in run.sightings:
+            self._occur(
+                self.origin.plus(seen.s), "monitor", self.system.monitor_names[seen.number], "", "", "",
+                seen.direction, seen.x, seen.x,
+            )  # fmt: skip
+        for g, s, distance in run.grazings:
+            c = int(self.system.owner[g])
+            automaton, mode = self.system.automata[c], int(run.flow.z[c])
+            name = automaton.guard_names[mode][automaton.guards[mode].index(g)]
+            x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
+            self._occur(
+                self.origin.plus(s), "near-grazing", automaton.name, name, automaton.modes[mode],
+                automaton.modes[mode], 0, x, x,
+            )  # fmt: skip
+            record.warn(f"near-grazing: {automaton.name}.{name} in mode {automaton.modes[mode]}")
+        record.occurrences.sort(key=lambda o: abs(o.instant.minus(Instant(self.task.t0))))
+
+    # -- events ---------------------------------------------------------------------------------------------
+
+    def _settle(
+        self, instant: Instant, arrival: Arrival, appointment: Appointment | None, segment: SegmentRun
+    ) -> bool:
+        """Settle what happens where a segment ended; True where the run stops."""
+        schedules = appointment.schedules if appointment else ()
+        if not (arrival.fired or arrival.stopping or appointment):
+            self.origin = instant
+            return True
+        at = self._situation(arrival, segment)
+        if not self.forward:
+            refused = self._refuse_backward(arrival, schedules)
+            if refused:
+                self.origin = instant
+                self.record.status, self.record.message = "backward-nonunique", refused
+                return True
+        fired = self._coincident(at, arrival.fired)
+        if fired and not self.forward:
+            outcome = cross_backward(self.system, at, fired)
+        else:
+            resets = [("schedule", k) for k in schedules] + [("monitor", k) for k in arrival.stopping]
+            outcome = Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
+        sides = segment.locator.monitor_sides
+        stop = self._adopt(instant, outcome, arrival.x, schedules, arrival.stopping, sides)
+        near = abs(arrival.s) <= _ACCUMULATION_ULPS * math.ulp(float(instant))
+        self.short = self.short + 1 if near and outcome.changes else 0
+        if not stop and self.short >= _ACCUMULATION_COUNT:
+            self.record.status = "accumulation"
+            self.record.message = f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
+            return True
+        return stop
+
+    def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
+        """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
+        system, flow = self.system, segment.flow
+        s_error = 2.0 * math.ulp(arrival.s)
+        zero = np.zeros(system.n)
+        for g in arrival.fired:
+            series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
+            value, slope = series.guards[g, 0], series.guards[g, 1]
+            if slope != 0.0 and math.isfinite(value / slope):
+                s_error = max(s_error, abs(value / slope))
+        slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
+        x_error = 4.0 * UNIT * segment.scale + s_error * slopes
+        holding = [system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold]
+        x_error[holding] = UNIT * np.abs(arrival.x[holding])
+        return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
+
+    def _coincident(self, at: Situation, fired: tuple[int, ...]) -> tuple[int, ...]:
+        """The located guards and those that are zero with them within rounding and leave, nearest first."""
+        system = self.system
+        if not fired:
+            return ()
+        series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+        together = {g: 0.0 for g in fired}
+        for g in np.flatnonzero(system.active(at.z)):
+            value, bound = series.guards[g], series.guard_bounds[g]
+            if g not in together and abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0:
+                together[int(g)] = -value[0] / value[1] if value[1] != 0.0 else 0.0
+        return tuple(sorted(together, key=lambda g: together[g]))
+
+    def _refuse_backward(self, arrival: Arrival, schedules: tuple[int, ...]) -> str:
+        resets = [self.system.model.schedules[k].name for k in schedules if self.system.model.schedules[k].reset]
+        resets += [self.system.monitor_names[k] for k in arrival.stopping if self.system.model.monitors[k].reset]
+        if resets:
+            return f"running backward, the reset of {', '.join(resets)} has no unique past"
+        return entered_here(self.system, self.outcome.z, arrival.fired)
+
+    def _adopt(
+        self, instant: Instant, outcome: Outcome, x_minus: np.ndarray, schedules: tuple[int, ...],
+        stopping: tuple[int, ...], monitor_sides: np.ndarray | None = None,
+    ) -> bool:  # fmt: skip
+        """Make the state after an event the start of the next segment and record the event; True to stop."""
+        system, record = self.system, self.record
+        self.origin, self.outcome = instant, outcome
+        self.p = system.vector(instant, system.discrete(outcome.p), self.forward)
+        for warning in outcome.warnings:
+            record.warn(warning)
+        for change in outcome.changes:
+            automaton = system.automata[change.component]
+            self._occur(
+                instant, "transition", automaton.name, change.guard, automaton.modes[change.source],
+                automaton.modes[change.target], -1, x_minus, outcome.x,
+            )  # fmt: skip
+            record.counters.events += 1
+        terminated = []
+        for k in schedules:
+            schedule = system.model.schedules[k]
+            self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
+            terminated += [schedule.name] if schedule.terminate else []
+        terminated += self._crossed_monitors(instant, outcome, x_minus, stopping, monitor_sides)
+        if outcome.status:
+            record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+            return True
+        if terminated:
+            record.status, record.message = "terminated", f"ended by {terminated[0]} at t = {float(instant)!r}"
+            return True
+        if not self.forward and held(system, outcome.z):
+            record.status = "backward-nonunique"
+            record.message = f"at t = {float(instant)!r}: {held(system, outcome.z)}"
+            return True
+        return False
+
+    def _crossed_monitors(
+        self, instant: Instant, outcome: Outcome, x_minus: np.ndarray, stopping: tuple[int, ...],
+        monitor_sides: np.ndarray | None,
+    ) -> list[str]:  # fmt: skip
+        """Record the monitors whose side differs across the event; return those that end the run."""
+        ended = []
+        for k, monitor in enumerate(self.system.model.monitors):
+            before = 0 if monitor_sides is None else int(monitor_sides[k])
+            after = int(outcome.monitor_sides[k])
+            if k not in stopping and (before == 0 or after in (0, before)):
+                continue
+            direction = after if after and after != before else -before
+            if {"up": 1, "down": -1, "both": direction}[monitor.direction] != direction:
+                continue
+            self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
+            ended += [monitor.name] if monitor.action == "terminate" else []
+        return ended
+
+    def _occur(self, instant: Instant, kind: str, component: str, guard: str, source: str, target: str,
+               direction: int, x_minus: np.ndarray, x_plus: np.ndarray) -> None:  # fmt: skip
+        self.record.occurrences.append(
+            Occurrence(instant, kind, component, guard, source, target, direction, x_minus, x_plus)
+        )

@@ -1,0 +1,86 @@
+"""Generated modules on disk: found by the hash of the model's structure, imported, compiled, never built twice."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.cache import model_folder
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A model's functions: addresses for kernels, plain Python for what runs once an event."""
+
+    module: ModuleType
+    seconds: float  # what lowering took; 0 when the module was found in the cache
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Everything about the model that the functions do not say."""
+        return self.module.DATA
+
+    def address(self, name: str) -> Any:
+        """Address of one of flow, project, guards, surfaces, monitors, quantities; compiled on first use."""
+        return self._address(name)
+
+    @cached_property
+    def _kept(self) -> dict[str, tuple[Any, Any]]:
+        return {}
+
+    def _address(self, name: str) -> Any:
+        from hybridsim.engine.jit import compile_model_function
+
+        if name not in self._kept:
+            self._kept[name] = compile_model_function(getattr(self.module, name))
+        return self._kept[name][0]
+
+
+_loaded: dict[str, Compiled] = {}
+
+
+def compiled(model: Model) -> Compiled:
+    """The compiled form of a model, from memory, from disk, or lowered now."""
+    key = hashlib.sha256(model.structure().encode()).hexdigest()[:24]
+    if key not in _loaded:
+        _loaded[key] = _load(model, f"hybridsim_model_{key}")
+    return _loaded[key]
+
+
+def _load(model: Model, name: str) -> Compiled:
+    path = model_folder() / f"{name}.py"
+    seconds = 0.0
+    if not path.exists():
+        from hybridsim.engine.emit import emit
+
+        start = time.perf_counter()
+        _write(path, emit(model))
+        seconds = time.perf_counter() - start
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:  # pragma: no cover - a .py path always has a loader
+        raise ImportError(f"cannot import {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # numba looks a cached function's module up by name
+    spec.loader.exec_module(module)
+    return Compiled(module, seconds)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write in one move, so that another process never reads half a module."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".py")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(temporary, path)

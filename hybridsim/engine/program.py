@@ -1,0 +1,83 @@
+"""A model as an ordered program of assignments: straight ones, and ones that depend on a component's mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from hybridsim.errors import ModelError
+
+
+@dataclass(frozen=True)
+class Assign:
+    """``name = expression`` (a SymPy expression over names)."""
+
+    name: str
+    expression: Any
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Assignments that depend on the mode of one component: branches[mode] is a tuple of `Assign`."""
+
+    component: int
+    branches: tuple[tuple[Assign, ...], ...]
+
+
+Item = Assign | Switch
+
+
+def assigned(item: Item) -> set[str]:
+    """Names that an item gives a value to."""
+    if isinstance(item, Assign):
+        return {item.name}
+    return {a.name for branch in item.branches for a in branch}
+
+
+def used(item: Item) -> set[str]:
+    """Names that an item reads, in any mode, and does not set itself."""
+    if isinstance(item, Assign):
+        return {s.name for s in item.expression.free_symbols}
+    names: set[str] = set()
+    for branch in item.branches:
+        own: set[str] = set()
+        for a in branch:
+            names |= {s.name for s in a.expression.free_symbols} - own
+            own.add(a.name)
+    return names
+
+
+def ordered(items: Iterable[Item]) -> list[Item]:
+    """The items so that each name is set before it is read; a loop among them is an error that names it."""
+    waiting = list(items)
+    pending: dict[str, int] = {}
+    for item in waiting:
+        for name in assigned(item):
+            pending[name] = pending.get(name, 0) + 1
+    result: list[Item] = []
+    while waiting:
+        ready = [i for i in waiting if not any(pending.get(n, 0) for n in used(i) - assigned(i))]
+        if not ready:
+            loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
+            raise ModelError(
+                f"the quantities {', '.join(loop)} depend on each other in a circle",
+                remedy="write one of them so that it does not use the others, or make it a state",
+            )
+        for item in ready:
+            waiting.remove(item)
+            for name in assigned(item):
+                pending[name] -= 1
+        result += ready
+    return result
+
+
+def needed(items: list[Item], names: Iterable[str]) -> list[Item]:
+    """The items, in order, that the given names depend on."""
+    wanted = set(names)
+    kept: list[Item] = []
+    for item in reversed(items):
+        if assigned(item) & wanted:
+            kept.append(item)
+            wanted |= used(item)
+    return kept[::-1]

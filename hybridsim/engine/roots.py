@@ -1,0 +1,209 @@
+"""All real roots of a guard along a step: Chebyshev pieces with a measured error bound, isolated in Bernstein form.
+
+On a piece [a, b] the guard is sampled at 17 Chebyshev points. The polynomial of degree 8 through every second
+point is the representation; its largest misfit at the other points, doubled, is the error bound. Pieces whose
+bound is not small are halved, so a long step over a fast guard costs samples, never a root. A polynomial in
+Bernstein form has no root where its coefficients share a sign (R. T. Farouki, Computer Aided Geometric Design
+29 (2012) 379, doi:10.1016/j.cagd.2012.03.001); halving isolates every root, and a dip that comes within the
+bound is reported as a near-grazing, not lost. Coefficients that are zero by decree at the left end are divided
+out (deflation), so a guard that has just fired cannot fire again from the same zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from hybridsim.engine.jit import kernel
+
+DEGREE = 8
+SAMPLES = 2 * DEGREE + 1
+# A piece is accepted when its error bound is below this share of the guard's largest value on it: about the
+# square root of the unit roundoff, so that a dip must be deeper than rounding to count and halving stays short.
+_ACCEPT = 2.0**-30
+_DEEPEST = 40  # halvings of a step: beyond 2**-40 of it a piece is accepted with whatever bound it has
+_NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
+
+# Chebyshev points of the second kind on [0, 1]
+POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
+
+
+def _transforms() -> tuple[np.ndarray, np.ndarray]:
+    """Matrices from the values at every second point to Bernstein coefficients and to the points between."""
+    nodes = POINTS[::2]
+    basis = np.array([[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS])
+    to_bernstein = np.linalg.inv(basis[::2])
+    between = basis[1::2] @ to_bernstein
+    assert len(nodes) == DEGREE + 1
+    return to_bernstein, between
+
+
+_TO_BERNSTEIN, _BETWEEN = _transforms()
+_GROWTH = float(np.abs(_TO_BERNSTEIN).sum(axis=1).max())  # how rounding of samples grows in the coefficients
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A change of side of a guard in (left, right) of the step's parameter theta in [0, 1]; +1 is upward."""
+
+    left: float
+    right: float
+    direction: int
+
+
+@dataclass(frozen=True)
+class Grazing:
+    """A minimum of |guard| within the error bound, with no certain change of side."""
+
+    theta: float
+    distance: float
+
+
+@kernel
+def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The two halves of a polynomial in Bernstein form (de Casteljau)."""
+    n = b.shape[0]
+    left, right, work = np.empty(n), np.empty(n), b.copy()
+    for k in range(n):
+        left[k] = work[0]
+        right[n - 1 - k] = work[n - 1 - k]
+        for i in range(n - 1 - k):
+            work[i] = 0.5 * (work[i] + work[i + 1])
+    return left, right
+
+
+@kernel
+def _sign(b: np.ndarray, bound: np.ndarray) -> int:
+    """+1 or -1 where all coefficients are beyond their bounds on one side, 0 where the sign is open."""
+    positive, negative = True, True
+    for i in range(b.shape[0]):
+        positive = positive and b[i] > bound[i]
+        negative = negative and b[i] < -bound[i]
+    if positive:
+        return 1
+    return -1 if negative else 0
+
+
+@kernel
+def _within(b: np.ndarray, bound: np.ndarray) -> bool:
+    """Whether the whole piece lies inside its bounds: halving would tell no more."""
+    for i in range(b.shape[0]):
+        if abs(b[i]) > bound[i]:
+            return False
+    return True
+
+
+@kernel
+def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
+    """Intervals of certain and of open sign: rows (left, right, sign), adjacent ones of one sign merged."""
+    n = b.shape[0]
+    rows = np.empty((1024, 3))
+    count = 0
+    # depth-first from the left; a stack of (coefficients, bounds, left, width)
+    coefficients, bounds = np.empty((128, n)), np.empty((128, n))
+    place, width = np.empty(128), np.empty(128)
+    coefficients[0], bounds[0], place[0], width[0] = b, bound, 0.0, 1.0
+    top = 1
+    while top > 0:
+        top -= 1
+        c, e, x, w = coefficients[top].copy(), bounds[top].copy(), place[top], width[top]
+        s = _sign(c, e)
+        if s == 0 and w > _NARROWEST and count < 1000 and not _within(c, e):
+            cl, cr = _halve(c)
+            el, er = _halve(e)
+            coefficients[top], bounds[top], place[top], width[top] = cr, er, x + 0.5 * w, 0.5 * w
+            coefficients[top + 1], bounds[top + 1], place[top + 1], width[top + 1] = cl, el, x, 0.5 * w
+            top += 2
+        elif count > 0 and rows[count - 1, 2] == s:
+            rows[count - 1, 1] = x + w
+        else:
+            rows[count, 0], rows[count, 1], rows[count, 2] = x, x + w, s
+            count += 1
+    return rows[:count], count
+
+
+def represent(samples: np.ndarray) -> tuple[np.ndarray, float]:
+    """Bernstein coefficients of the piece sampled at `POINTS`, and the bound of its error."""
+    chosen = samples[::2]
+    misfit = float(np.max(np.abs(_BETWEEN @ chosen - samples[1::2])))
+    rounding = 4.0 * 2.0**-53 * _GROWTH * float(np.max(np.abs(chosen)))
+    return _TO_BERNSTEIN @ chosen, 2.0 * misfit + rounding
+
+
+def deflate(b: np.ndarray, bound: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Divide out theta**order: the first `order` Bernstein coefficients are zero by decree."""
+    for _ in range(min(order, len(b) - 1)):
+        n = len(b) - 1
+        factor = n / np.arange(1, n + 1)
+        b, bound = b[1:] * factor, bound[1:] * factor
+    return b, bound
+
+
+def find_roots(
+    sample: Callable[[np.ndarray], np.ndarray],
+    first: np.ndarray,
+    order: int,
+    side: int,
+    stop_at_first: int,
+) -> tuple[list[Crossing], list[Grazing], int]:
+    """All changes of side of one guard over a step, theta in (0, 1].
+
+    Parameters
+    ----------
+    sample : callable, thetas (k,) -> values (k,)
+    first : values at `POINTS` over the whole step
+    order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
+    stop_at_first : direction after whose first crossing the search may end (0: find all)
+
+    Returns the crossings and grazings in order, and the sign at the end of the step (0 where it is within the bound).
+    """
+    crossings: list[Crossing] = []
+    grazings: list[Grazing] = []
+    last, open_from = side, -1.0  # last certain sign; where the open stretch after it began
+    low = math.inf
+    waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
+    while waiting:
+        a, b, samples, depth = waiting.pop()
+        if samples is None:
+            samples = sample(a + (b - a) * POINTS)
+        coefficients, error = represent(samples)
+        largest = float(np.max(np.abs(samples)))
+        if not math.isfinite(error) or (error > _ACCEPT * largest and depth < _DEEPEST):
+            if depth >= _DEEPEST:
+                break  # not a number beyond here: the step's own error control will see it
+            middle = 0.5 * (a + b)
+            waiting += [(middle, b, None, depth + 1), (a, middle, None, depth + 1)]
+            continue
+        bounds = np.full(len(coefficients), error)
+        if a == 0.0 and order > 0:
+            coefficients, bounds = deflate(coefficients, bounds, order)
+            if side != 0:
+                # the leading coefficient's sign is known by decree, whatever rounding made of it
+                coefficients[0] = side * max(side * coefficients[0], 2.0 * bounds[0])
+        rows, count = sign_pattern(coefficients, bounds)
+        for left, right, sign in rows[:count]:
+            x, y = a + (b - a) * left, a + (b - a) * right
+            if sign == 0:
+                if open_from < 0.0:
+                    open_from = x
+                value = sample(np.array([0.5 * (x + y)]))[0] if order == 0 or x > 0.0 else math.inf
+                low = min(low, abs(value))
+                continue
+            if last == 0:
+                last = int(sign)
+            elif sign != last:
+                start = open_from if open_from >= 0.0 else x
+                crossings.append(Crossing(start, x, int(sign)))
+                last = int(sign)
+                if stop_at_first == sign:
+                    return crossings, grazings, last
+            elif open_from > 0.0:
+                grazings.append(Grazing(0.5 * (open_from + x), low))
+            open_from, low = -1.0, math.inf
+        if b == 1.0 and count and rows[count - 1, 2] == 0:
+            return crossings, grazings, 0
+    return crossings, grazings, last

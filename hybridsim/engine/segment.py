@@ -1,0 +1,247 @@
+"""One segment: steps of a method from an event to the next, each searched for events, the event time refined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybridsim.engine.decide import side_after, side_before
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.locate import Findings, Hit, Locator
+from hybridsim.engine.stepping import Counters, Dense, Flow, Method, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.engine.trajectory import Pieces, Segment
+
+_CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
+_DIRECTIONS = {"up": 1, "down": -1, "both": 0}
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A monitor that changed its side, and the state there."""
+
+    s: float
+    x: np.ndarray
+    number: int
+    direction: int
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """The end of a segment: local time and state, the guards located there and the monitors that stop the run."""
+
+    s: float
+    x: np.ndarray
+    fired: tuple[int, ...] = ()
+    stopping: tuple[int, ...] = ()
+
+
+class Still:
+    """The stepper of a model without continuous states: one step to the bound, nothing moves."""
+
+    def __init__(self, bound: float) -> None:
+        self.bound = bound
+
+    def step(self) -> Step:
+        """The whole segment."""
+        return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
+
+    def restep(self, step: Step, s: float) -> Step:
+        """The same up to s."""
+        return Step(step.s0, s, step.x0, step.x1, step.dense)
+
+
+class SegmentRun:
+    """Integrates one segment and keeps what it passed."""
+
+    def __init__(
+        self, system: System, method: Method, origin: Instant, p: np.ndarray, z: np.ndarray, x: np.ndarray,
+        watch: Watch, tolerances: Tolerances, counters: Counters, forward: bool,
+        progress: Callable[[Instant], None] | None,
+    ) -> None:  # fmt: skip
+        self.system, self.method, self.origin = system, method, origin
+        self.tolerances, self.counters, self.progress = tolerances, counters, progress
+        self.watch = watch
+        self.flow = Flow(system, p, z, counters, forward)
+        self.locator = Locator(self.flow, watch)
+        self.monitors = system.model.monitors
+        self.knots, self.states = [0.0], [x]
+        self.interpolants: list[Dense] = []
+        self.scale = np.abs(x)  # largest size of each state on the segment: what rounding is relative to
+        self.sightings: list[Sighting] = []
+        self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
+        self.last_step: float | None = None
+
+    def run(self, bound: float, first_step: float | None) -> Arrival:
+        """Step to the first event, or to the bound."""
+        stepper = self._start(bound, first_step)
+        self.counters.restarts += 1
+        while True:
+            step = stepper.step()
+            self.counters.steps += 1
+            if not np.isfinite(step.x1).all():
+                raise StepFailure(f"the state is not finite at local time {step.s1!r}")
+            self.last_step = abs(step.s1 - step.s0)
+            self.scale = np.maximum(self.scale, np.abs(step.x1))
+            if step.roots is None:
+                step, arrival = self._examine(stepper, step)
+            else:
+                arrival = self._take_roots(step)
+            x = arrival.x if arrival else self._projected(step)
+            self.knots.append(step.s1)
+            self.states.append(x)
+            self.interpolants.append(step.dense)
+            if self.progress:
+                self.progress(self.origin.plus(step.s1))
+            if arrival:
+                return arrival
+            if step.s1 == bound:
+                return Arrival(step.s1, x)
+
+    def segment(self) -> Segment:
+        """The finished piece of trajectory."""
+        knots = np.array(self.knots)
+        flow = self.flow
+        return Segment(
+            self.origin, flow.z, flow.p, knots, np.array(self.states).reshape(len(knots), -1),
+            Pieces(knots, tuple(self.interpolants)),
+        )  # fmt: skip
+
+    def _start(self, bound: float, first_step: float | None) -> Stepper:
+        if self.system.n == 0:
+            return Still(bound)
+        if first_step is not None:
+            first_step = min(first_step, abs(bound))
+        return self.method.start(self.flow, self.states[0], bound, self.tolerances, first_step, self.watch)
+
+    def _projected(self, step: Step) -> np.ndarray:
+        return self.flow.project(np.array([step.s1]), step.x1[None, :])[0]
+
+    # -- events that the engine locates ---------------------------------------------------------------------
+
+    def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
+        """Search a step; where something stops the segment, return the step up to there and the arrival."""
+        found = self.locator.search(step)
+        first = self._first_stop(found)
+        for hit in found.crossings:
+            if self._wanted(hit.number, hit.direction) and (first is None or hit.theta < first[0].theta):
+                if self.monitors[hit.number].action == "record":
+                    ended = self._refine(stepper, step, hit, is_monitor=True)
+                    self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
+        limit = first[0].theta if first else 1.0
+        for g, grazing in found.grazings:
+            if grazing.theta < limit:
+                self.grazings.append((g, step.s0 + grazing.theta * (step.s1 - step.s0), grazing.distance))
+        if first is not None:
+            hit, is_monitor = first
+            ended = self._refine(stepper, step, hit, is_monitor)
+            x = self._projected(ended)
+            self._remember_monitors(found, hit.theta)
+            if is_monitor:
+                return ended, Arrival(ended.s1, x, stopping=(hit.number,))
+            return ended, Arrival(ended.s1, x, fired=(hit.number,))
+        return step, self._at_step_end(step, found)
+
+    def _wanted(self, monitor: int, direction: int) -> bool:
+        want = _DIRECTIONS[self.monitors[monitor].direction]
+        return want in (0, direction)
+
+    def _first_stop(self, found: Findings) -> tuple[Hit, bool] | None:
+        stops = [(hit, False) for hit in found.exits]
+        stops += [
+            (hit, True) for hit in found.crossings
+            if self.monitors[hit.number].action != "record" and self._wanted(hit.number, hit.direction)
+        ]  # fmt: skip
+        return min(stops, key=lambda stop: stop[0].theta, default=None)
+
+    def _remember_monitors(self, found: Findings, theta: float) -> None:
+        """Sides of the monitors just before a stop."""
+        for hit in found.crossings:
+            if hit.theta < theta:
+                self.locator.monitor_sides[hit.number] = hit.direction
+
+    def _at_step_end(self, step: Step, found: Findings) -> Arrival | None:
+        """Sides for the next step; a zero at the end of this one belongs to it."""
+        locator = self.locator
+        open_guards = [int(g) for g in self.watch.guards if found.guard_ends[g] == 0]
+        open_monitors = [k for k in range(len(self.monitors)) if found.monitor_ends[k] == 0]
+        locator.sides, locator.orders = found.guard_ends.copy(), np.zeros_like(locator.orders)
+        before = locator.monitor_sides.copy()
+        for hit in found.crossings:
+            before[hit.number] = hit.direction
+        locator.monitor_sides, locator.monitor_orders = found.monitor_ends.copy(), np.zeros_like(before)
+        if not open_guards and not open_monitors:
+            return None
+        x = self._projected(step)
+        errors = 4.0 * UNIT * self.scale
+        series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, math.ulp(step.s1))
+        side_of = side_after if self.flow.forward else side_before
+        fired, stopping = [], []
+        for g in open_guards:
+            locator.sides[g], order = side_of(series.guards[g], series.guard_bounds[g], 0)
+            locator.orders[g] = order if order <= ORDER else 0
+            if locator.sides[g] < 0:
+                fired.append(g)
+        for k in open_monitors:
+            side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
+            locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
+            if side == 0:
+                locator.monitor_sides[k] = before[k]
+            elif before[k] != 0 and side != before[k] and self._wanted(k, side):
+                if self.monitors[k].action == "record":
+                    self.sightings.append(Sighting(step.s1, x, k, side))
+                else:
+                    stopping.append(k)
+        if fired or stopping:
+            return Arrival(step.s1, x, tuple(fired), tuple(stopping))
+        return None
+
+    def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> Step:
+        """The step up to the event, with the method's own accuracy there.
+
+        Where the dense output is less accurate than the method, the step is repeated to the event time and
+        that time corrected by Newton's method until the guard is zero to rounding.
+        """
+        s = step.s0 + hit.theta * (step.s1 - step.s0) if hit.theta < 1.0 else step.s1
+        if self.method.dense_is_accurate or s == step.s0:
+            x = step.dense(np.array([s]))[0]
+            return Step(step.s0, s, step.x0, x, step.dense)
+        low, high = min(step.s0, step.s1), max(step.s0, step.s1)
+        ended = stepper.restep(step, s)
+        for _ in range(_CORRECTIONS):
+            x = self._projected(ended)
+            zero = np.zeros(self.system.n)
+            series = self.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0)
+            value, slope = (series.monitors if is_monitor else series.guards)[hit.number, :2]
+            shift = -value / slope if slope != 0.0 else math.nan
+            if not math.isfinite(shift) or abs(shift) <= 2.0 * math.ulp(s):
+                break
+            corrected = min(max(s + shift, low), high)
+            if corrected in (s, step.s0):
+                break
+            s = corrected
+            ended = stepper.restep(step, s)
+        return ended
+
+    # -- events that the method locates itself --------------------------------------------------------------
+
+    def _take_roots(self, step: Step) -> Arrival | None:
+        x = self._projected(step)
+        fired = tuple(r.number for r in step.roots or () if not r.is_monitor and r.direction < 0)
+        stopping = []
+        for root in step.roots or ():
+            if root.is_monitor:
+                self.locator.monitor_sides[root.number] = root.direction
+                if not self._wanted(root.number, root.direction):
+                    continue
+                if self.monitors[root.number].action == "record":
+                    self.sightings.append(Sighting(step.s1, x, root.number, root.direction))
+                else:
+                    stopping.append(root.number)
+        if fired or stopping:
+            return Arrival(step.s1, x, fired, tuple(stopping))
+        return None

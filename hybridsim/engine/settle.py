@@ -1,0 +1,399 @@
+"""At an event: transitions, resets and joint decisions, repeated until every mode is admissible just after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hybridsim.engine.decide import (
+    FINE,
+    LEAVES,
+    NONE,
+    NONUNIQUE,
+    UNDECIDED,
+    choose,
+    decree_orders,
+    joint_candidates,
+    judge,
+    side_after,
+)
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.system import Series, System
+
+# A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
+# mode of the model goes round in circles.
+_ROUNDS_PER_MODE = 8
+_MOST_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
+
+
+@dataclass
+class Situation:
+    """Where an event happens: the state before it, and how well its instant is known."""
+
+    s: float
+    x: np.ndarray
+    p: np.ndarray
+    z: np.ndarray
+    x_error: np.ndarray
+    s_error: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """One transition of one component."""
+
+    component: int
+    guard: str
+    source: int
+    target: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+
+@dataclass
+class Outcome:
+    """What holds just after an event, or why nothing does."""
+
+    x: np.ndarray
+    p: np.ndarray
+    z: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    monitor_sides: np.ndarray
+    monitor_orders: np.ndarray
+    changes: list[Change] = field(default_factory=list)
+    continuous: bool = False  # the flow went on without a jump: the step size may be kept
+    status: str = ""
+    message: str = ""
+    warnings: list[str] = field(default_factory=list)
+
+
+class Settling:
+    """One event being settled."""
+
+    def __init__(self, system: System, at: Situation, before: np.ndarray, forward: bool) -> None:
+        self.system = system
+        self.at = at
+        self.before = before  # modes before the event, -1 for what has none yet
+        self.forward = forward
+        self.fired = np.zeros(system.guard_count, dtype=np.bool_)
+        self.on_surface = np.zeros(len(system.automata), dtype=np.bool_)
+        self.changes: list[Change] = []
+        self.warnings: list[str] = []
+        self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        self.released_by = [-1] * len(system.automata)
+        self.sides = np.ones(system.guard_count, dtype=np.int64)
+        self.orders = np.zeros(system.guard_count, dtype=np.int64)
+
+    # -- the rounds -----------------------------------------------------------------------------------------
+
+    def run(self, fired: Iterable[int], resets: Iterable[tuple[object, ...]]) -> Outcome:
+        """Settle: `fired` guards located at zero, and keys of the resets that are due."""
+        located = set(fired)
+        self.fired[list(located)] = True
+        self.released_by = self._release_guards(located)
+        surfaces = self._surface_components()
+        open_ = {c for c, _, _ in self._fired_guards()}
+        failure = self._transitions(open_ - surfaces, list(resets))
+        if failure:
+            return self._stop(*failure)
+        open_ &= surfaces
+        if self.jumped or (self.at.z < 0).any():
+            open_ |= self._take_sides()
+        limit = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in self.system.automata))
+        for _ in range(limit):
+            failure = self._decide(open_)
+            if failure:
+                return self._stop(*failure)
+            verdicts = self._judge_all()
+            leaving = {c for c, v in verdicts.items() if v == LEAVES}
+            for c, v in verdicts.items():
+                if v == UNDECIDED:
+                    self._note_undecided(c)
+            if not leaving:
+                return self._done()
+            fatal = self._fatal(leaving)
+            if fatal:
+                return self._stop("inconsistent", fatal)
+            failure = self._transitions(leaving - surfaces, [])
+            if failure:
+                return self._stop(*failure)
+            open_ = leaving & surfaces
+            if self.jumped:
+                open_ |= self._take_sides()
+        names = ", ".join(f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True))
+        guards = ", ".join(sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]}))
+        return self._stop(
+            "cascade", f"transitions did not come to rest after {limit} rounds ({names}); guards that fire: {guards}"
+        )
+
+    def _take_sides(self) -> set[int]:
+        """Give every surface component the mode of the side it is on; return those that are on the surface."""
+        at, system = self.at, self.system
+        free = at.p.copy()
+        free[system.layout.pin_at] = 0.0  # the states as they are, not as a holding mode would have them
+        series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
+        found = set()
+        for k, c in enumerate(system.surface_of):
+            automaton, value = system.automata[c], series.surfaces[k, 0]
+            if abs(value) <= series.surface_bounds[k, 0]:
+                if at.z[c] in (-1, automaton.hold) or self.on_surface[c]:
+                    found.add(c)
+                continue
+            self.on_surface[c] = False
+            side = automaton.above if value > 0.0 else automaton.below
+            if at.z[c] not in (-1, side):
+                self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
+            at.z[c] = side
+        return found
+
+    def _surface_components(self) -> set[int]:
+        return {c for c, a in enumerate(self.system.automata) if a.has_surface}
+
+    def _fired_guards(self) -> list[tuple[int, int, int]]:
+        """(component, index in its mode, number) of the located guards."""
+        table = self.system.guards_of(self.at.z)
+        return [(c, j, int(g)) for c, row in enumerate(table) for j, g in enumerate(row) if g >= 0 and self.fired[g]]
+
+    def _series(self, z: np.ndarray, x: np.ndarray) -> Series:
+        at = self.at
+        return self.system.series(at.s, x, at.p, z, at.x_error, at.s_error)
+
+    def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
+        """Verdict on the guards of some components in the candidate z."""
+        series = self._series(z, x)
+        active = np.zeros(self.system.guard_count, dtype=np.bool_)
+        table = self.system.guards_of(z)
+        for c in components:
+            active[table[c][table[c] >= 0]] = True
+        sides, orders = np.empty_like(self.sides), np.empty_like(self.orders)
+        verdict = judge(series.guards, series.guard_bounds, decreed, active, not self.forward, sides, orders)
+        self.sides[active], self.orders[active] = sides[active], orders[active]
+        return int(verdict)
+
+    def _judge_all(self) -> dict[int, int]:
+        decreed = self._decreed(self.at.z, self._continuous(self.at.z, range(len(self.system.automata))))
+        return {
+            c: self._judge(self.at.z, self.at.x, decreed, [c])
+            for c in range(len(self.system.automata))
+        }  # fmt: skip
+
+    def _note_undecided(self, component: int) -> None:
+        automaton = self.system.automata[component]
+        mode = automaton.modes[self.at.z[component]]
+        self.warnings.append(f"undecided at rounding: {automaton.name} keeps mode {mode}")
+
+    def _fatal(self, leaving: set[int]) -> str | None:
+        for c in leaving:
+            automaton = self.system.automata[c]
+            mode = int(self.at.z[c])
+            for j, g in enumerate(automaton.guards[mode]):
+                if self.sides[g] < 0 and automaton.fatal[mode][j]:
+                    return automaton.fatal[mode][j]
+        return None
+
+    # -- transitions by declared choices --------------------------------------------------------------------
+
+    def _transitions(self, components: set[int], resets: list[tuple[object, ...]]) -> tuple[str, str] | None:
+        """Take the declared choices of some components and apply resets, everything evaluated at x-."""
+        at, system = self.at, self.system
+        x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
+        x_error = at.x_error.copy()
+        writer: dict[str, tuple[str, float]] = {}
+        taken: list[tuple[int, str, int, int]] = []
+        for c in sorted(components):
+            automaton, mode = system.automata[c], int(at.z[c])
+            leaving = [j for j, g in enumerate(automaton.guards[mode]) if self.fired[g] or self.sides[g] < 0]
+            for j in leaving[:1]:
+                if automaton.fatal[mode][j]:
+                    return "inconsistent", str(automaton.fatal[mode][j])
+                number = system.choose(c, mode, j, at.s, at.x, at.p, at.z)
+                name = automaton.guard_names[mode][j]
+                if number < 0:
+                    return "inconsistent", (
+                        f"guard {name} of mode {automaton.modes[mode]} ({automaton.name}) would go negative and none "
+                        f"of the conditions of its transitions holds"
+                    )
+                target = automaton.targets[mode][j][number]
+                resets.append(("choice", c, mode, j, number))
+                taken.append((c, name, mode, target))
+                z_plus[c] = target
+            for j in range(len(automaton.guards[mode])):
+                self.fired[automaton.guards[mode][j]] = False
+        for key in resets:
+            x_one, p_one = at.x.copy(), at.p.copy()
+            system.apply_reset(key, at.s, at.x, at.p, at.z, x_one, p_one)
+            clash = self._merge(key, x_one, p_one, x_plus, p_plus, x_error, writer)
+            if clash:
+                return "inconsistent", clash
+        self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
+        self.jumped = self.jumped or bool(taken) or bool(resets)
+        at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
+        return None
+
+    def _merge(
+        self, key: tuple[object, ...], x_one: np.ndarray, p_one: np.ndarray, x_plus: np.ndarray, p_plus: np.ndarray,
+        x_error: np.ndarray, writer: dict[str, tuple[str, float]],
+    ) -> str | None:  # fmt: skip
+        """Merge the values that one reset set into x+; two resets that disagree are a message."""
+        system = self.system
+        if key not in system.resets:
+            return None
+        label = " ".join(str(k) for k in key)
+        discrete = tuple(d.name for d in system.model.discrete)
+        for name in system.resets[key][1]:
+            if name in discrete:
+                place = system.layout.discrete_at + discrete.index(name)
+                value = p_plus[place] = p_one[place]
+            else:
+                place = system.names.index(name)
+                value = x_plus[place] = x_one[place]
+                x_error[place] = UNIT * abs(value)
+            previous = writer.setdefault(name, (label, float(value)))
+            if previous[1] != value and not (np.isnan(value) and np.isnan(previous[1])):
+                return f"two resets at one instant set {name} to {previous[1]!r} and to {float(value)!r}"
+        return None
+
+    # -- decisions by admissibility at surfaces -------------------------------------------------------------
+
+    def _decide(self, open_: set[int]) -> tuple[str, str] | None:
+        """Decide the clusters in which a component is open: it fired, leaves, or has no mode yet."""
+        for cluster in self.system.clusters:
+            if open_ & set(cluster):
+                failure = self._decide_cluster(cluster, open_)
+                if failure:
+                    return failure
+        return None
+
+    def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
+        at, automata = self.at, self.system.automata
+        taking_part = [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
+        for c in taking_part:
+            self.on_surface[c] = True
+        sizes = [len(automata[c].modes) for c in taking_part]
+        if int(np.prod(sizes)) > _MOST_CANDIDATES:
+            names = ", ".join(automata[c].name for c in taking_part)
+            return "inconsistent", f"{len(taking_part)} coupled components at their surfaces at once ({names})"
+        candidates = joint_candidates(sizes)
+        at.x = self._pinned(taking_part)
+        at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
+        verdicts = np.array([self._joint_verdict(c, taking_part, cluster) for c in candidates], dtype=np.int64)
+        holds = np.array([automata[c].hold for c in taking_part])
+        number = int(choose(candidates, verdicts, at.z[taking_part], holds))
+        if number == NONUNIQUE:
+            return "nonunique", self._say(taking_part, candidates[verdicts == FINE], "several motions are admissible")
+        if number == NONE:
+            return "inconsistent", self._say(taking_part, candidates, "no motion is admissible")
+        source, x_minus = at.z.copy(), at.x.copy()
+        guards = {c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0}
+        for c, mode in zip(taking_part, candidates[number], strict=True):
+            at.z[c] = mode
+            if source[c] != mode:
+                for g in automata[c].guards[source[c]] if source[c] >= 0 else ():
+                    self.fired[g] = False
+                if source[c] >= 0:
+                    self.changes.append(Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x))
+        return None
+
+    def _pinned_states(self, components: list[int]) -> np.ndarray:
+        mask = np.zeros(self.system.n, dtype=np.bool_)
+        mask[[self.system.pins[c] for c in components]] = True
+        return mask
+
+    def _pinned(self, components: list[int]) -> np.ndarray:
+        """x with the surfaces of these components exactly zero."""
+        z = np.maximum(self.at.z, 0)
+        for c in components:
+            z[c] = self.system.automata[c].hold
+        return self.system.project(self.at.s, self.at.x, self.at.p, z)
+
+    def _joint_verdict(self, modes: np.ndarray, taking_part: list[int], cluster: tuple[int, ...]) -> int:
+        z = self.at.z.copy()
+        z[taking_part] = modes
+        return self.verdict(np.maximum(z, 0), cluster)
+
+    def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
+        """Whether the guards of some components admit the modes z just after the event."""
+        components = list(components)
+        decreed = self._decreed(z, self._continuous(z, components))
+        return self._judge(z, self.at.x, decreed, components)
+
+    def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
+        """Whether every change so far leaves all unknowns as they were: releases at the limit without a jump."""
+        if self.jumped:
+            return False
+        changed = [c for c in components if z[c] != self.before[c]]
+        if not changed:
+            return True
+        jumps = self.system.jumps(self.at.s, self.at.x, self.at.p, z)
+        return all(self._released(c, z) and jumps[c][self._release_side(c, z)] == 0.0 for c in changed)
+
+    def _release_side(self, c: int, z: np.ndarray) -> int:
+        return 0 if z[c] == self.system.automata[c].above else 1
+
+    def _released(self, c: int, z: np.ndarray) -> bool:
+        """Whether c leaves its holding mode through the guard that was located for it."""
+        hold = self.system.automata[c].hold
+        if hold < 0 or self.before[c] != hold or z[c] == hold:
+            return False
+        return self.released_by[c] == self._release_side(c, z)
+
+    def _release_guards(self, located: set[int]) -> list[int]:
+        """For each component held before, the first of its located guards (0 releases above, 1 below), else -1."""
+        result = []
+        for c, automaton in enumerate(self.system.automata):
+            held = automaton.has_surface and self.before[c] == automaton.hold
+            guards = automaton.guards[automaton.hold] if held else ()
+            result.append(next((j for j, g in enumerate(guards) if g in located), -1))
+        return result
+
+    def _decreed(self, z: np.ndarray, continuous: bool) -> np.ndarray:
+        system = self.system
+        modes = zip(system.automata, z, strict=True)
+        holding = np.array([a.has_surface and m == a.hold for a, m in modes], dtype=np.bool_)
+        released = np.array([self._released(c, z) for c in range(len(z))], dtype=np.bool_)
+        decreed = np.zeros(system.guard_count, dtype=np.int64)
+        fired = self.fired & (z == self.at.z)[system.owner]
+        decree_orders(system.guards_of(z), holding, self.on_surface, released, continuous, fired, decreed)
+        return decreed
+
+    def _say(self, components: list[int], candidates: np.ndarray, what: str) -> str:
+        automata = self.system.automata
+        rows = [
+            ", ".join(f"{automata[c].name}: {automata[c].modes[m]}" for c, m in zip(components, row, strict=True))
+            for row in candidates
+        ]
+        state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, self.at.x, strict=True))
+        return f"{what} at {state}: {'; or '.join(rows)}"
+
+    # -- results --------------------------------------------------------------------------------------------
+
+    def _monitors(self) -> tuple[np.ndarray, np.ndarray]:
+        series = self._series(np.maximum(self.at.z, 0), self.at.x)
+        found = [
+            side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)
+        ]  # fmt: skip
+        sides = np.array([f[0] for f in found], dtype=np.int64)
+        orders = np.array([f[1] for f in found], dtype=np.int64)
+        if not self.forward:
+            sides = np.where(orders % 2 == 1, -sides, sides)
+        return sides, orders
+
+    def _done(self) -> Outcome:
+        at = self.at
+        monitor_sides, monitor_orders = self._monitors()
+        continuous = not self.jumped and self._continuous(at.z, range(len(self.system.automata)))
+        orders = np.where(self.orders > ORDER, 0, self.orders)
+        return Outcome(
+            at.x, at.p, at.z, self.sides, orders, monitor_sides, np.where(monitor_orders > ORDER, 0, monitor_orders),
+            self.changes, continuous, "", "", self.warnings,
+        )  # fmt: skip
+
+    def _stop(self, status: str, message: str) -> Outcome:
+        at = self.at
+        empty = np.zeros(len(self.system.monitor_names), dtype=np.int64)
+        return Outcome(
+            at.x, at.p, at.z, self.sides, self.orders, empty, empty, self.changes, False, status, message, self.warnings
+        )

@@ -1,0 +1,139 @@
+"""What the mode loop asks of an integrator: a flow goes in, steps with dense output come out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from hybridsim.engine.rows import evaluate
+from hybridsim.engine.system import System
+
+Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
+
+
+class StepFailure(Exception):
+    """The integrator cannot go on from here; the message says why."""
+
+
+@dataclass
+class Counters:
+    """What a run has cost, summed over all restarts."""
+
+    steps: int = 0
+    rejected: int = 0
+    rhs_evaluations: int = 0
+    guard_evaluations: int = 0
+    events: int = 0
+    restarts: int = 0
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Error control of a run: rtol, atol for each state, bounds of the step."""
+
+    rtol: float
+    atol: np.ndarray
+    max_step: float = np.inf
+    first_step: float | None = None
+
+
+@dataclass(frozen=True)
+class Root:
+    """A zero that an integrator located by itself: of guard `number`, or of a monitor, falling (-1) or rising (+1)."""
+
+    number: int
+    direction: int
+    is_monitor: bool = False
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted step from s0 to s1 (local times) with its dense output.
+
+    roots is None where the mode loop locates events itself; else the zeros at s1 that the integrator found.
+    """
+
+    s0: float
+    s1: float
+    x0: np.ndarray
+    x1: np.ndarray
+    dense: Dense
+    roots: tuple[Root, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What to look for in one segment: active guards and all monitors, with side and leading order at its start.
+
+    guards are the numbers of the active guards; the other arrays are over all guards, and over all monitors.
+    """
+
+    guards: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    monitor_sides: np.ndarray
+    monitor_orders: np.ndarray
+
+
+@dataclass
+class Flow:
+    """The smooth field of one segment, as integrators see it: rhs(s, x), counted."""
+
+    system: System
+    p: np.ndarray
+    z: np.ndarray
+    counters: Counters
+    forward: bool = True
+    _address: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._address = self.system.address("flow")
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return self.system.n
+
+    def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
+        """dx/dt in a fresh array; NaN where the model has no value."""
+        out = np.empty(self.system.n)
+        evaluate(self._address, float(s), x, self.p, self.z, out)
+        return out
+
+    def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """States (k, n) at local times (k,) with held states on their constraints."""
+        x = np.ascontiguousarray(x, dtype=float)
+        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.pins else x
+
+    def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Guard values (k, guards)."""
+        self.counters.guard_evaluations += len(s)
+        return self.system.rows("guards", self.system.guard_count, s, x, self.p, self.z)
+
+    def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Monitor values (k, monitors)."""
+        return self.system.rows("monitors", len(self.system.monitor_names), s, x, self.p, self.z)
+
+
+class Stepper(Protocol):
+    """An integration in progress through one smooth segment."""
+
+    def step(self) -> Step:
+        """The next accepted step; raises StepFailure."""
+
+    def restep(self, step: Step, s: float) -> Step:
+        """The step anew from its start to s exactly: the method's own accuracy at an event time."""
+
+
+class Method(Protocol):
+    """What the mode loop uses of an integrator."""
+
+    dense_is_accurate: bool
+
+    def start(
+        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+    ) -> Stepper:
+        """Begin a segment at local time 0 towards s_bound (negative when time runs backward)."""

@@ -1,0 +1,225 @@
+"""A model bound to parameter values: its compiled functions, its run-time vector, its series with error bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.jets import ORDER, UNIT, new_registers, run_tape
+from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
+from hybridsim.engine.modules import compiled
+from hybridsim.engine.rows import evaluate, evaluate_rows
+from hybridsim.engine.signals import Signal
+from hybridsim.engine.timepair import Instant, phase
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """One component as the engine sees it; modes and guards are numbers."""
+
+    name: str
+    modes: tuple[str, ...]
+    guards: tuple[tuple[int, ...], ...]  # global guard number of each guard of each mode
+    guard_names: tuple[tuple[str, ...], ...]
+    targets: tuple[tuple[tuple[int, ...], ...], ...]  # mode, guard -> target modes of its choices
+    fatal: tuple[tuple[str | None, ...], ...]
+    above: int = -1
+    below: int = -1
+    hold: int = -1
+    initial: int = -1
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether its mode is decided by admissibility at a surface."""
+        return self.hold >= 0
+
+
+@dataclass(frozen=True)
+class Series:
+    """Taylor coefficients along a flow, order along the last axis, with rounding error bounds."""
+
+    guards: np.ndarray
+    guard_bounds: np.ndarray
+    surfaces: np.ndarray
+    surface_bounds: np.ndarray
+    monitors: np.ndarray
+    monitor_bounds: np.ndarray
+    states: np.ndarray
+
+
+def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton:
+    names = tuple(m.name for m in component.modes)
+    surface = component.surface
+    return Automaton(
+        component.name, names, guards,
+        tuple(tuple(g.name for g in m.guards) for m in component.modes),
+        tuple(tuple(tuple(names.index(c.to) for c in g.then) for g in m.guards) for m in component.modes),
+        tuple(tuple(g.fatal for g in m.guards) for m in component.modes),
+        *((names.index(surface.above), names.index(surface.below), names.index(surface.hold)) if surface
+          else (-1, -1, -1)),
+        initial=-1 if component.initial is None else names.index(component.initial),
+    )  # fmt: skip
+
+
+class System:
+    """A model with values: what integrators and the mode loop work on."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.code = compiled(model)
+        data = self.code.data
+        self.names = tuple(s.name for s in model.states)
+        self.n = len(self.names)
+        self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
+        self.automata = tuple(
+            _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
+        )
+        self.guard_count: int = data["guard_count"]
+        self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
+        self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
+        self.pins: dict[int, int] = data["pins"]
+        self.linear: dict[str, tuple[bool, ...]] = data["linear"]
+        self.quantities: tuple[str, ...] = data["quantities"]
+        self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
+        self.monitor_names = tuple(m.name for m in model.monitors)
+        self._values = model.parameter_values()
+        self._base = np.zeros(self.layout.size)
+        self._base[: self.layout.parameters] = list(self._values.values())
+        self._base[self.layout.pin_at] = 1.0
+        self._rates = self._plain("rates", self._base, data["rates"])
+        self.signals = tuple(Signal(i, self._values) for i in model.inputs)
+        self.owner = np.zeros(self.guard_count, dtype=np.int64)  # component of each guard
+        for c, automaton in enumerate(self.automata):
+            for numbers in automaton.guards:
+                self.owner[list(numbers)] = c
+        self._tapes: dict[bytes, np.ndarray] = {}
+        self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
+
+    # -- values ---------------------------------------------------------------------------------------------
+
+    def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
+        """Initial states, in order."""
+        values = self.model.start_values() | dict(overrides)
+        return np.array([float(values[n]) for n in self.names])
+
+    def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
+        """The run-time vector p of a segment whose local time starts at `origin`."""
+        p = self._base.copy()
+        at = self.layout
+        p[at.discrete_at : at.discrete_at + at.discrete] = discrete
+        p[at.origin_at] = float(origin)
+        for k, rate in enumerate(self._rates):
+            p[at.phases_at + k] = phase(origin, float(rate), 0.0)
+        for k, signal in enumerate(self.signals):
+            place = at.signals_at + SIGNAL_SLOTS * k
+            p[place : place + SIGNAL_SLOTS] = signal.piece(origin, forward)
+        return p
+
+    def discrete(self, p: np.ndarray) -> np.ndarray:
+        """Discrete states in p."""
+        return p[self.layout.discrete_at : self.layout.discrete_at + self.layout.discrete]
+
+    def mode_names(self, z: np.ndarray) -> dict[str, str]:
+        """Mode of every component by name."""
+        return {a.name: a.modes[m] for a, m in zip(self.automata, z, strict=True)}
+
+    # -- functions ------------------------------------------------------------------------------------------
+
+    def address(self, name: str) -> Any:
+        """Address of a compiled function, for kernels."""
+        return self.code.address(name)
+
+    def _plain(self, name: str, p: np.ndarray, size: int) -> np.ndarray:
+        out = np.zeros(size)
+        getattr(self.code.module, name)(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
+        return out
+
+    def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """dx/dt."""
+        out = np.empty(self.n)
+        evaluate(self.address("flow"), s, x, p, z, out)
+        return out
+
+    def project(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """x with every held state evaluated from its constraint."""
+        if not self.pins:
+            return x
+        out = np.empty(self.n)
+        evaluate(self.address("project"), s, np.ascontiguousarray(x), p, z, out)
+        return out
+
+    def rows(self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """A function at many points: s (k,), x (k, n) -> (k, count)."""
+        out = np.empty((len(s), count))
+        evaluate_rows(self.address(name), s, x, p, z, out)
+        return out
+
+    def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[float, float]]:
+        """Jump of each unknown on release to above and to below, by component."""
+        out = np.zeros(2 * len(self.surface_of))
+        self.code.module.jumps(s, x, p, z, out)
+        return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
+
+    def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
+        """Number of the first choice of a guard whose condition holds; -1 if none."""
+        return self.code.module.choose(component, mode, guard, s, x, p, z)
+
+    def apply_reset(self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any) -> None:
+        """Write the values that one reset sets; everything is evaluated at (s, x, p, z)."""
+        if key in self.resets:
+            self.code.module.reset(self.resets[key][0], s, x, p, z, x_plus, p_plus)
+
+    # -- series ---------------------------------------------------------------------------------------------
+
+    def guards_of(self, z: np.ndarray) -> np.ndarray:
+        """Active guard numbers (components, widest), -1 where a mode has fewer."""
+        table = np.full((len(self.automata), max(self._widest, 1)), -1, dtype=np.int64)
+        for c, (automaton, mode) in enumerate(zip(self.automata, z, strict=True)):
+            numbers = automaton.guards[mode]
+            table[c, : len(numbers)] = numbers
+        return table
+
+    def active(self, z: np.ndarray) -> np.ndarray:
+        """Mask of the guards that the modes in z have."""
+        mask = np.zeros(self.guard_count, dtype=np.bool_)
+        numbers = self.guards_of(z)
+        mask[numbers[numbers >= 0]] = True
+        return mask
+
+    def _tape(self, z: np.ndarray) -> np.ndarray:
+        key = z.tobytes()
+        if key not in self._tapes:
+            rows: list[tuple[int, ...]] = []
+            for component, branches in self.code.data["tape"]["parts"]:
+                rows += branches[0 if component < 0 else z[component]]
+            self._tapes[key] = np.array(rows, dtype=np.int64).reshape(-1, 5)
+        return self._tapes[key]
+
+    def series(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
+    ) -> Series:
+        """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
+        tape = self.code.data["tape"]
+        V, E = new_registers(tape["registers"], ORDER)
+        for register, value in tape["constants"]:
+            V[register, 0] = value
+        at = self.layout
+        for register, place in tape["parameters"]:
+            V[register, 0] = p[place]
+            if at.phases_at <= place < at.signals_at:
+                E[register, 0] = 2.0 * UNIT * abs(p[place])
+        if tape["time"] >= 0:
+            V[tape["time"], 0], E[tape["time"], 0] = s, s_error
+            V[tape["time"], 1] = 1.0
+        states = np.array(tape["states"], dtype=np.int64)
+        V[states, 0], E[states, 0] = x, x_error
+        derivatives = np.array(tape["derivatives"], dtype=np.int64)
+        run_tape(self._tape(z), ORDER, states, derivatives, V, E)
+        g, f, m = (list(tape[k]) for k in ("guards", "surfaces", "monitors"))
+        return Series(V[g], E[g], V[f], E[f], V[m], E[m], V[states])

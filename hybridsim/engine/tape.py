@@ -1,0 +1,183 @@
+"""A tape: expressions as rows (operation, a, b, c, out) over numbered registers, for one pre-compiled interpreter.
+
+The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
+generated source, and run by `hybridsim.engine.jets` to get Taylor coefficients with error bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+# Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
+COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
+SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, EQUAL = range(10, 23)
+# how INTEGRAL finds its own leading coefficient from the argument c
+LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
+
+_MAX_INTEGER_POWER = 64  # beyond it a power costs more as products than as exp(n log u)
+
+
+class TapeBuilder:
+    """Turns SymPy expressions over named registers into rows; equal subexpressions share a register."""
+
+    def __init__(self) -> None:
+        self.registers: dict[str, int] = {}  # name -> register
+        self.constants: dict[float, int] = {}  # value -> register
+        self.count = 0
+
+    def register(self, name: str) -> int:
+        """The register of a name, made on first use."""
+        if name not in self.registers:
+            self.registers[name] = self._new()
+        return self.registers[name]
+
+    def rows(self, assignments: list[tuple[str, Any]], known: dict[Any, int]) -> list[tuple[int, ...]]:
+        """Rows that put each expression into the register of its name; `known` shares subexpressions."""
+        rows: list[tuple[int, ...]] = []
+        for name, expression in assignments:
+            source = self._emit(expression, known, rows)
+            rows.append((COPY, source, 0, 0, self.register(name)))
+        return rows
+
+    def _new(self) -> int:
+        self.count += 1
+        return self.count - 1
+
+    def _constant(self, value: float) -> int:
+        if value not in self.constants:
+            self.constants[value] = self._new()
+        return self.constants[value]
+
+    def _op(self, rows: list[tuple[int, ...]], op: int, a: int, b: int = 0, c: int = 0) -> int:
+        out = self._new()
+        if op in (SINCOS, SINHCOSH, TANGENT):
+            self._new()  # these operations keep a companion series in the next register
+        rows.append((op, a, b, c, out))
+        return out
+
+    def _emit(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        if e in known:
+            return known[e]
+        known[e] = out = self._emit_new(e, known, rows)
+        return out
+
+    def _emit_new(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        if e.is_Symbol:
+            return self.register(e.name)
+        if e is sp.true or e is sp.false:
+            return self._constant(1.0 if e is sp.true else 0.0)
+        if e.is_number and not e.has(sp.Function):
+            return self._constant(float(e))
+        if e.is_Add or e.is_Mul:
+            return self._emit_chain(e, known, rows)
+        if e.is_Pow:
+            return self._emit_power(e.base, e.exp, known, rows)
+        if isinstance(e, sp.Piecewise):
+            return self._emit_piecewise(e, known, rows)
+        arguments = [self._emit(a, known, rows) for a in e.args]
+        return self._emit_function(e, arguments, known, rows)
+
+    def _emit_chain(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        if e.is_Mul:
+            numerator, denominator = e.as_numer_denom()
+            if denominator != 1 and not denominator.is_number:
+                a, b = self._emit(numerator, known, rows), self._emit(denominator, known, rows)
+                return self._op(rows, DIV, a, b)
+            if e.could_extract_minus_sign() and e.args[0] is sp.S.NegativeOne:
+                return self._op(rows, NEG, self._emit(-e, known, rows))
+        out = -1
+        for argument in e.args:
+            subtract = e.is_Add and out >= 0 and argument.could_extract_minus_sign()
+            value = self._emit(-argument if subtract else argument, known, rows)
+            if out < 0:
+                out = value
+            else:
+                out = self._op(rows, SUB if subtract else (ADD if e.is_Add else MUL), out, value)
+        return out
+
+    def _emit_power(self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        if exponent.is_Integer and abs(int(exponent)) <= _MAX_INTEGER_POWER:
+            n = int(exponent)
+            if n < 0:
+                return self._op(rows, DIV, self._constant(1.0), self._emit(base ** (-n), known, rows))
+            half = self._emit(base ** (n // 2), known, rows) if n > 3 else self._emit(base, known, rows)
+            if n > 3:
+                square = self._op(rows, MUL, half, half)
+                return self._op(rows, MUL, square, self._emit(base, known, rows)) if n % 2 else square
+            out = self._op(rows, MUL, half, half)
+            return self._op(rows, MUL, out, half) if n == 3 else out
+        if exponent == sp.Rational(1, 2) or exponent == 0.5:
+            return self._op(rows, SQRT, self._emit(base, known, rows))
+        if exponent == sp.Rational(-1, 2) or exponent == -0.5:
+            root = self._op(rows, SQRT, self._emit(base, known, rows))
+            return self._op(rows, DIV, self._constant(1.0), root)
+        return self._emit(sp.exp(exponent * sp.log(base), evaluate=False), known, rows)
+
+    def _emit_piecewise(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        out = self._emit(e.args[-1].expr, known, rows)
+        for pair in reversed(e.args[:-1]):
+            condition = self._emit(pair.cond, known, rows)
+            value = self._emit(pair.expr, known, rows)
+            out = self._op(rows, SELECT, condition, value, out)
+        return out
+
+    def _emit_function(self, e: Any, a: list[int], known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        one = self._constant(1.0)
+        simple: Mapping[Any, int] = {
+            sp.exp: EXP, sp.Abs: ABS, sp.sign: SIGN, sp.Not: NOT, sp.tan: TANGENT,
+        }  # fmt: skip
+        chained: Mapping[Any, int] = {sp.Min: MIN, sp.Max: MAX, sp.And: AND, sp.Or: OR}
+        ordered: Mapping[Any, tuple[int, bool]] = {
+            sp.StrictLessThan: (LESS, False), sp.StrictGreaterThan: (LESS, True),
+            sp.LessThan: (LESS_EQUAL, False), sp.GreaterThan: (LESS_EQUAL, True),
+        }  # fmt: skip
+        kind = e.func
+        if kind in simple:
+            return self._op(rows, simple[kind], a[0])
+        if kind in chained:
+            out = a[0]
+            for other in a[1:]:
+                out = self._op(rows, chained[kind], out, other)
+            return out
+        if kind in ordered:
+            op, swap = ordered[kind]
+            return self._op(rows, op, a[1] if swap else a[0], a[0] if swap else a[1])
+        if kind is sp.Eq:
+            return self._op(rows, EQUAL, a[0], a[1])
+        if kind is sp.Ne:
+            return self._op(rows, NOT, self._op(rows, EQUAL, a[0], a[1]))
+        if kind in (sp.sin, sp.cos):
+            pair = ("sincos", e.args[0])
+            if pair not in known:
+                known[pair] = self._op(rows, SINCOS, a[0])
+            return known[pair] + (0 if kind is sp.sin else 1)
+        if kind in (sp.sinh, sp.cosh):
+            pair = ("sinhcosh", e.args[0])
+            if pair not in known:
+                known[pair] = self._op(rows, SINHCOSH, a[0])
+            return known[pair] + (0 if kind is sp.sinh else 1)
+        if kind is sp.tanh:
+            # (e^u - e^-u)/(e^u + e^-u) overflows; 1 - 2/(e^{2u} + 1) loses digits at 0: use y' = (1 - y^2) u'
+            return self._op(rows, TANGENT, a[0], 1)
+        if kind is sp.log:
+            return self._op(rows, INTEGRAL, a[0], a[0], LOG)
+        if kind in (sp.asin, sp.acos):
+            root = self._op(rows, SQRT, self._op(rows, SUB, one, self._op(rows, MUL, a[0], a[0])))
+            if kind is sp.asin:
+                return self._op(rows, INTEGRAL, root, a[0], ASIN)
+            return self._op(rows, INTEGRAL, self._op(rows, NEG, root), a[0], ACOS)
+        if kind is sp.atan:
+            return self._op(rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN)
+        if kind is sp.atan2:
+            # on the unit circle turned by the leading angle the rest is an ordinary arc tangent
+            return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)
+        raise NotImplementedError(f"no Taylor recurrence for {kind}")

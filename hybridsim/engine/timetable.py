@@ -1,0 +1,79 @@
+"""What happens at times known beforehand: scheduled resets, clock ticks, knots of inputs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.timepair import Instant, multiple
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+
+
+@dataclass(frozen=True)
+class Appointment:
+    """An instant to be stepped to, and the schedules that are due then (none: a knot of an input)."""
+
+    instant: Instant
+    schedules: tuple[int, ...]
+
+
+class Timetable:
+    """The scheduled times of one run."""
+
+    def __init__(self, system: System) -> None:
+        values = system.model.parameter_values()
+        self._signals = system.signals
+        self._schedules = []
+        for schedule in system.model.schedules:
+            times = sorted(evaluate(t, values) for t in schedule.times)
+            start = evaluate(schedule.start, values) if schedule.start is not None else 0.0
+            period = evaluate(schedule.period, values) if schedule.period is not None else 0.0
+            count = 1 if schedule.start is not None and schedule.period is None else schedule.count
+            self._schedules.append((times, start, period, count))
+
+    def due_at_start(self, start: Instant) -> tuple[int, ...]:
+        """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
+        return tuple(
+            k for k in range(len(self._schedules)) if (first := self._first(k)) is not None and first.minus(start) == 0
+        )
+
+    def next(self, after: Instant, forward: bool) -> Appointment | None:
+        """The nearest appointment strictly after an instant; what coincides within rounding comes together."""
+        found: list[tuple[Instant, int]] = []
+        for k in range(len(self._schedules)):
+            time = self._next(k, after, forward)
+            if time is not None:
+                found.append((time, k))
+        for signal in self._signals:
+            knot = signal.next_knot(after, forward)
+            if knot is not None:
+                found.append((knot, -1))
+        if not found:
+            return None
+        nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
+        slack = math.ulp(nearest.high)
+        together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
+        latest = max((t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after)))
+        return Appointment(latest, tuple(sorted(k for k in together if k >= 0)))
+
+    def _first(self, k: int) -> Instant | None:
+        times, start, period, _ = self._schedules[k]
+        if times:
+            return Instant(times[0])
+        return Instant(start)
+
+    def _next(self, k: int, after: Instant, forward: bool) -> Instant | None:
+        times, start, period, count = self._schedules[k]
+        if times:
+            candidates = [Instant(t) for t in times]
+        else:
+            last = math.inf if count is None else count - 1
+            near = 0 if period == 0.0 else math.floor((float(after) - start) / period)
+            ticks = range(max(near - 1, 0), int(min(max(near, 0) + 3, last)) + 1)
+            candidates = [multiple(start, i, period) for i in ticks]
+        ahead = [c for c in candidates if (c.minus(after) > 0.0 if forward else c.minus(after) < 0.0)]
+        return None if not ahead else (ahead[0] if forward else ahead[-1])

@@ -1,0 +1,72 @@
+"""The contract of an integrator, for those who write one."""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.loop import ModeLoop
+from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
+from hybridsim.engine.trajectory import Task, Trajectory
+
+CAPABILITIES = {
+    "contacts": "components with a surface: contacts, relays",
+    "transitions": "general automata: modes, choices, resets",
+    "monitors": "events that change no mode",
+    "scheduled": "events and inputs at times known beforehand",
+    "multiple-roots": "several zeros of a guard within one step",
+    "exact-stick": "a held state is exact, bit for bit",
+    "backward": "time running backward",
+    "stiff": "rates that differ by many decades",
+    "adaptive": "the error follows rtol and atol",
+}
+
+
+class Integrator(ABC):  # noqa: B024 - one of start() or run() must be given, see rule 2
+    """How a piecewise-smooth system is integrated.
+
+    The contract, in the order in which it matters:
+
+    1. An integrator is a frozen dataclass; its fields are its options, with defaults and types. It keeps no state
+       between runs: whatever a run needs lives in the stepper.
+    2. Give ``start`` to step through smooth segments and have events located, decided and settled by the engine; or
+       give ``run`` to drive a whole run, as a fixed-step method that makes its own decisions does.
+    3. ``start(flow, x0, s_bound, tolerances, first_step, watch)`` begins a segment at local time 0 in the state x0.
+       Its field ``flow.rhs(s, x)`` is smooth: no sign, no switch. Everything is fresh: no history of an earlier
+       segment may be used.
+    4. ``stepper.step()`` returns the next accepted `Step`, the last one ending at ``s_bound`` bit for bit, or raises
+       `StepFailure`. A trial in which a number is not finite is a rejected step, never an accepted one. s_bound is
+       negative when time runs backward.
+    5. ``step.dense(times)`` takes local times (k,) inside the step to states (k, n) and meets x0 and x1 at its ends.
+       Say in ``dense_is_accurate`` whether it is as accurate as the method; if not, give ``stepper.restep(step, s)``,
+       the same step up to s exactly, and event times get the accuracy of the method.
+    6. A method that finds zeros by itself returns them in ``step.roots`` and ends its step at them; ``watch`` says
+       what to look for and which leading coefficients are zero at the start, by decree.
+    7. What a method cannot do stands in ``lacks``: capability (a key of `CAPABILITIES`) to the reason. A model that
+       needs it is refused with that reason.
+    8. Evaluate only through ``flow``: it counts. Count rejected steps in ``flow.counters.rejected``.
+    9. ``tests/conformance`` holds every integrator to the event contract; run it on yours.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    order: ClassVar[str]
+    reference: ClassVar[str]
+    when: ClassVar[str]
+    lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    dense_is_accurate: ClassVar[bool] = False
+
+    def start(
+        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
+
+    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run a task; by default step by step through the engine's mode loop."""
+        return ModeLoop(system, self, task, progress).run()

@@ -1,0 +1,69 @@
+"""The one list of integrators: ours, and those that third parties add through the entry point."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.integrators.base import Integrator
+
+ENTRY_POINT = "hybridsim.integrators"
+_OURS = (
+    "scipy_explicit:ScipyDOP853",
+    "scipy_explicit:ScipyRK45",
+    # "sundials:CvodeAdams",
+    # "sundials:CvodeBDF",
+    # "published:Rk4Dichotomy",
+    # "published:Rk4Sign",
+)
+
+
+@cache
+def _registered() -> dict[str, type[Integrator]]:
+    found: dict[str, type[Integrator]] = {}
+    for place in _OURS:
+        module, name = place.split(":")
+        integrator = getattr(import_module(f"hybridsim.integrators.{module}"), name)
+        found[integrator.name] = integrator
+    for entry in entry_points(group=ENTRY_POINT):
+        integrator = entry.load()
+        if not (isinstance(integrator, type) and issubclass(integrator, Integrator)):
+            raise UsageError(
+                f"the entry point {entry.name} = {entry.value} names no Integrator class",
+                remedy=f"let {entry.value} be a subclass of hybridsim.integrators.base.Integrator",
+            )
+        if integrator.name in found and found[integrator.name] is not integrator:
+            raise UsageError(
+                f"{entry.value} is called {integrator.name!r}, and so is another integrator",
+                remedy="give it a name of its own",
+            )
+        found[integrator.name] = integrator
+    return found
+
+
+def list_integrators() -> tuple[type[Integrator], ...]:
+    """All integrators that can be named, ours first."""
+    return tuple(_registered().values())
+
+
+def integrator_class(name: str) -> type[Integrator]:
+    """The integrator of a name."""
+    found = _registered()
+    if name not in found:
+        raise UsageError(f"there is no integrator {name!r}", remedy=nearest(name, found, kind="integrators"))
+    return found[name]
+
+
+def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
+    """The integrator of a name with its options set."""
+    cls = integrator_class(name)
+    known = [f.name for f in fields(cls)]  # type: ignore[arg-type] - every integrator is a dataclass (rule 1)
+    for option in options:
+        if option not in known:
+            remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"
+            raise UsageError(f"{name} has no option {option!r}", remedy=remedy)
+    return cls(**options)

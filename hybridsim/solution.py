@@ -1,0 +1,328 @@
+"""What a run gives back: times, states, dense output, events, modes, outputs, cost."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError, nearest
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+    from hybridsim.engine.trajectory import Segment, Trajectory
+    from hybridsim.model import Model
+
+_GOOD = ("finished", "terminated")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at one instant.
+
+    Parameters
+    ----------
+    t : time, rounded to a double.
+    kind : "transition", "monitor", "scheduled" or "near-grazing".
+    component : name of the component, monitor or schedule.
+    guard : name of the guard that fired, if one did.
+    source, target : modes before and after; empty where no mode changed.
+    direction : -1 falling, +1 rising, 0 where it has no meaning.
+    x_minus, x_plus : states (n,) just before and just after.
+    """
+
+    t: float
+    kind: str
+    component: str
+    guard: str
+    source: str
+    target: str
+    direction: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+    def __repr__(self) -> str:
+        change = f" {self.source} -> {self.target}" if self.source or self.target else ""
+        return f"<{self.kind} {self.component}{change} at t = {self.t:.9g}>"
+
+
+@dataclass(frozen=True)
+class ModeInterval:
+    """A stretch of time that a component spent in one mode."""
+
+    mode: str
+    t0: float
+    t1: float
+
+
+class Solution:
+    """The result of `simulate`; ``sol(t)`` is the dense output.
+
+    Attributes
+    ----------
+    t, y : times (m,) and states (n, m), as in SciPy; an event time stands twice, with x- and x+.
+    events, modes, stats, status, success, message, warnings : see the properties.
+    """
+
+    def __init__(
+        self, model: Model, system: System, trajectory: Trajectory, integrator: str, wall_time: float,
+        compile_time: float, grid: np.ndarray | None,
+    ) -> None:  # fmt: skip
+        self.model = model
+        self.integrator = integrator
+        self._system = system
+        self._trajectory = trajectory
+        self._grid = grid
+        self._cost = (wall_time, compile_time)
+
+    # -- trajectory -----------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, in the order of the rows of y."""
+        return self._system.names
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times (m,): the requested grid as far as the run went, else the steps with every event time twice."""
+        if self._grid is not None:
+            if not self._segments:
+                return self._grid[:0]
+            low, high = sorted((self.t_start, self.t_end))
+            return self._grid[(self._grid >= low) & (self._grid <= high)]
+        parts = [segment.origin.high + (segment.s + segment.origin.low) for segment in self._segments]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    @cached_property
+    def y(self) -> np.ndarray:
+        """States (n, m) at the times t."""
+        if self._grid is not None:
+            return self(self.t)
+        parts = [segment.x for segment in self._segments]
+        return np.concatenate(parts).T if parts else np.zeros((self._system.n, 0))
+
+    @property
+    def _segments(self) -> list[Segment]:
+        return self._trajectory.segments
+
+    @property
+    def t_start(self) -> float:
+        """First time of the run."""
+        return float(self._segments[0].start)
+
+    @property
+    def t_end(self) -> float:
+        """Last time that the run reached."""
+        return float(self._segments[-1].end)
+
+    def __call__(self, t: Any, side: str = "+") -> np.ndarray:
+        """States at time t: (n,) for a number, (n, k) for k times.
+
+        side "+" is right-continuous, as x+ at an event; "-" gives x-.
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        out = np.empty((len(times), self._system.n))
+        for segment, chosen, s in self._pieces(times, side):
+            out[chosen] = self._states(segment, s)
+        return out[0] if np.ndim(t) == 0 else out.T
+
+    def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
+        """A named quantity over time: a state, an output, an input, a definition, a variable of a mode such as a force.
+
+        Parameters
+        ----------
+        name : what to evaluate.
+        t : a number or an array of times; without it ``sol.t``, each event time on both its sides.
+        """
+        known = (*self._system.names, *(q for q in self._system.quantities if " in " not in q))
+        known = (*known, *(d.name for d in self.model.discrete))
+        if name not in known:
+            raise UsageError(f"model {self.model.name} has no quantity {name!r}",
+                             remedy=nearest(name, known, kind="quantities"))  # fmt: skip
+        if t is None and self._grid is None:
+            parts = [self._quantity(name, g, g.s, g.x) for g in self._segments]
+            return np.concatenate(parts) if parts else np.zeros(0)
+        given = self.t if t is None else t
+        times = np.atleast_1d(np.asarray(given, dtype=float))
+        out = np.empty(len(times))
+        for segment, chosen, s in self._pieces(times, side):
+            out[chosen] = self._quantity(name, segment, s, self._states(segment, s))
+        return out[0] if np.ndim(given) == 0 else out
+
+    def _quantity(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        system = self._system
+        if name in system.names:
+            return x[:, system.names.index(name)]
+        discrete = [d.name for d in self.model.discrete]
+        if name in discrete:
+            return np.full(len(s), segment.p[system.layout.discrete_at + discrete.index(name)])
+        values = system.rows("quantities", len(system.quantities), s, np.ascontiguousarray(x), segment.p, segment.z)
+        chosen = name
+        for c, automaton in enumerate(system.automata):
+            special = f"{name} in {automaton.name}.{automaton.modes[segment.z[c]]}"
+            chosen = special if special in system.quantities else chosen
+        return values[:, system.quantities.index(chosen)]
+
+    def _states(self, segment: Segment, s: np.ndarray) -> np.ndarray:
+        x = np.ascontiguousarray(segment.dense(s), dtype=float)
+        at_knot = np.searchsorted(segment.s, s) if segment.s[-1] >= segment.s[0] else None
+        if at_knot is not None:
+            same = segment.s[np.minimum(at_knot, len(segment.s) - 1)] == s
+            x[same] = segment.x[at_knot[same]]
+        if self._system.pins:
+            x = self._system.rows("project", self._system.n, s, x, segment.p, segment.z)
+        return x
+
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        return np.array([float(segment.start) for segment in self._segments])
+
+    def _pieces(self, times: np.ndarray, side: str) -> list[tuple[Segment, np.ndarray, np.ndarray]]:
+        """(segment, indices of the times in it, their local times)."""
+        if side not in ("+", "-"):
+            raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+        if not self._segments:
+            raise UsageError(f"the run holds no trajectory ({self.status}: {self.message})")
+        low, high = sorted((self.t_start, self.t_end))
+        if len(times) and not ((times >= low) & (times <= high)).all():
+            bad = times[~((times >= low) & (times <= high))][0]
+            raise UsageError(f"t = {bad!r} is outside of the run, which goes from {low!r} to {high!r}")
+        sign = 1.0 if self.t_end >= self.t_start else -1.0
+        # right-continuous in time: forward the later segment has an event time, backward the earlier one
+        later = (side == "+") == (sign > 0)
+        index = np.searchsorted(sign * self._starts, sign * times, side="right" if later else "left") - 1
+        index = np.clip(index, 0, len(self._segments) - 1)
+        result = []
+        for i in np.unique(index):
+            segment, chosen = self._segments[i], np.flatnonzero(index == i)
+            s = (times[chosen] - segment.origin.high) - segment.origin.low
+            low_s, high_s = sorted((segment.s[0], segment.s[-1]))
+            result.append((segment, chosen, np.clip(s, low_s, high_s)))
+        return result
+
+    # -- events and modes -----------------------------------------------------------------------------------
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All events in order of time: transitions, monitors, scheduled events, near-grazings."""
+        return tuple(
+            Event(float(o.instant), o.kind, o.component, o.guard, o.source, o.target, o.direction, o.x_minus, o.x_plus)
+            for o in self._trajectory.occurrences
+        )
+
+    def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
+        """Times of the events of one component, monitor or schedule."""
+        return np.array([e.t for e in self.events if e.component == component and kind in (None, e.kind)])
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
+        """For each component its modes in order, with the stretch of time of each."""
+        result = {}
+        for c, automaton in enumerate(self._system.automata):
+            runs: list[ModeInterval] = []
+            for segment in self._segments:
+                mode = automaton.modes[segment.z[c]]
+                if runs and runs[-1].mode == mode:
+                    runs[-1] = ModeInterval(mode, runs[-1].t0, float(segment.end))
+                else:
+                    runs.append(ModeInterval(mode, float(segment.start), float(segment.end)))
+            result[automaton.name] = tuple(runs)
+        return result
+
+    # -- how it went ----------------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> str:
+        """How the run ended: "finished" at t1, "terminated" by a monitor or schedule, else the reason it stopped."""
+        return self._trajectory.status
+
+    @property
+    def success(self) -> bool:
+        """Whether the run did what was asked."""
+        return self.status in _GOOD
+
+    @property
+    def message(self) -> str:
+        """One sentence about how the run ended."""
+        return self._trajectory.message or f"reached t = {self.t_end!r} with {self.integrator}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know: near-grazings, decisions inside rounding."""
+        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._trajectory.warnings.items())
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """Cost summed over all restarts: steps, rejected, evaluations, events, restarts, wall and compile seconds."""
+        counters = self._trajectory.counters
+        return {**vars(counters), "wall_time": self._cost[0], "compile_time": self._cost[1]}
+
+    # -- as SciPy's OdeResult --------------------------------------------------------------------------------
+
+    @property
+    def sol(self) -> Solution:
+        """The dense output, under SciPy's name."""
+        return self
+
+    @property
+    def nfev(self) -> int:
+        """Evaluations of the right-hand side, under SciPy's name."""
+        return self._trajectory.counters.rhs_evaluations
+
+    @property
+    def t_events(self) -> list[np.ndarray]:
+        """Times of each monitor in the order of declaration, under SciPy's name."""
+        return [self.event_times(m.name, "monitor") for m in self.model.monitors]
+
+    @property
+    def y_events(self) -> list[np.ndarray]:
+        """States (events, n) of each monitor, under SciPy's name."""
+        found = [[e.x_minus for e in self.events if e.component == m.name and e.kind == "monitor"]
+                 for m in self.model.monitors]  # fmt: skip
+        return [np.array(rows).reshape(-1, self._system.n) for rows in found]
+
+    # -- files ----------------------------------------------------------------------------------------------
+
+    def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
+        """Write time, states, outputs and modes as CSV; at `points` equal steps, else at ``sol.t``."""
+        outputs = [q for q in self._system.quantities if " in " not in q]
+        components = [a.name for a in self._system.automata]
+        header = ["t", *self.names, *outputs, *(f"mode({c})" for c in components)]
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            for segment, t, s, x in self._rows(points):
+                columns = [self._quantity(name, segment, s, x) for name in outputs]
+                modes = [a.modes[m] for a, m in zip(self._system.automata, segment.z, strict=True)]
+                for k in range(len(t)):
+                    values = [t[k], *x[k], *(column[k] for column in columns)]
+                    writer.writerow([*(repr(float(v)) for v in values), *modes])
+
+    def _rows(self, points: int | None) -> list[tuple[Segment, np.ndarray, np.ndarray, np.ndarray]]:
+        if points is None and self._grid is None:
+            return [(g, g.origin.high + (g.s + g.origin.low), g.s, g.x) for g in self._segments]
+        times = self.t if points is None else np.linspace(self.t_start, self.t_end, points)
+        return [(g, times[chosen], s, self._states(g, s)) for g, chosen, s in self._pieces(times, "+")]
+
+    def __repr__(self) -> str:
+        kinds = Counter(e.kind for e in self.events)
+        counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) or "none"
+        lines = [
+            f"Solution of {self.model.name} by {self.integrator}: {self.status}",
+            f"  {self.message}",
+        ]
+        if self._segments:
+            final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(self.names, self._segments[-1].x[-1], strict=True))
+            lines += [f"  t from {self.t_start:.9g} to {self.t_end:.9g}; at the end {final}"]
+        stats = self.stats
+        lines += [
+            f"  events: {counted}",
+            f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+            *(f"  warning: {w}" for w in self.warnings),
+        ]
+        return "\n".join(lines)
