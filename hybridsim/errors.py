@@ -1,4 +1,4 @@
-"""The one tree of errors: every message says what is wrong, where (file, line, caret) and what to do about it."""
+"""The one tree of errors: a message says what is wrong, where (file, line, caret) and what to do."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class HybridsimError(Exception):
 
 
 class ModelError(HybridsimError):
-    """A model that cannot be: ``errors`` holds every fault that was found, each with its own place and remedy."""
+    """A model that cannot be; ``errors`` holds every fault found, each with its own place and remedy."""
 
     exit_code = 3
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from collections.abc import Callable, Iterable
 
 from hybridsim.errors import ExpressionError, Place, nearest
 from hybridsim.expr.grammar import BINARY, COMPARISONS, CONSTANTS, FUNCTIONS, MAX_INTEGER, MAX_POWER
@@ -52,6 +53,13 @@ class _Checker:
             raise self.fail(node, "a condition is needed here, this is a number", "compare it, e.g. 'x > 0'.")
         return constant
 
+    def every(self, check: Callable[[ast.expr], bool], nodes: Iterable[ast.expr]) -> bool:
+        """Check all nodes, not only up to the first that varies; returns whether all are constant."""
+        constant = True
+        for node in nodes:
+            constant = check(node) and constant
+        return constant
+
     def any(self, node: ast.expr) -> tuple[bool, bool]:
         """Check a node; returns (is constant, is boolean). A constant must have a finite real value."""
         constant, boolean = self.kind(node)
@@ -82,11 +90,11 @@ class _Checker:
                     self.power(node, left, right, base)
                 return base and other, False
             case ast.BoolOp(values=values):
-                return all([self.truth(value) for value in values]), True
+                return self.every(self.truth, values), True
             case ast.Compare(left=left, ops=ops, comparators=others) if all(
                 type(op) in COMPARISONS for op in ops
             ):
-                return all([self.number(part) for part in (left, *others)]), True
+                return self.every(self.number, (left, *others)), True
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return self.conditional(test, body, orelse)
             case ast.Call():
@@ -176,7 +184,7 @@ class _Checker:
         count = len(node.args)
         if count < function.least or (function.most is not None and count > function.most):
             raise self.fail(node, f"{name} takes {function.arity}, {count} given", "correct the call.")
-        return all([self.number(argument) for argument in node.args])
+        return self.every(self.number, node.args)
 
 
 def check_tree(
@@ -196,7 +204,7 @@ def check_tree(
             raise ExpressionError(
                 f"the expression is {what} ({max_depth} levels and {max_nodes} parts are allowed)",
                 place=place.at(text),
-                remedy="name parts of it in [definitions], or add with parentheses: (a + b + ...) + (c + d + ...).",
+                remedy="name parts of it in [definitions], or group a long sum: (a + b + ...) + (c + ...).",
             )
         level = [
             child

@@ -15,8 +15,8 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
 
     Errors
     ------
-    ExpressionError naming the expression and the values it was given: an unknown name, division by zero, a function
-    outside its domain, overflow.
+    ExpressionError naming the expression and the values it was given: an unknown name, division by zero, a
+    function outside its domain, overflow.
     """
     require_names(expr, values)
     try:
@@ -51,7 +51,7 @@ def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
 
 
 def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[str]:
-    """The names so ordered that each depends on earlier ones only; names that are not keys are taken as known.
+    """The names in an order where each depends on earlier ones only; names that are no keys are known.
 
     Errors
     ------

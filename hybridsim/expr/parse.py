@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral, Real
+from typing import SupportsFloat
 
 from hybridsim.errors import ExpressionError, Place, nearest
 from hybridsim.expr.check import check_tree
@@ -17,6 +19,7 @@ from hybridsim.expr.grammar import (
     MAX_DEPTH,
     MAX_DERIVED_DEPTH,
     MAX_DERIVED_NODES,
+    MAX_INTEGER,
     MAX_LENGTH,
 )
 from hybridsim.expr.write import write
@@ -94,28 +97,13 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
 
     Errors
     ------
-    ExpressionError with a caret: a character, construct, function or number that is not allowed, wrong arity, too
-    long, too deep, a power out of bounds, or a constant part without a finite real value.
+    ExpressionError with a caret: a character, construct, function or number that is not allowed, wrong arity,
+    too long, too deep, a power out of bounds, or a constant part without a finite real value.
     """
     if isinstance(text, Expression):
         return text
     where = place or Place()
-    if isinstance(text, bool):
-        text = str(text)
-    elif isinstance(text, Integral):
-        text = str(int(text)) if abs(int(text)) <= 10**15 else repr(_double(int(text), where))
-    elif isinstance(text, Real):
-        text = repr(float(text))
-        if text in ("nan", "inf", "-inf"):
-            raise ExpressionError(
-                f"{text} is not a finite number", place=where, remedy="give a finite number."
-            )
-    if not isinstance(text, str):
-        raise ExpressionError(
-            f"{_short(repr(text))} is no expression",
-            place=where,
-            remedy='write a number, or an expression in quotes such as "sqrt(k/m)".',
-        )
+    text = _as_text(text, where)
     text = re.sub(r"[ \t\r\n]", " ", text).strip()
     _check_text(text, where)
     try:
@@ -159,8 +147,8 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
 def substitute(expr: Expression, values: Mapping[str, Expression | str | float]) -> Expression:
     """Put expressions in the place of names, all at once, in the tree (no parentheses can be lost).
 
-    The result is checked like a text (its bounds are wider, since it was derived and not typed) and keeps the place
-    of ``expr``.
+    The result is checked like a text (its bounds are wider, since it was derived and not typed) and keeps the
+    place of ``expr``.
     """
     parts = {name: parse(value).tree for name, value in values.items() if name in expr.names}
     if not parts:
@@ -178,7 +166,7 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
 
 
 def _replaced(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
-    """A copy of the tree with names exchanged; untouched leaves are shared, since nothing ever changes a tree."""
+    """A copy of the tree with names exchanged; leaves are shared, since nothing ever changes a tree."""
     match node:
         case ast.Name(id=name):
             return parts.get(name, node)
@@ -224,12 +212,33 @@ def _check_text(text: str, where: Place) -> None:
             )
 
 
-def _double(value: int, where: Place) -> float:
+def _as_text(given: object, where: Place) -> str:
+    """Numbers as Python writes them; whatever is neither number nor text is refused."""
+    if isinstance(given, str):
+        return given
+    if isinstance(given, bool):
+        return str(given)
+    if isinstance(given, Integral):
+        value = int(given)
+        return str(value) if abs(value) <= MAX_INTEGER else repr(_double(value, where))
+    if isinstance(given, Real):
+        number = _double(given, where)
+        if not math.isfinite(number):
+            raise ExpressionError(f"{number} is not finite", place=where, remedy="give a finite number.")
+        return repr(number)
+    raise ExpressionError(
+        f"{_short(repr(given))} is no expression",
+        place=where,
+        remedy='write a number, or an expression in quotes such as "sqrt(k/m)".',
+    )
+
+
+def _double(value: SupportsFloat, where: Place) -> float:
     try:
         return float(value)
     except OverflowError:
         raise ExpressionError(
-            "the whole number is too large for a double", place=where, remedy="give a number below 1.8e308."
+            "the number is too large for a double", place=where, remedy="give a number below 1.8e308."
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""A checked expression as a SymPy object: the only file of the floor that imports SymPy, and only when called."""
+"""A checked expression as a SymPy object; the only file of this floor that imports SymPy."""
 
 from __future__ import annotations
 
@@ -42,12 +42,13 @@ _RELATIONS: dict[type[ast.cmpop], Any] = {
 def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
     """SymPy form of an expression (an Expr, or a Boolean for a condition).
 
-    Whole numbers are exact, decimal numbers are the double itself with all its 53 bits; a conditional becomes a
-    Piecewise, abs/min/max/sign stay what they are.
+    Whole numbers are exact, decimal numbers are the double itself with all its 53 bits; a conditional becomes
+    a Piecewise, abs/min/max/sign stay what they are.
 
     Parameters
     ----------
-    symbols : a SymPy object for every name of the expression, real symbols as a rule (``t`` among them if used).
+    symbols : a SymPy object for every name of the expression, real symbols as a rule (``t`` among them if
+        used).
 
     Errors
     ------

@@ -36,7 +36,7 @@ class NoValue(Exception):
 
 
 def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
-    """Value of a checked node; `NoValue` where it is not a finite real number, KeyError for a missing name."""
+    """Value of a checked node; `NoValue` where it is no finite real number, KeyError without a name."""
     match node:
         case ast.Constant(value=bool() as truth):
             return truth

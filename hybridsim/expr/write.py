@@ -45,8 +45,8 @@ def _text(node: ast.expr) -> tuple[str, int]:
             return " or ".join(write(value, _AND) for value in values), _OR
         case ast.Compare(left=left, ops=ops, comparators=others):
             parts = [write(left, _SUM)]
-            for op, other in zip(ops, others, strict=True):
-                parts += [COMPARISONS[type(op)], write(other, _SUM)]
+            for relation, other in zip(ops, others, strict=True):
+                parts += [COMPARISONS[type(relation)], write(other, _SUM)]
             return " ".join(parts), _COMPARE
         case ast.IfExp(test=test, body=body, orelse=orelse):
             text = f"{write(body, _OR)} if {write(test, _OR)} else {write(orelse, _CONDITIONAL)}"

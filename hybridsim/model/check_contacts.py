@@ -70,5 +70,5 @@ def _contact(scope: Scope, contact: Contact) -> None:
         message = f"{what}: the velocity depends on '{forces[0]}', which depends on a mode"
         scope.fail(contact, message, "write it over states, inputs, parameters and t.")
     elif not any(scope.kinds.get(name) == "state" for name in reached):
-        message = f"{what}: the velocity '{contact.velocity.text}' contains no state, so no force can hold it at zero"
+        message = f"{what}: the velocity '{contact.velocity.text}' contains no state to hold"
         scope.fail(contact, message, "write the relative velocity, e.g. 'v - v_belt'.")

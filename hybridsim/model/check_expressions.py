@@ -1,4 +1,4 @@
-"""Checks of every expression: known names, numbers or conditions where they belong, no circles, bounded size."""
+"""Checks of every expression: known names, numbers and conditions in place, no circles, bounded size."""
 
 from __future__ import annotations
 
@@ -33,8 +33,10 @@ def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:
     model = scope.model
     for parameter in model.parameters:
         yield f"parameter {parameter.name}", parameter.value
-    for state in (*model.states, *model.discrete):
+    for state in model.states:
         yield f"state {state.name}, start", state.start
+    for discrete in model.discrete:
+        yield f"discrete state {discrete.name}, start", discrete.start
     for schedule in model.schedules:
         for index, time in enumerate(schedule.times):
             yield f"schedule {schedule.name}, times[{index}]", time
@@ -57,9 +59,11 @@ def _of_everything(scope: Scope) -> Iterator[Item]:
         yield from _of_component(component)
     for monitor in model.monitors:
         yield f"monitor {monitor.name}", monitor.expr, False
-    for event in (*model.monitors, *model.schedules):
-        for name, expr in event.reset.items():
-            yield f"event {event.name}, reset of {name}", expr, False
+        for name, expr in monitor.reset.items():
+            yield f"monitor {monitor.name}, reset of {name}", expr, False
+    for schedule in model.schedules:
+        for name, expr in schedule.reset.items():
+            yield f"schedule {schedule.name}, reset of {name}", expr, False
     for output in model.outputs:
         yield f"output {output.name}", output.expr, False
         for key, expr in output.modes.items():
@@ -105,8 +109,9 @@ def _circles(scope: Scope) -> None:
     for name in order:
         sizes[name] = max(_size(expr, sizes) for expr in edges[name])
         if sizes[name] > MAX_DERIVED_NODES:
-            message = f"'{name}' has {sizes[name]} parts once its definitions are put in, {MAX_DERIVED_NODES} are allowed"
-            scope.errors.append(edges[name][0].error(message, remedy="let definitions grow less."))
+            message = f"'{name}' has {sizes[name]} parts with its definitions put in"
+            remedy = f"{MAX_DERIVED_NODES} are allowed; let definitions use one another less."
+            scope.errors.append(edges[name][0].error(message, remedy=remedy))
             return
 
 

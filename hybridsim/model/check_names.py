@@ -35,7 +35,7 @@ def check_names(scope: Scope) -> None:
     for output in model.outputs:
         check_identifier(scope, output, "output", output.name)
         if output.name in scope.all_names and output.expr.text != output.name:
-            message = f"the output '{output.name}' is {output.expr.text}, but the model has a {seen[output.name]} of that name"
+            message = f"the output '{output.name}' has the name of something else, but is {output.expr.text}"
             scope.fail(output, message, "rename the output.")
 
 

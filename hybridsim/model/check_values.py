@@ -10,8 +10,8 @@ from hybridsim.model.declared import Declared
 from hybridsim.model.inputs import Input
 from hybridsim.model.scope import Scope
 
-# A limit below the force at the onset of slip by less than this share is rounding in a law such as Stribeck's, whose
-# two coefficients were set equal: a few operations, each off by 1e-16.
+# A limit below the force at the onset of slip by less than this share is rounding in a law such as
+# Stribeck's, whose two coefficients were set equal: a few operations, each off by 1e-16.
 ROUNDING = 1e-12
 
 
@@ -23,9 +23,10 @@ def check_values(scope: Scope) -> None:
     except ModelError as fault:
         scope.errors.append(fault)
         return
-    for state in (*model.states, *model.discrete):
-        _value(scope, state.start, values)
+    for discrete in model.discrete:
+        _value(scope, discrete.start, values)
     for state in model.states:
+        _value(scope, state.start, values)
         if state.nominal is not None and not 0 < state.nominal < float("inf"):
             scope.fail(state, f"state {state.name}: nominal is {state.nominal!r}", "give a size above zero.")
     for schedule in model.schedules:

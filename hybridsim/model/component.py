@@ -1,4 +1,4 @@
-"""A small automaton: modes with their flows, guards that last while they are >= 0, and choices of what comes next."""
+"""A small automaton: modes with flows, guards that stay >= 0 while they last, choices of what comes next."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from hybridsim.expr import Expression
-from hybridsim.model.declared import Declared
+from hybridsim.model.declared import Declared, as_tuple
 from hybridsim.model.frozen_map import FrozenMap
 
 
 @dataclass(frozen=True)
 class Choice(Declared):
-    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both are evaluated at x-."""
+    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both taken at x-."""
 
     to: str
     when: Expression | None = None
@@ -30,8 +30,10 @@ class Guard(Declared):
     Parameters
     ----------
     expr : the scalar, smooth in its mode.
-    then : choices in order, the first whose condition holds is taken; empty where a surface decides.
-    fatal : a message instead of choices: the run ends with status ``inconsistent`` where the guard would go negative.
+    then : choices in order, the first whose condition holds is taken; a text is the mode to go to. Empty
+        where a surface decides.
+    fatal : a message instead of choices: the run ends with status ``inconsistent`` where the guard would go
+        negative.
     """
 
     name: str
@@ -41,9 +43,12 @@ class Guard(Declared):
 
     def __post_init__(self) -> None:
         self._expressions("expr")
-        if isinstance(self.then, str):
-            object.__setattr__(self, "then", Choice(self.then, place=self.place))
-        self._tuples("then")
+        choices = tuple(
+            Choice(choice, place=self.place) if isinstance(choice, str) else choice
+            for choice in as_tuple(self.then)
+        )
+        object.__setattr__(self, "then", choices)
+        object.__setattr__(self, "fatal", self.fatal or None)
 
 
 @dataclass(frozen=True)
@@ -69,8 +74,8 @@ class Surface(Declared):
     function : s.
     unknown : the variable that holds it, solved for from ds/dt = 0, in which it must be linear.
     above, below, hold : mode for s > 0, for s < 0, and on s = 0.
-    jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s = 0+ (in
-        ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
+    jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s =
+        0+ (in ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
     """
 
     function: Expression

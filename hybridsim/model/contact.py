@@ -18,14 +18,16 @@ from hybridsim.model.law import NORMAL, SPEED, FrictionLaw
 class Contact(Declared):
     """Dry friction between two bodies; its name is the friction force, which opposes the relative velocity.
 
-    A positive force opposes a positive relative velocity: a body that slides with v has ``- f`` in its equation.
+    A positive force opposes a positive relative velocity: a body that slides with v has ``- f`` in its
+    equation.
 
     Parameters
     ----------
     velocity : relative velocity, an expression of states, inputs, parameters and t.
     normal : normal load, >= 0. Where it can vary, a guard ends the run should it become negative.
     law : a `FrictionLaw`, or the name of one that comes with the package.
-    arguments : law parameter to number or expression over the model's names; what is not given has the law's default.
+    arguments : law parameter to number or expression over the model's names; what is not given has the law's
+        default.
 
     Examples
     --------
@@ -42,10 +44,11 @@ class Contact(Declared):
     def __post_init__(self) -> None:
         self._expressions("velocity", "normal")
         self._maps("arguments")
-        if isinstance(self.law, str):
+        law: object = self.law
+        if isinstance(law, str):
             from hybridsim.model.library import load_law
 
-            object.__setattr__(self, "law", load_law(self.law))
+            object.__setattr__(self, "law", load_law(law))
 
     def component(self, constants: Collection[str] = ()) -> Component:
         """The automaton: three modes on the surface velocity = 0.
@@ -56,8 +59,8 @@ class Contact(Declared):
 
         Parameters
         ----------
-        constants : names known to be constant (the model's parameters); a normal load that uses any other name gets a
-            guard in every mode.
+        constants : names known to be constant (the model's parameters); a normal load that uses any other
+            name gets a guard in every mode.
 
         Errors
         ------
@@ -109,7 +112,7 @@ class Contact(Declared):
         for name, value in self.arguments.items():
             if name not in law.parameters:
                 raise ModelError(
-                    f"contact {self.name}: the law '{law.name}' has no parameter '{name}' (given {value.text})",
+                    f"contact {self.name}: the law '{law.name}' has no parameter '{name}'",
                     place=value.place or self.place,
                     remedy=nearest(name, law.parameters, kind="parameters of the law"),
                 )

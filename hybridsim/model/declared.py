@@ -15,8 +15,8 @@ from hybridsim.model.frozen_map import FrozenMap
 class Declared:
     """Base of every part of a model; ``place`` says where it was declared and takes no part in comparisons.
 
-    Constructors take a number or a text wherever an `Expression` is wanted, a dict wherever a mapping is, and a
-    list wherever a tuple is.
+    Constructors take a number or a text wherever an `Expression` is wanted, a dict wherever a mapping is, and
+    a list wherever a tuple is.
     """
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)

@@ -24,8 +24,8 @@ class FrictionLaw(Declared):
     ----------
     slip : expression of ``v``, ``N`` (normal load) and the law's own parameters.
     stick : expression of ``N`` and the law's own parameters.
-    parameters : name to default (a number or an expression of the others); a default of None, or a plain sequence of
-        names, makes them arguments that every contact has to give.
+    parameters : name to default (a number or an expression of the others); a default of None, or a plain
+        sequence of names, makes them arguments that every contact has to give.
 
     Examples
     --------
@@ -42,6 +42,7 @@ class FrictionLaw(Declared):
 
     def __post_init__(self) -> None:
         self._expressions("slip", "stick")
-        if not isinstance(self.parameters, Mapping):
-            object.__setattr__(self, "parameters", {name: None for name in as_tuple(self.parameters)})
+        given: object = self.parameters
+        if not isinstance(given, Mapping):
+            object.__setattr__(self, "parameters", dict.fromkeys(as_tuple(given)))
         self._maps("parameters")

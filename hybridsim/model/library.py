@@ -31,8 +31,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
 
     Errors
     ------
-    ModelError: no such model (the nearest names are listed) or file; the file is empty, too large, no text, no TOML;
-    or all its faults in one.
+    ModelError: no such model (the nearest names are listed) or file; the file is empty, too large, no text,
+    no TOML; or all its faults in one.
     """
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or os.sep in text:

@@ -30,7 +30,8 @@ class Model(Declared):
     components, contacts : the automata; their modes together are the discrete state z.
     inputs, monitors, schedules : known signals, events that change no mode, events at known times.
     outputs : `Output` objects, or a dict of name to expression.
-    definitions : named intermediate expressions, a dict or pairs; they may use one another and what components set.
+    definitions : named intermediate expressions, a dict or pairs; they may use one another and what
+        components set.
     title, source, description, look : what it is, where it comes from, more, and what to look at.
     path : the file it was read from.
 
@@ -82,7 +83,7 @@ class Model(Declared):
         return hash(_content(self))
 
     def __repr__(self) -> str:
-        automata = [part.name for part in (*self.contacts, *self.components)]
+        automata = [*(contact.name for contact in self.contacts), *(part.name for part in self.components)]
         names = ", ".join(state.name for state in self.states)
         return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
 
@@ -93,7 +94,7 @@ class Model(Declared):
         ------
         UsageError for a name that is no parameter; ExpressionError for a value that is no expression.
         """
-        _known(changes, (parameter.name for parameter in self.parameters), "parameter", self.name)
+        _known(changes, [parameter.name for parameter in self.parameters], "parameter", self.name)
         changed = (
             replace(p, value=parse(changes[p.name])) if p.name in changes else p for p in self.parameters
         )
@@ -101,7 +102,7 @@ class Model(Declared):
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
-        names = [part.name for part in (*self.states, *self.discrete)]
+        names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
         _known(changes, names, "state", self.name)
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
@@ -149,8 +150,8 @@ class Model(Declared):
     def structure(self) -> str:
         """Canonical text of all that generated code depends on.
 
-        Parameter values, initial values, units, titles and the numbers of tables are not in it, so models that differ
-        only in these share their code.
+        Parameter values, initial values, units, titles and the numbers of tables are not in it, so models
+        that differ only in these share their code.
         """
         from hybridsim.model.structure import structure
 
@@ -178,7 +179,7 @@ class Model(Declared):
 
     @classmethod
     def from_toml(cls, text: str, path: str | None = None) -> Model:
-        """Read and validate a model from TOML text; ``path`` names the file in messages and finds its tables."""
+        """Read and validate a model from TOML text; ``path`` names the file and finds its tables."""
         from hybridsim.model.toml_read import read_model
 
         return read_model(text, path)

@@ -11,7 +11,8 @@ _BLANK = " \t"
 def positions(text: str) -> Mapping[Path, int]:
     """Line (from 1) of every key and array element of a valid TOML text.
 
-    The text must have passed `tomllib`: nothing is checked again here, and an escape in a quoted key is not resolved.
+    The text must have passed `tomllib`: nothing is checked again here, and an escape in a quoted key is not
+    resolved.
     """
     return _Scanner(text).scan()
 
@@ -114,7 +115,7 @@ class _Scanner:
                 self.at += 1
 
     def string(self, quote: str) -> None:
-        """Go past a string that begins here; a quote that is escaped, or one of several at the end, is inside."""
+        """Go past a string; a quote that is escaped, or one of several at its end, is inside."""
         end = self.at + len(quote)
         while not self.text.startswith(quote, end):
             end += 2 if self.text[end] == "\\" and quote[0] == '"' else 1

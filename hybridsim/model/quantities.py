@@ -32,7 +32,8 @@ class State(Declared):
     start : initial value, an expression of parameters.
     der : its rate over everything the model names; a mode may override it in its own ``der``.
     unit : for people; never computed with.
-    nominal : typical size in that unit, from which the absolute tolerance follows; None takes it from the run.
+    nominal : typical size in that unit, from which the absolute tolerance follows; None takes it from the
+        run.
     """
 
     name: str
@@ -61,8 +62,8 @@ class Discrete(Declared):
 class Output(Declared):
     """A named expression to look at; it changes nothing.
 
-    ``modes`` maps ``"component.mode"`` to the expression that replaces ``expr`` in that mode; where several apply the
-    last one counts.
+    ``modes`` maps ``"component.mode"`` to the expression that replaces ``expr`` in that mode; where several
+    apply the last one counts.
     """
 
     name: str

@@ -19,8 +19,8 @@ class Schedule(Declared):
     Parameters
     ----------
     times : single times; or instead
-    start, period, count : first tick (0 if only a period is given), time between ticks, number of ticks (None: no
-        end). All times are expressions of parameters.
+    start, period, count : first tick (0 if only a period is given), time between ticks, number of ticks
+        (None: no end). All times are expressions of parameters.
     reset : state or discrete state to expression, evaluated at x-.
     terminate : whether the run ends there.
     """

@@ -49,14 +49,10 @@ class Scope:
     def declarations(self) -> Iterator[tuple[str, str, Declared]]:
         """(kind, name, part) of everything that expressions can name."""
         model = self.model
-        for kind, parts in (
-            ("parameter", model.parameters),
-            ("state", model.states),
-            ("discrete state", model.discrete),
-            ("input", model.inputs),
-        ):
-            for part in parts:
-                yield kind, part.name, part
+        yield from (("parameter", part.name, part) for part in model.parameters)
+        yield from (("state", part.name, part) for part in model.states)
+        yield from (("discrete state", part.name, part) for part in model.discrete)
+        yield from (("input", part.name, part) for part in model.inputs)
         for name, expr in model.definitions:
             yield "definition", name, Declared(place=expr.place)
         for contact in model.contacts:
@@ -67,7 +63,7 @@ class Scope:
 
     @cached_property
     def changed_by_reset(self) -> tuple[str, ...]:
-        return tuple(part.name for part in (*self.model.states, *self.model.discrete))
+        return (*(part.name for part in self.model.states), *(part.name for part in self.model.discrete))
 
     @cached_property
     def all_names(self) -> frozenset[str]:
@@ -102,7 +98,7 @@ class Scope:
         if foreign or expr.is_boolean:
             reason = f"the law has no '{foreign[0]}'" if foreign else f"'{expr.text}' is true or false"
             remedy = (
-                f"it knows {', '.join(sorted(known))}; declare a parameter of the law, and give its value in the contact."
+                f"it knows {', '.join(sorted(known))}; give the law a parameter and the contact its value."
                 if foreign
                 else "a number is needed."
             )

@@ -48,8 +48,8 @@ def _component(component: Component) -> Iterator[str]:
     surface = component.surface
     if surface:
         yield (
-            f"  surface {surface.function}; {surface.unknown}; {surface.above}; {surface.below}; {surface.hold}; "
-            f"{surface.jump_above}; {surface.jump_below}"
+            f"  surface {surface.function}; {surface.unknown}; {surface.above}; {surface.below}; "
+            f"{surface.hold}; {surface.jump_above}; {surface.jump_below}"
         )
     for mode in component.modes:
         yield f"  mode {mode.name}: set" + _map(mode.set) + " der" + _map(mode.der)

@@ -15,8 +15,8 @@ MAX_BYTES = 64_000_000
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
     """Columns of a CSV file as numbers.
 
-    Comma, semicolon or tab separates; a first line that is not all numbers holds the names; lines that are empty or
-    begin with # are skipped.
+    Comma, semicolon or tab separates; a first line that is not all numbers holds the names; lines that are
+    empty or begin with # are skipped.
 
     Parameters
     ----------

@@ -72,13 +72,11 @@ def _surface(parent: Table) -> Surface | None:
     if table is None:
         return None
     names = ("unknown", "above", "below", "hold")
-    table.only("function", *names, "jump_above", "jump_below")
+    jumps = ("jump_above", "jump_below")
+    table.only("function", *names, *jumps)
     for key in names:
         table.require(key, f'write {key} = "...".')
-    return Surface(
-        table.needed("function", 'write function = "s(t, x)".'),
-        *(table.text(key) for key in names),
-        table.needed("jump_above", "write jump_above = 0 where nothing jumps at a release."),
-        table.needed("jump_below", "write jump_below = 0 where nothing jumps at a release."),
-        place=table.place,
-    )
+    unknown, above, below, hold = (table.text(key) for key in names)
+    jump_above, jump_below = (table.needed(key, f"{key} = 0 says that nothing jumps there.") for key in jumps)
+    function = table.needed("function", 'write function = "s(t, x)".')
+    return Surface(function, unknown, above, below, hold, jump_above, jump_below, place=table.place)

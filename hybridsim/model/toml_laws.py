@@ -26,8 +26,8 @@ def read_law_of_contact(
 ) -> tuple[FrictionLaw, dict[str, Expression]] | None:
     """Law and arguments of a contact; None, with the fault noted, where there is none of that name.
 
-    ``law = { name = "coulomb", mu = "mu" }`` names one of the file or of the package; with ``slip`` and ``stick`` the
-    law is brought along, and every other key is a parameter of it with its value.
+    ``law = { name = "coulomb", mu = "mu" }`` names one of the file or of the package; with ``slip`` and
+    ``stick`` the law is brought along, and every other key is a parameter of it with its value.
     """
     if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }.'):
         return None
@@ -63,8 +63,9 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
     stick = table.needed("stick", 'write stick = "limit over N and parameters".')
     given: Any = table.data.get("parameters", {})
     parameters: dict[str, Expression | None] = {}
-    if isinstance(given, list) and all(isinstance(item, str) for item in given):
-        parameters = dict.fromkeys(given)
+    if isinstance(given, list):
+        for index, item in enumerate(given):
+            parameters.update(_listed(table, item, index))
     else:
         parameters.update(table.expressions("parameters"))
     for argument in arguments:
@@ -72,3 +73,13 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
     return FrictionLaw(
         name, slip, stick, parameters, table.text("title"), table.text("source"), place=table.place
     )
+
+
+def _listed(table: Table, item: Any, index: int) -> dict[str, Expression | None]:
+    """One entry of a list of parameters: a name without default, or a table of names with theirs."""
+    if isinstance(item, str):
+        return {item: None}
+    if isinstance(item, dict):
+        return {name: table.parsed(value, "parameters", index, name) for name, value in item.items()}
+    table.fail(f"'parameters' holds {item!r}", "write a name, or { name = default }.", "parameters", index)
+    return {}

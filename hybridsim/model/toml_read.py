@@ -24,8 +24,9 @@ from hybridsim.model.toml_table import Source, Table
 
 SCHEMA = 1
 KEYS = (
-    "schema", "name", "title", "source", "description", "look", "parameters", "states", "discrete", "definitions",
-    "inputs", "laws", "contacts", "initial", "modes", "components", "monitors", "schedules", "clocks", "outputs",
+    "schema", "name", "title", "source", "description", "look", "parameters", "states", "discrete",
+    "definitions", "inputs", "laws", "contacts", "initial", "modes", "components", "monitors", "schedules",
+    "clocks", "outputs",
 )  # fmt: skip
 
 
@@ -34,7 +35,8 @@ def read_model(text: str, path: str | None = None) -> Model:
 
     Errors
     ------
-    ModelError: not TOML (with line and column), or all faults of form in one, or all faults of content in one.
+    ModelError: not TOML (with line and column), or all faults of form in one, or all faults of content in
+    one.
     """
     root = open_text(text, path, "the model")
     model = _model(root, Path(path).parent if path else Path())

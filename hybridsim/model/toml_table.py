@@ -34,7 +34,7 @@ class Source:
 
 
 class Table:
-    """A table at a path; every getter reports a wrong type and returns a stand-in, so that reading goes on."""
+    """A table at a path; a getter reports a wrong type and returns a stand-in, so that reading goes on."""
 
     def __init__(self, source: Source, path: Path, data: Mapping[str, Any], kind: str) -> None:
         self.source = source

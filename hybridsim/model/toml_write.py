@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.expr import Expression
+from hybridsim.expr.grammar import MAX_INTEGER
 from hybridsim.model.component import Component, Guard
 from hybridsim.model.contact import Contact
 from hybridsim.model.inputs import Input
@@ -86,9 +87,10 @@ def _input(signal: Input) -> dict[str, Any]:
 
 
 def _law(law: FrictionLaw) -> dict[str, Any]:
-    # A table can give no default only by a list of names, so a mixture is told apart by the arguments of the contact.
-    needed = [name for name, value in law.parameters.items() if value is None]
-    parameters: Any = needed if len(needed) == len(law.parameters) else law.parameters
+    # Only the form of a list can say that a parameter has no default.
+    parameters: Any = law.parameters
+    if None in law.parameters.values():
+        parameters = [name if value is None else {name: value} for name, value in law.parameters.items()]
     return {
         "title": law.title,
         "source": law.source,
@@ -172,5 +174,5 @@ def _number(text: str) -> str | None:
             value = kind(text)
         except ValueError:
             continue
-        return text if repr(value) == text and abs(value) < 10**15 else None
+        return text if repr(value) == text and (kind is float or abs(value) <= MAX_INTEGER) else None
     return None

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 def find_errors(model: Model) -> tuple[ModelError, ...]:
     """All faults of a model, in the order of the checks.
 
-    Names come first, then how the parts fit together, then the expressions; values are only looked at where all of
-    that is sound, since they would repeat the same faults in other words.
+    Names come first, then how the parts fit together, then the expressions; values are only looked at where
+    all of that is sound, since they would repeat the same faults in other words.
     """
     scope = Scope(model)
     check_names(scope)
