@@ -177,10 +177,6 @@ def _record(solution: Solution) -> dict[str, Any]:
 
 
 def _draw(solution: Solution, path: Path) -> None:
-    from matplotlib.figure import Figure
+    from hybridsim.plot import save, time_history
 
-    from hybridsim.plot import time_history
-
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    time_history(solution, figure)
-    figure.savefig(path, dpi=150)
+    save(time_history(solution), path)

@@ -159,7 +159,7 @@ def test_other_commands_refuse_alike(command: str, hybridsim: Callable, tmp_path
 
 def test_all_faults_are_reported_together(hybridsim: Callable, tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
-    text = swapped(swapped(GOOD, "(-k*x - f)/m", "(-k*x - f)/mm"), "start = 0", "start = 'nn'")
+    text = swapped(swapped(GOOD, "(-k*x - f)/m", "(-k*x - f)/mm"), "start = 1", "start = 'nn'")
     path.write_text(text, encoding="utf-8")
     code, _, err = hybridsim("check", path)
     assert code == 3

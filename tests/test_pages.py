@@ -1,0 +1,54 @@
+"""What README and docs show is true: Python runs, model files are models, links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hybridsim as hs
+
+ROOT = Path(__file__).parent.parent
+README = ROOT / "README.md"
+PAGES = [README, ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The blocks of code in a language."""
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_ten_lines_run(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", *blocks(README, "python")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "mode changes" in done.stdout
+
+
+def test_the_model_shown_is_the_model_shipped() -> None:
+    (shown,) = blocks(README, "toml")
+    model, shipped = hs.Model.from_toml(shown), hs.load("dfcs")
+    assert model.states == shipped.states
+    assert model.contacts == shipped.contacts
+    assert model.parameter_values() == shipped.parameter_values()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_models_shown_are_models(page: Path) -> None:
+    for text in blocks(page, "toml"):
+        if "schema" in text:
+            hs.Model.from_toml(text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if "://" not in target and not (page.parent / target).exists()] == []
