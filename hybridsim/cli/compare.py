@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.output import Written, require_folder
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Comparison
 
 
 def add_to(commands: Any) -> None:
@@ -63,12 +66,17 @@ def execute(args: argparse.Namespace, written: Written) -> int:
         print(comparison.to_json())
     else:
         print(comparison.table())
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, write in (
-        ("table.csv", comparison.to_csv),
-        ("comparison.json", comparison.to_json),
-        ("chart.png", comparison.plot),
-    ):
-        write(folder / name)
-        written.add(folder / name)
+    _write(comparison, folder, written)
     return 0
+
+
+def _write(comparison: Comparison, folder: Path, written: Written) -> None:
+    from hybridsim.plot import save, work_precision
+
+    folder.mkdir(parents=True, exist_ok=True)
+    comparison.to_csv(folder / "table.csv")
+    written.add(folder / "table.csv")
+    comparison.to_json(folder / "comparison.json")
+    written.add(folder / "comparison.json")
+    save(work_precision(comparison), folder / "chart.png")
+    written.add(folder / "chart.png")

@@ -6,7 +6,7 @@ import argparse
 import textwrap
 from typing import Any
 
-from hybridsim.cli.output import Written, print_json
+from hybridsim.cli.output import Written, print_json, print_table
 
 
 def add_to(commands: Any) -> None:
@@ -23,6 +23,7 @@ def add_to(commands: Any) -> None:
 def execute(args: argparse.Namespace, written: Written) -> int:
     """List every integrator: its own and those that other packages registered."""
     import hybridsim
+    from hybridsim.integrators.base import CAPABILITIES
 
     found = hybridsim.list_integrators()
     if args.json:
@@ -40,9 +41,12 @@ def execute(args: argparse.Namespace, written: Written) -> int:
             ]
         )
         return 0
-    for i, each in enumerate(found):
-        if i:
-            print()
+    print_table(
+        ("INTEGRATOR", *CAPABILITIES),
+        [(each.name, *("-" if c in each.lacks else "yes" for c in CAPABILITIES)) for each in found],
+    )
+    for each in found:
+        print()
         print(f"{each.name}: {each.title} (order {each.order})")
         _paragraph(f"choose it: {each.when}")
         for capability, reason in each.lacks.items():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.output import Written, complain, print_json, require_writable
+from hybridsim.cli.progress import Progress
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -74,13 +75,19 @@ def execute(args: argparse.Namespace, written: Written) -> int:
 
     import hybridsim
 
-    solution = hybridsim.simulate(model, (0.0, t_end), integrator=args.integrator, **settings)
+    with Progress() as progress:
+        solution = hybridsim.simulate(
+            model, (0.0, t_end), integrator=args.integrator, progress=progress, **settings
+        )
     if args.json:
         print_json(_record(solution))
     else:
         print("\n".join(_summary(solution)))
     for warning in solution.warnings:
         complain(f"warning: {warning}")
+    if not solution.t.size:  # stopped before the first step: there is nothing to write
+        complain(f"{solution.status}: {solution.message}")
+        return 1
     if args.csv:
         solution.to_csv(args.csv)
         written.add(args.csv)
@@ -117,17 +124,17 @@ def _shares(solution: Solution) -> dict[str, dict[str, float]]:
     return shares
 
 
+def _final(solution: Solution) -> list[tuple[str, float]]:
+    """Name and value of every state at the end of the run; none where the run never began."""
+    return [(name, row[-1]) for name, row in zip(solution.names, solution.y, strict=True) if row.size]
+
+
 def _summary(solution: Solution) -> list[str]:
     model, stats = solution.model, solution.stats
-    final = [
-        f"{state.name} = {value:.9g} {state.unit}".rstrip()
-        for state, value in zip(model.states, solution.y[:, -1], strict=True)
-    ]
     kinds = Counter(event.kind for event in solution.events)
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
         f"  integrator   {solution.integrator}",
-        f"  time         {solution.t[0]:g} to {solution.t[-1]:.9g}",
         f"  status       {solution.status}",
         f"  events       {len(solution.events)}"
         + (f" ({', '.join(f'{n} {kind}' for kind, n in kinds.items())})" if kinds else ""),
@@ -135,7 +142,11 @@ def _summary(solution: Solution) -> list[str]:
     for component, modes in _shares(solution).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
         lines.append(f"  modes of {component:<4}{shares}")
-    lines.append(f"  final state  {', '.join(final)}")
+    if solution.t.size:
+        units = {state.name: state.unit for state in model.states}
+        final = ", ".join(f"{name} = {value:.9g} {units[name]}".rstrip() for name, value in _final(solution))
+        lines.append(f"  time         {solution.t_start:g} to {solution.t_end:.9g}")
+        lines.append(f"  final state  {final}")
     lines.append(
         f"  cost         {stats['steps']} steps ({stats['rejected']} rejected), "
         f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s"
@@ -156,8 +167,8 @@ def _record(solution: Solution) -> dict[str, Any]:
         "status": solution.status,
         "message": solution.message,
         "warnings": solution.warnings,
-        "t": [solution.t[0], solution.t[-1]],
-        "final": {state.name: value for state, value in zip(model.states, solution.y[:, -1], strict=True)},
+        "t_span": [solution.t_start, solution.t_end] if solution.t.size else None,
+        "final": dict(_final(solution)),
         "modes": _shares(solution),
         "events": [
             {

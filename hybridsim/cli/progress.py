@@ -1,0 +1,32 @@
+"""A line that shows how far long work has come: on a terminal only, and gone when the work is done."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Self
+
+_WAIT = 1.0  # seconds; what is done sooner needs no progress
+_PAUSE = 0.1  # seconds between updates, so that showing costs nothing
+
+
+class Progress:
+    """Callable with the finished fraction of the work; silent where stderr is no terminal."""
+
+    def __init__(self) -> None:
+        self._shown = False
+        self._next = time.monotonic() + _WAIT
+
+    def __call__(self, fraction: float) -> None:
+        if time.monotonic() >= self._next and sys.stderr.isatty():
+            print(f"\r{100 * fraction:5.1f} %", end="", file=sys.stderr, flush=True)
+            self._shown = True
+            self._next = time.monotonic() + _PAUSE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._shown:
+            print("\r" + " " * 8 + "\r", end="", file=sys.stderr, flush=True)
