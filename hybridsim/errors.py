@@ -65,7 +65,7 @@ class HybridsimError(Exception):
                 lines.append("    " + " " * column + "^")
         if self.remedy:
             lines.append(self.remedy)
-        return "\n".join(lines)
+        return _printable("\n".join(lines))
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.__dict__)
@@ -122,6 +122,11 @@ def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
         return f"there are no {kind} here."
     shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
     return f"known {kind}: {shown}."
+
+
+def _printable(text: str) -> str:
+    """What a file holds must not steer the terminal that shows it; a tab is one column wide, like a caret."""
+    return "".join(c if c.isprintable() or c == "\n" else " " if c == "\t" else "?" for c in text)
 
 
 def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int | None]:

@@ -61,6 +61,8 @@ def _contact(scope: Scope, contact: Contact) -> None:
     for name, value in contact.arguments.items():
         scope.need(value, f"{what}, law argument {name}", known)
     reached = scope.reached(contact.velocity)
+    if not reached <= scope.all_names:
+        return
     forces = sorted(
         name
         for name in reached

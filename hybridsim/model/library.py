@@ -35,7 +35,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     no TOML; or all its faults in one.
     """
     text = os.fspath(name_or_path)
-    if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or os.sep in text:
+    if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)
     else:
         path = models_folder() / f"{text}.toml"
@@ -127,12 +127,14 @@ def read_text(path: Path) -> str:
 
 
 def _beside(path: Path) -> str:
-    """Near names in the same folder and among the packaged models."""
+    """Near names in the same folder, else the names of the packaged models."""
+    packaged = [known.stem for known in _model_files()]
     try:
-        names = [other.name for other in path.parent.glob("*.toml")]
+        beside = [other.name for other in path.parent.glob("*.toml")]
     except OSError:
-        names = []
-    return nearest(path.name, [*names, *(known.stem for known in _model_files())], kind="models")
+        beside = []
+    near = nearest(path.name, beside)
+    return near if "did you mean" in near else "models that go by name: " + ", ".join(packaged) + "."
 
 
 def _model_files() -> list[Path]:

@@ -1,4 +1,4 @@
-"""Where things stand in a TOML text: from the path of a key to its line, which `tomllib` forgets."""
+"""Where things stand in a TOML text: from the path of a key to line and column, which `tomllib` forgets."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ Path = tuple[str | int, ...]
 _BLANK = " \t"
 
 
-def positions(text: str) -> Mapping[Path, int]:
-    """Line (from 1) of every key and array element of a valid TOML text.
+def positions(text: str) -> Mapping[Path, tuple[int, int]]:
+    """Line (from 1) and column (from 0) of every key and array element of a valid TOML text.
 
     The text must have passed `tomllib`: nothing is checked again here, and an escape in a quoted key is not
     resolved.
@@ -24,10 +24,10 @@ class _Scanner:
         self.text = text + "\n"
         self.at = 0
         self.line = 1
-        self.found: dict[Path, int] = {}
+        self.found: dict[Path, tuple[int, int]] = {}
         self.elements: dict[Path, int] = {}
 
-    def scan(self) -> dict[Path, int]:
+    def scan(self) -> dict[Path, tuple[int, int]]:
         table: Path = ()
         while self.skip(_BLANK + "\r\n"):
             if self.text[self.at] == "[":
@@ -53,42 +53,44 @@ class _Scanner:
         self.at = to
 
     def note(self, path: Path) -> None:
-        for length in range(1, len(path) + 1):
-            self.found.setdefault(path[:length], self.line)
+        """Remember where the last part of a path begins; the first mention counts."""
+        column = self.at - (self.text.rfind("\n", 0, self.at) + 1)
+        self.found.setdefault(path, (self.line, column))
 
     def header(self) -> Path:
         array = self.text.startswith("[[", self.at)
         self.move(self.at + (2 if array else 1))
-        path = self.key()
+        path = self.key(())
         if array:
             count = self.elements[path] = self.elements.get(path, -1) + 1
             path = (*path, count)
-        self.note(path)
+            self.note(path)
         self.skip(_BLANK + "]")
         return path
 
     def pair(self, table: Path) -> None:
-        path = (*table, *self.key())
-        self.note(path)
+        path = self.key(table)
         self.move(self.at + 1)  # the equals sign
         self.value(path)
 
-    def key(self) -> Path:
-        parts: list[str | int] = []
+    def key(self, path: Path) -> Path:
+        """Read a key, dotted or not, inside the table at a path; every part of it is remembered."""
         while True:
             self.skip(_BLANK)
             start = self.at
             quote = self.text[start]
+            line, column = self.line, start - (self.text.rfind("\n", 0, start) + 1)
             if quote in "\"'":
                 self.string(quote)
-                parts.append(self.text[start + 1 : self.at - 1])
+                path = (*path, self.text[start + 1 : self.at - 1])
             else:
                 while self.text[self.at] not in " \t.=]\n":
                     self.at += 1
-                parts.append(self.text[start : self.at])
+                path = (*path, self.text[start : self.at])
+            self.found.setdefault(path, (line, column))
             self.skip(_BLANK)
             if self.text[self.at] != ".":
-                return tuple(parts)
+                return path
             self.move(self.at + 1)
 
     def value(self, path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hybridsim.errors import Place
 from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.toml_table import Table
 
@@ -14,13 +15,13 @@ SINGLE = "mode"
 def read_components(root: Table) -> Iterable[Component]:
     """The automaton of the top-level [modes.*], then those of [components.*]."""
     if "modes" in root.data or "initial" in root.data:
-        yield _component(SINGLE, root)
+        yield _component(SINGLE, root, root.source.place(("modes",)))
     for name, table in root.entries("components", "component"):
         table.only("modes", "initial", "surface")
-        yield _component(name, table)
+        yield _component(name, table, table.place)
 
 
-def _component(name: str, table: Table) -> Component:
+def _component(name: str, table: Table, place: Place) -> Component:
     tables = dict(table.entries("modes", "mode"))
     if not tables:
         table.fail("it has no modes", f"write [components.{name}.modes.NAME].")
@@ -34,7 +35,7 @@ def _component(name: str, table: Table) -> Component:
             )
     surface = _surface(table)
     modes = [_mode(mode, part) for mode, part in tables.items()]
-    return Component(name, tuple(modes), named or (marked[0] if marked else None), surface, place=table.place)
+    return Component(name, tuple(modes), named or (marked[0] if marked else None), surface, place=place)
 
 
 def _mode(name: str, table: Table) -> Mode:

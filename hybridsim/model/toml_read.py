@@ -51,7 +51,7 @@ def open_text(text: str, path: str | None, kind: str) -> Table:
         raise ModelError("the file is empty", place=Place(path), remedy="a model has at least [states].")
     try:
         data = tomllib.loads(text)
-        source = Source(path, text.splitlines(), positions(text))
+        source = Source(path, _split(text), positions(text))
     except tomllib.TOMLDecodeError as fault:
         raise _not_toml(fault, text, path) from None
     except (ValueError, RecursionError) as fault:
@@ -63,7 +63,7 @@ def open_text(text: str, path: str | None, kind: str) -> Table:
 def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> ModelError:
     found = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
     message = re.sub(r"\s*\(at [^)]*\)", "", str(fault))
-    lines = text.splitlines()
+    lines = _split(text)
     line, column = (int(found[1]), int(found[2]) - 1) if found else (len(lines), 0)
     shown = lines[line - 1] if 0 < line <= len(lines) else ""
     return ModelError(
@@ -71,6 +71,11 @@ def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> Mo
         place=Place(path, line, column, shown),
         remedy='TOML wants key = value, expressions in double quotes: der = "-k*x".',
     )
+
+
+def _split(text: str) -> list[str]:
+    """Lines as TOML counts them: other characters that Python calls line breaks are not."""
+    return [line.rstrip("\r") for line in text.split("\n")]
 
 
 def _model(root: Table, folder: Path) -> Model:

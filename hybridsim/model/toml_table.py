@@ -19,18 +19,17 @@ class Source:
 
     file: str | None
     lines: list[str]
-    positions: Mapping[Path, int]
+    positions: Mapping[Path, tuple[int, int]]
     errors: list[ModelError] = field(default_factory=list)
 
     def place(self, path: Path) -> Place:
         """Place of a key, or of the nearest table around it that has a line."""
         while path and path not in self.positions:
             path = path[:-1]
-        line = self.positions.get(path)
-        text = self.lines[line - 1] if line else None
-        key = str(path[-1]) if path else ""
-        column = text.find(key) if text and key in text else None
-        return Place(self.file, line, column, text)
+        if not path:
+            return Place(self.file)
+        line, column = self.positions[path]
+        return Place(self.file, line, column, self.lines[line - 1])
 
 
 class Table:
@@ -139,7 +138,14 @@ class Table:
 
 
 def _shown(value: Any) -> str:
-    names = {bool: "true or false", dict: "a table", list: "a list", str: "a text"}
+    names = {
+        bool: "true or false",
+        dict: "a table",
+        list: "a list",
+        str: "a text",
+        int: "a number",
+        float: "a number",
+    }
     text = str(value).lower() if isinstance(value, bool) else repr(value)
     what = names.get(type(value), type(value).__name__)
     return f"{what} ({text if len(text) <= 40 else text[:37] + '...'})"
