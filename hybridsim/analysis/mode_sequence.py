@@ -101,7 +101,7 @@ def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
                 _Entry(event.t, event.target, event)
             )
         elif event.kind in ("monitor", "scheduled"):
-            name = event.guard or event.component
+            name = event.component or event.guard
             sequences.setdefault((event.kind, name), []).append(_Entry(event.t, name, event))
     return {
         channel: _without_instants(entries) if channel[0] == "transition" else entries

@@ -38,5 +38,6 @@ def resets_of(model: Model) -> Resets:
         for choice in guard.then
         if states & choice.reset.keys()
     )
-    declared = (*model.monitors, *model.schedules)
-    return Resets(transitions, frozenset(item.name for item in declared if states & item.reset.keys()))
+    declared = [(monitor.name, monitor.reset) for monitor in model.monitors]
+    declared += [(schedule.name, schedule.reset) for schedule in model.schedules]
+    return Resets(transitions, frozenset(name for name, reset in declared if states & reset.keys()))

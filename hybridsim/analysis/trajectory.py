@@ -66,7 +66,7 @@ def trajectory_of(solution: Solution) -> Trajectory:
     """What a comparison reads of a run."""
     return Trajectory(
         states=solution,
-        t_span=(float(solution.t[0]), float(solution.t[-1])),
+        t_span=(solution.t_start, solution.t_end),
         events=tuple(solution.events),
         initial_modes={name: intervals[0].mode for name, intervals in solution.modes.items() if intervals},
     )
@@ -76,7 +76,7 @@ def as_trajectory(value: Any, t_span: tuple[float, float]) -> Trajectory:
     """A trajectory from a Trajectory, from something like a Solution, or from a function t -> states."""
     if isinstance(value, Trajectory):
         return value
-    if all(hasattr(value, name) for name in ("t", "events", "modes")):
+    if all(hasattr(value, name) for name in ("t_end", "events", "modes")):
         return trajectory_of(value)
     if callable(value):
         return Trajectory(lambda t, side: np.asarray(value(t), dtype=float), t_span)

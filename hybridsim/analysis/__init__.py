@@ -1,0 +1,7 @@
+"""What is asked of a model beyond one run: comparisons of integrators."""
+
+from hybridsim.analysis.compare import compare
+from hybridsim.analysis.comparison import Comparison
+from hybridsim.analysis.series import Series
+
+__all__ = ["Comparison", "Series", "compare"]

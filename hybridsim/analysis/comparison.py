@@ -1,0 +1,180 @@
+"""The result of a comparison: one row a run, as a table, as CSV and as JSON."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hybridsim.analysis.errors_against_reference import Errors
+from hybridsim.analysis.rows import QUANTITIES, Reading, Row
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Integrators on one model, each at several settings, against one reference.
+
+    Parameters
+    ----------
+    title : of the model.
+    t_span, period : what was run; the period of the forcing or None.
+    reference : what the errors are relative to, in words.
+    uncertainty : how far the reference is from a second of another kind; None where there is none.
+    rows : in the order of the request.
+    repeat : timed repetitions.
+    provenance : versions, machine, hash of the model.
+    warnings : what a reader must know before he trusts the numbers.
+    """
+
+    title: str
+    t_span: tuple[float, float]
+    period: float | None
+    reference: str
+    uncertainty: Errors | None
+    rows: tuple[Row, ...]
+    repeat: int
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def reading(self, row: Row, quantity: str) -> Reading | None:
+        """An error of a row ("state", "state_last_period", "event_time"); None where the row has none.
+
+        Event times are in periods where there is a period, else in the model's unit of time.
+        """
+        value = getattr(row.errors, quantity, None)
+        if value is None:
+            return None
+        value, floor = value / self._scale(quantity), self.floor(quantity)
+        return Reading(max(value, floor), value <= floor and floor > 0)
+
+    def floor(self, quantity: str) -> float:
+        """The reference's own uncertainty in the units of `reading`; 0 where it is not known."""
+        return (getattr(self.uncertainty, quantity, None) or 0.0) / self._scale(quantity)
+
+    def _scale(self, quantity: str) -> float:
+        return self.period if quantity == "event_time" and self.period else 1.0
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the lines, in order."""
+        return tuple(dict.fromkeys(row.label for row in self.rows))
+
+    def table(self) -> str:
+        """The comparison as text, for people."""
+        times = "event time / T" if self.period else "event time"
+        header: tuple[str, ...] = ("integrator", "setting", "state error", "last period", times, "modes")
+        header = (*header, "wall time", "min .. max", "rhs", "guards", "steps")
+        lines = [header, *(self._cells(row) for row in self.rows)]
+        full = [line for line in lines if len(line) == len(header)]
+        widths = [max(len(line[i]) for line in full) for i in range(len(header))]
+        left = (0, 1, 5)
+        text = []
+        for line in lines:
+            cells = zip(range(len(line)), line, widths)
+            shown = [cell.ljust(width) if i in left else cell.rjust(width) for i, cell, width in cells]
+            text.append("  ".join(shown).rstrip())
+        return "\n".join([*self._heading(), "", text[0], "-" * len(text[0]), *text[1:], "", *self._notes()])
+
+    def _cells(self, row: Row) -> tuple[str, ...]:
+        name, value = row.setting
+        setting = f"{name} {value:g}"
+        if row.errors is None or row.cost is None:
+            return row.label, setting, f"{row.status}: {row.message}" if row.message else row.status
+        readings = [self.reading(row, quantity) for quantity in QUANTITIES]
+        times = row.cost.wall_times
+        return (
+            row.label,
+            setting,
+            *(str(reading) if reading else "-" for reading in readings),
+            str(row.errors.sequence),
+            milliseconds(row.cost.wall_time),
+            f"{milliseconds(min(times))} .. {milliseconds(max(times))}",
+            str(row.cost.rhs_evaluations),
+            str(row.cost.guard_evaluations),
+            str(row.cost.steps),
+        )
+
+    def _heading(self) -> list[str]:
+        t0, t1 = self.t_span
+        periods = f" ({(t1 - t0) / self.period:g} periods)" if self.period else ""
+        lines = [self.title, f"  time       {t0:g} to {t1:g}{periods}", f"  reference  {self.reference}"]
+        if self.uncertainty is not None:
+            words = zip(QUANTITIES, ("state", "last period", "event time"))
+            known = [f"{name} {self.floor(quantity):.1e}" for quantity, name in words if self.floor(quantity)]
+            lines.append(f"             uncertain by: {', '.join(known) or 'nothing that shows'}")
+        return lines
+
+    def _notes(self) -> list[str]:
+        unit = "periods T" if self.period else "the model's unit of time"
+        facts = self.provenance
+        versions = [f"{name} {facts[name]}" for name in ("hybridsim", "python", "numpy") if name in facts]
+        return [
+            "State errors: the largest of all states, relative to each one's amplitude in the reference.",
+            f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
+            f"Wall time: median of {self.repeat} after a warm-up, in turns over all rows.",
+            f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs",
+            f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
+            *(f"warning: {warning}" for warning in self.warnings),
+        ]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write one line a row; times in the model's unit, wall times in seconds."""
+        records = [self._record(row) for row in self.rows]
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(records[0]) if records else [])
+            writer.writeheader()
+            for record in records:
+                writer.writerow({**record, "options": json.dumps(record["options"], default=str)})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as plain values."""
+        return {
+            "title": self.title,
+            "t_span": list(self.t_span),
+            "period": self.period,
+            "reference": self.reference,
+            "uncertainty": asdict(self.uncertainty) if self.uncertainty else None,
+            "repeat": self.repeat,
+            "warnings": list(self.warnings),
+            "provenance": dict(self.provenance),
+            "rows": [self._record(row) for row in self.rows],
+        }
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        text = json.dumps(self.to_dict(), indent=2, default=str)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text
+
+    def _record(self, row: Row) -> dict[str, Any]:
+        errors, cost = row.errors, row.cost
+        record: dict[str, Any] = {
+            "integrator": row.integrator,
+            "label": row.label,
+            "setting": row.setting[0],
+            "value": row.setting[1],
+            "options": dict(row.options),
+            "status": row.status,
+            "message": row.message,
+        }
+        for quantity in QUANTITIES:
+            reading = self.reading(row, quantity)
+            record[f"{quantity}_error"] = getattr(errors, quantity, None)
+            record[f"{quantity}_below_uncertainty"] = reading.is_bound if reading else None
+        for fault in ("missed", "spurious", "wrong"):
+            record[f"{fault}_modes"] = getattr(errors.sequence, fault) if errors else None
+        record["wall_time"] = cost.wall_time if cost else None
+        record["wall_time_min"] = min(cost.wall_times) if cost else None
+        record["wall_time_max"] = max(cost.wall_times) if cost else None
+        for count in ("rhs_evaluations", "guard_evaluations", "steps"):
+            record[count] = getattr(cost, count, None)
+        return record
+
+
+def milliseconds(seconds: float) -> str:
+    """A wall time for people, three digits."""
+    return f"{seconds * 1e3:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"

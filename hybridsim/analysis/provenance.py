@@ -1,0 +1,39 @@
+"""Where a result comes from: versions, the machine in plain facts, and a hash of the model."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from hybridsim.model import Model
+
+_PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae")
+
+
+def provenance(model: Model) -> dict[str, Any]:
+    """Versions, machine and model of a result, ready for JSON.
+
+    The hash is that of the model written out, with the parameters and initial values of this run.
+    """
+    from hybridsim import __version__
+
+    return {
+        "hybridsim": __version__,
+        "python": f"{platform.python_implementation()} {platform.python_version()}",
+        **{name: _version(name) for name in _PACKAGES},
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "cpus": os.cpu_count(),
+        "model": model.name,
+        "model_sha256": hashlib.sha256(model.to_toml().encode()).hexdigest(),
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,9 @@
+"""Pictures of solutions and comparisons: functions return the axes they drew in and change nothing global."""
+
+from hybridsim.plot.friction_loop import friction_loop
+from hybridsim.plot.phase_portrait import phase_portrait
+from hybridsim.plot.style import save
+from hybridsim.plot.time_history import TimeHistoryAxes, time_history
+from hybridsim.plot.work_precision import work_precision
+
+__all__ = ["TimeHistoryAxes", "friction_loop", "phase_portrait", "save", "time_history", "work_precision"]

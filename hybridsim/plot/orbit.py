@@ -1,0 +1,97 @@
+"""One quantity against another: what the phase portrait and the friction loop have in common."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+
+from hybridsim.plot import style
+from hybridsim.plot.pieces import extent, pieces_of, unit_of, window_of
+from hybridsim.plot.scale import label_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.solution import Solution
+
+_HELD, _FREE, _DOT = (
+    3.0,
+    1.2,
+    5.0,
+)  # widths of a held (stuck) piece and of others, and its size where it is a point
+_VISIBLE = 1e-3  # of the range
+
+
+def draw_orbit(
+    solution: Solution, across: str, up: str, t_span: tuple[float, float] | None, axes: Axes | None
+) -> Axes:
+    """Draw `up` against `across` in the colours of the modes; held pieces thick, jumps dashed.
+
+    With several components, a colour stands for the mode of the first one, and a piece is held where any is.
+    """
+    units = unit_of(solution, across), unit_of(solution, up)
+    window = window_of(solution, t_span)
+    pieces = pieces_of(solution, (across, up), window)
+    if axes is None:
+        axes = style.figure(6.2, 4.6).subplots()
+    colours = style.mode_colours(solution.model)
+    surfaces = {c.name: c.surface.hold for c in solution.model.all_components() if c.surface}
+    held_modes = set(surfaces.values())
+    spans = [extent(pieces, name) for name in (across, up)]
+    least = np.array([_VISIBLE * ((high - low) or 1.0) for low, high in spans])
+    lines: dict[str, list[np.ndarray]] = {}
+    dots: dict[str, list[np.ndarray]] = {}
+    ends = []
+    for piece in pieces:
+        points = np.column_stack([piece.values[across], piece.values[up]])
+        ends.append((points[0], points[-1]))
+        held = [mode for component, mode in piece.modes.items() if surfaces.get(component) == mode]
+        mode = (held or [*piece.modes.values(), ""])[0]
+        at_a_point = bool(np.all(np.ptp(points, axis=0) < least))
+        (dots if at_a_point else lines).setdefault(mode, []).append(points)
+    for mode in dict.fromkeys([*lines, *dots]):
+        colour = colours.get(mode, style.INK)
+        width = _HELD if mode in held_modes else _FREE
+        axes.add_collection(
+            LineCollection(lines.get(mode, []), colors=colour, linewidths=width, capstyle="round")
+        )
+        if mode in dots:
+            x, y = np.array([points[0] for points in dots[mode]]).T
+            axes.plot(x, y, "o", color=colour, markersize=_DOT)
+    jumps = [
+        (before[1], after[0])
+        for before, after in itertools.pairwise(ends)
+        if np.any(np.abs(after[0] - before[1]) > least)
+    ]
+    axes.add_collection(
+        LineCollection(jumps, colors=style.FAINT, linewidths=0.9, linestyles=[(0, (3, 2))], zorder=1.5)
+    )
+    axes.autoscale_view()
+    style.dress(axes)
+    for axis, name, unit, span in zip((axes.xaxis, axes.yaxis), (across, up), units, spans):
+        label_axis(axis, name, unit, *span)
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=colours[mode],
+            linewidth=(_HELD if mode in held_modes else _FREE) if mode in lines else 0,
+            marker="o" if mode in dots else "",
+            markersize=_DOT,
+            label=style.literal(mode),
+        )
+        for mode in colours
+        if mode in lines or mode in dots
+    ]
+    if jumps:
+        handles.append(Line2D([], [], color=style.FAINT, linewidth=0.9, linestyle=(0, (3, 2)), label="jump"))
+    if handles:
+        axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
+    model = solution.model
+    title = ": ".join(part for part in (model.title or model.name, window.note) if part)
+    axes.set_title(style.literal(title), fontsize=10, loc="left")
+    return axes

@@ -1,0 +1,128 @@
+"""Cuts a solution at its events into smooth pieces, sampled densely enough to draw, in bounded number."""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsim.engine.period import forcing_period
+from hybridsim.errors import UsageError, nearest
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+    from hybridsim.solution import Solution
+
+# Points of a whole picture, about four for each pixel across; and the fewest of a piece, so that a short
+# slip among long ones is still a curve.
+_POINTS, _LEAST = 6_000, 9
+# More periods than can be told apart in a picture are not drawn; the last few are, without the transient.
+_MANY, _FEW = 12, 4
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A smooth piece: times (k,), the values of each quantity (k,), and the mode of each component in it."""
+
+    t: NDArray[np.float64]
+    values: Mapping[str, NDArray[np.float64]]
+    modes: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a run to draw, and what the title has to say about it."""
+
+    t0: float
+    t1: float
+    note: str = ""
+
+
+def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
+    """What to draw: `t_span` if given, else all of it, or the last few of very many periods."""
+    start, end = sorted((solution.t_start, solution.t_end))
+    if t_span is not None:
+        t0, t1 = sorted(map(float, t_span))
+        if not (t1 > start and t0 < end):
+            raise UsageError(
+                f"t_span = ({t0:g}, {t1:g}) is outside of the run", remedy=f"it is from {start:g} to {end:g}"
+            )
+        return Window(max(t0, start), min(t1, end))
+    period = forcing_period(solution.model)
+    if period is None or end - start <= _MANY * period:
+        return Window(start, end)
+    return Window(end - _FEW * period, end, f"last {_FEW} of {(end - start) / period:.4g} periods")
+
+
+def unit_of(solution: Solution, name: str) -> str:
+    """Unit of a state or an output; `UsageError` for a name that is neither."""
+    for quantity in (*solution.model.states, *solution.model.outputs):
+        if quantity.name == name:
+            return quantity.unit
+    names = [quantity.name for quantity in (*solution.model.states, *solution.model.outputs)]
+    raise UsageError(
+        f"{solution.model.name} has no state or output '{name}'",
+        remedy=nearest(name, names, kind="quantities"),
+    )
+
+
+def time_unit(model: Model) -> str:
+    """Seconds, if any unit of the model speaks of them; else time has no unit."""
+    units = [state.unit for state in model.states] + [output.unit for output in model.outputs]
+    units += [parameter.unit for parameter in model.parameters]
+    return "s" if any(re.search(r"(?<![A-Za-z])s(?![A-Za-z])", unit) for unit in units) else ""
+
+
+def extent(pieces: Sequence[Piece], name: str) -> tuple[float, float]:
+    """Least and largest value of a quantity."""
+    values = [piece.values[name] for piece in pieces]
+    return float(min(map(np.min, values))), float(max(map(np.max, values)))
+
+
+def pieces_of(solution: Solution, names: Sequence[str], window: Window) -> list[Piece]:
+    """The pieces of a window in order of time; at an event one ends at x- and the next begins at x+."""
+    inner = {e.t for e in solution.events if e.kind != "near-grazing" and window.t0 < e.t < window.t1}
+    cuts = np.array([window.t0, *sorted(inner), window.t1])
+    lengths = np.diff(cuts)
+    counts = np.maximum(_LEAST, np.ceil(_POINTS * lengths / lengths.sum())).astype(int)
+    grids = [np.linspace(a, b, count) for a, b, count in zip(cuts[:-1], cuts[1:], counts)]
+    forward = solution.t_end >= solution.t_start
+    starts, ends = ("+", "-") if forward else ("-", "+")
+    body = np.concatenate([grid[:-1] for grid in grids])
+    splits = np.cumsum(counts - 1)[:-1]
+    values: dict[str, list[NDArray[np.float64]]] = {}
+    for name in names:
+        parts = np.split(_evaluate(solution, name, body, starts), splits)
+        last = _evaluate(solution, name, cuts[1:], ends)
+        values[name] = [np.append(part, value) for part, value in zip(parts, last)]
+    modes_at = _mode_lookup(solution)
+    return [
+        Piece(grid, {name: values[name][i] for name in names}, modes_at((grid[0] + grid[-1]) / 2))
+        for i, grid in enumerate(grids)
+    ]
+
+
+def _evaluate(solution: Solution, name: str, t: NDArray[np.float64], side: str) -> NDArray[np.float64]:
+    for i, state in enumerate(solution.model.states):
+        if state.name == name:
+            return np.asarray(solution(t, side=side)[i])
+    return np.asarray(solution.output(name, t, side=side))
+
+
+def _mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:
+    """Function of a time that gives the mode of each component."""
+    starts, modes = {}, {}
+    for component, intervals in solution.modes.items():
+        ordered = sorted((min(interval.t0, interval.t1), interval.mode) for interval in intervals)
+        starts[component] = [start for start, _ in ordered]
+        modes[component] = [mode for _, mode in ordered]
+
+    def lookup(t: float) -> dict[str, str]:
+        return {name: modes[name][max(bisect.bisect_right(starts[name], t) - 1, 0)] for name in modes}
+
+    return lookup

@@ -1,0 +1,58 @@
+"""Labels and ticks of an axis that carries a physical quantity: prefixes instead of powers of ten."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from matplotlib.ticker import Formatter
+
+from hybridsim.plot.style import literal
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+# Units that take a prefix when they stand first: "m" and "m/s" do, "kg" (has one) and "1/s" do not.
+_TAKES_PREFIX = re.compile(r"(m|s|N|V|A|W|J|Pa|Hz|rad|g|C|F|H|K|Nm|N m)(?![A-Za-z])")
+
+
+class Scaled(Formatter):
+    """Ticks in units of `factor`, with as many decimals as their spacing needs; the data stay as they are."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def format_ticks(self, values: Sequence[float]) -> list[str]:
+        scaled = [value / self.factor for value in values]
+        steps = [abs(b - a) for a, b in itertools.pairwise(scaled) if b != a]
+        decimals = 0
+        # Rounding must not show: the fewest decimals at which every tick is where its label says.
+        while (
+            decimals < 9
+            and steps
+            and any(abs(round(value, decimals) - value) > 1e-3 * min(steps) for value in scaled)
+        ):
+            decimals += 1
+        return [f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in scaled]
+
+    def __call__(self, value: float, pos: int | None = None) -> str:
+        return f"{value / self.factor:.6g}".replace("-", "\N{MINUS SIGN}")
+
+
+def label_axis(axis: Axis, name: str, unit: str, low: float, high: float) -> None:
+    """Label an axis "name [unit]" with a prefix, or a power of ten, that suits values from low to high."""
+    size = max(abs(low), abs(high))
+    power = 3 * math.floor(math.log10(size) / 3 + 1e-9) if size > 0 and math.isfinite(size) else 0
+    power = min(max(power, -12), 9)
+    if power and _TAKES_PREFIX.match(unit):
+        text = f"[{_PREFIXES[power]}{literal(unit)}]"
+    elif -2 <= math.log10(size or 1.0) < 4:
+        power, text = 0, f"[{literal(unit)}]" if unit else ""
+    else:
+        text = f"[$10^{{{power}}}$ {literal(unit)}]" if unit else f"[$10^{{{power}}}$]"
+    axis.set_label_text(f"{literal(name)} {text}".rstrip())
+    axis.set_major_formatter(Scaled(10.0**power))

@@ -1,0 +1,166 @@
+"""States and outputs over time, with a strip of modes under them and marks at the events."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import Patch
+
+from hybridsim.errors import UsageError
+from hybridsim.plot import style
+from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, time_unit, unit_of, window_of
+from hybridsim.plot.scale import label_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.solution import Event, Solution
+
+_MOST_QUANTITIES = 4  # drawn unasked
+_MOST_MARKS = 150  # event lines; closer together they would be a grey area
+_VISIBLE = 1e-3  # of the range: a smaller jump is not seen
+_ROW, _STRIP = 1.75, 0.34  # inches
+
+
+@dataclass(frozen=True)
+class TimeHistoryAxes:
+    """The axes of a time history: one for each quantity, and the strip of modes (None without components)."""
+
+    quantities: tuple[Axes, ...]
+    modes: Axes | None
+
+    def __iter__(self) -> Iterator[Axes]:
+        yield from self.quantities
+        if self.modes is not None:
+            yield self.modes
+
+
+def time_history(
+    solution: Solution,
+    quantities: Sequence[str] | None = None,
+    *,
+    t_span: tuple[float, float] | None = None,
+    axes: Sequence[Axes] | None = None,
+) -> TimeHistoryAxes:
+    """Draw quantities over time, one below the other, and the modes of all components under them.
+
+    A jump (of a state at a reset, of an output at a change of mode) is dashed; thin lines mark the events.
+
+    Parameters
+    ----------
+    quantities : names of states and outputs; the first four of them if not given.
+    t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
+    axes : where to draw: one for each quantity, one more if the model has components; new if not given.
+    """
+    model = solution.model
+    declared = [quantity.name for quantity in (*model.states, *model.outputs)]
+    names = list(declared[:_MOST_QUANTITIES] if quantities is None else quantities)
+    units = [unit_of(solution, name) for name in names]
+    window = window_of(solution, t_span)
+    pieces = pieces_of(solution, names, window)
+    history = _axes(len(names), len(solution.modes), axes)
+    events = [e for e in solution.events if window.t0 <= e.t <= window.t1 and e.kind != "near-grazing"]
+    for axis, name, unit in zip(history.quantities, names, units):
+        _draw(axis, pieces, name)
+        _mark(axis, events)
+        style.dress(axis)
+        label_axis(axis.yaxis, name, unit, *extent(pieces, name))
+        axis.set_xlim(window.t0, window.t1)
+    if history.modes is not None:
+        _strip(history.modes, solution, window)
+    *upper, lowest = history
+    for axis in upper:
+        axis.tick_params(labelbottom=False)
+    label_axis(lowest.xaxis, "t", time_unit(model), window.t0, window.t1)
+    title = ": ".join(part for part in (model.title or model.name, window.note) if part)
+    history.quantities[0].set_title(style.literal(title), fontsize=10, loc="left")
+    return history
+
+
+def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> TimeHistoryAxes:
+    count = quantities + bool(components)
+    if axes is not None:
+        given = tuple(axes)
+        if len(given) != count:
+            raise UsageError(f"{len(given)} axes for {quantities} quantities", remedy=f"give {count} axes")
+        return TimeHistoryAxes(given[:quantities], given[quantities] if components else None)
+    heights = [_ROW] * quantities + [0.1 + _STRIP * components] * bool(components)
+    figure = style.figure(9.0, 0.7 + sum(heights))
+    grid = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
+    made = tuple(grid[:, 0])
+    figure.align_ylabels(made)
+    return TimeHistoryAxes(made[:quantities], made[quantities] if components else None)
+
+
+def _draw(axis: Axes, pieces: Sequence[Piece], name: str) -> None:
+    """The curve in one line, interrupted at jumps, which are dashed in another."""
+    low, high = extent(pieces, name)
+    t, y, jump_t, jump_y = [pieces[0].t], [pieces[0].values[name]], [], []
+    for before, after in itertools.pairwise(pieces):
+        left, right = before.values[name][-1], after.values[name][0]
+        if abs(right - left) > _VISIBLE * (high - low):
+            t.append(np.array([np.nan]))
+            y.append(np.array([np.nan]))
+            jump_t += [after.t[0], after.t[0], np.nan]
+            jump_y += [left, right, np.nan]
+        t.append(after.t)
+        y.append(after.values[name])
+    axis.plot(np.concatenate(t), np.concatenate(y), color=style.INK, linewidth=1.2, solid_joinstyle="round")
+    if jump_t:
+        axis.plot(jump_t, jump_y, color=style.INK, linewidth=0.8, linestyle=(0, (3, 2)))
+
+
+def _mark(axis: Axes, events: Sequence[Event]) -> None:
+    """A thin line at each event, where they can be told apart; a triangle at the top for a monitor's."""
+    if len(events) <= _MOST_MARKS:
+        for event in events:
+            axis.axvline(event.t, color=style.MARK, linewidth=0.6, zorder=0.9)
+    monitors = [event.t for event in events if event.kind == "monitor"]
+    if monitors and len(monitors) <= _MOST_MARKS:
+        at_top = axis.get_xaxis_transform()
+        axis.plot(
+            monitors,
+            [1.0] * len(monitors),
+            "v",
+            color=style.INK,
+            markersize=5,
+            transform=at_top,
+            clip_on=False,
+        )
+
+
+def _strip(axis: Axes, solution: Solution, window: Window) -> None:
+    """One row a component, each mode in its colour; the legend names the modes that occur."""
+    colours = style.mode_colours(solution.model)
+    components = list(solution.modes)
+    seen: dict[str, None] = {}
+    for row, component in enumerate(components):
+        bars, faces = [], []
+        for interval in solution.modes[component]:
+            start, end = sorted((interval.t0, interval.t1))
+            start, end = max(start, window.t0), min(end, window.t1)
+            if end > start:
+                bars.append((start, end - start))
+                faces.append(colours[interval.mode])
+                seen[interval.mode] = None
+        axis.broken_barh(bars, (row - 0.38, 0.76), facecolors=faces, linewidth=0)
+    axis.set_ylim(len(components) - 0.5, -0.5)
+    axis.set_yticks(range(len(components)), [style.literal(name) for name in components])
+    axis.tick_params(axis="y", length=0, labelsize=9)
+    axis.tick_params(axis="x", color=style.FAINT, labelsize=9)
+    axis.spines[["top", "right", "left"]].set_visible(False)
+    axis.spines["bottom"].set_color(style.FAINT)
+    axis.set_xlim(window.t0, window.t1)
+    handles = [Patch(color=colours[name], label=style.literal(name)) for name in colours if name in seen]
+    axis.legend(
+        handles=handles,
+        loc="center left",
+        bbox_to_anchor=(1.005, 0.5),
+        frameon=False,
+        fontsize=9,
+        handlelength=1.2,
+    )
