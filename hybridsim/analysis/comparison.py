@@ -80,7 +80,8 @@ class Comparison:
 
     def _cells(self, row: Row) -> tuple[str, ...]:
         name, value = row.setting
-        setting = f"{name} {value:g}"
+        short = f"{value:.0e}"
+        setting = f"{name} {short if value < 1 and float(short) == value else f'{value:g}'}"
         if row.errors is None or row.cost is None:
             return row.label, setting, f"{row.status}: {row.message}" if row.message else row.status
         readings = [self.reading(row, quantity) for quantity in QUANTITIES]
@@ -115,7 +116,7 @@ class Comparison:
             "State errors: the largest of all states, relative to each one's amplitude in the reference.",
             f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
             f"Wall time: median of {self.repeat} after a warm-up, in turns over all rows.",
-            f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs",
+            f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPU",
             f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
             *(f"warning: {warning}" for warning in self.warnings),
         ]

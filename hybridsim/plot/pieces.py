@@ -61,20 +61,23 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
 
 def unit_of(solution: Solution, name: str) -> str:
     """Unit of a state or an output; `UsageError` for a name that is neither."""
-    for quantity in (*solution.model.states, *solution.model.outputs):
-        if quantity.name == name:
-            return quantity.unit
-    names = [quantity.name for quantity in (*solution.model.states, *solution.model.outputs)]
-    raise UsageError(
-        f"{solution.model.name} has no state or output '{name}'",
-        remedy=nearest(name, names, kind="quantities"),
-    )
+    units = units_of(solution.model)
+    if name not in units:
+        raise UsageError(
+            f"{solution.model.name} has no state or output '{name}'",
+            remedy=nearest(name, units, kind="quantities"),
+        )
+    return units[name]
+
+
+def units_of(model: Model) -> dict[str, str]:
+    """Names of the states and the outputs, in that order, with their units."""
+    return {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
 
 
 def time_unit(model: Model) -> str:
     """Seconds, if any unit of the model speaks of them; else time has no unit."""
-    units = [state.unit for state in model.states] + [output.unit for output in model.outputs]
-    units += [parameter.unit for parameter in model.parameters]
+    units = [*units_of(model).values(), *(parameter.unit for parameter in model.parameters)]
     return "s" if any(re.search(r"(?<![A-Za-z])s(?![A-Za-z])", unit) for unit in units) else ""
 
 

@@ -50,7 +50,7 @@ def label_axis(axis: Axis, name: str, unit: str, low: float, high: float) -> Non
     power = min(max(power, -12), 9)
     if power and _TAKES_PREFIX.match(unit):
         text = f"[{_PREFIXES[power]}{literal(unit)}]"
-    elif -2 <= math.log10(size or 1.0) < 4:
+    elif -3 <= math.log10(size or 1.0) < 4:
         power, text = 0, f"[{literal(unit)}]" if unit else ""
     else:
         text = f"[$10^{{{power}}}$ {literal(unit)}]" if unit else f"[$10^{{{power}}}$]"

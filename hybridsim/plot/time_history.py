@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
-from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, time_unit, unit_of, window_of
+from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, time_unit, unit_of, units_of, window_of
 from hybridsim.plot.scale import label_axis
 
 if TYPE_CHECKING:
@@ -57,8 +57,7 @@ def time_history(
     axes : where to draw: one for each quantity, one more if the model has components; new if not given.
     """
     model = solution.model
-    declared = [quantity.name for quantity in (*model.states, *model.outputs)]
-    names = list(declared[:_MOST_QUANTITIES] if quantities is None else quantities)
+    names = list(units_of(model))[:_MOST_QUANTITIES] if quantities is None else list(quantities)
     units = [unit_of(solution, name) for name in names]
     window = window_of(solution, t_span)
     pieces = pieces_of(solution, names, window)

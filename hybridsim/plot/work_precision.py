@@ -80,10 +80,10 @@ def _panel(panel: Axes, comparison: Comparison, quantity: str) -> None:
             panel.plot(
                 [min(times), max(times)], [error, error], color=colour, linewidth=2.5, alpha=0.35, zorder=2
             )
+            fill = colour if right else "white"
             panel.plot(
-                time, error, marker, color=colour, markerfacecolor=colour if right else "white", markersize=_SIZE,
-                markeredgewidth=1.3, zorder=3,
-            )  # fmt: skip
+                time, error, marker, color=colour, markerfacecolor=fill, markersize=_SIZE, markeredgewidth=1.3
+            )
     panel.set_xscale("log")
     panel.set_yscale("log")
     style.dress(panel)

@@ -1,0 +1,132 @@
+"""The pictures draw what the solution holds, label it rightly, and leave matplotlib as it was."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscillator_model
+
+from hybridsim.errors import UsageError
+from hybridsim.plot import friction_loop, phase_portrait, save, time_history
+
+PERIOD = 2 * math.pi / oscillator_model().parameter_values()["omega"]
+
+
+def drawn(axes) -> np.ndarray:
+    """Points of the solid curve of a time history, (k, 2)."""
+    return max((line.get_xydata() for line in axes.get_lines()), key=len)
+
+
+def test_time_history_draws_the_states_and_outputs() -> None:
+    solution = oscillator(3)
+    history = time_history(solution)
+    assert [axes.get_ylabel() for axes in history.quantities] == ["x [µm]", "v [mm/s]", "f [N]"]
+    assert history.modes.get_xlabel() == "t [ms]"
+    for i, axes in enumerate(history.quantities[:2]):
+        t, y = drawn(axes).T
+        assert y == pytest.approx(solution(t)[i], nan_ok=True)
+    assert {text.get_text() for text in history.modes.get_legend().get_texts()} == {"slip+", "slip-", "stick"}
+
+
+def test_long_runs_show_their_last_periods_and_say_so() -> None:
+    axes = time_history(oscillator(100)).quantities[0]
+    assert axes.get_xlim() == pytest.approx((96 * PERIOD, 100 * PERIOD))
+    assert axes.get_title(loc="left") == "Dry friction oscillator: last 4 of 100 periods"
+    assert len(drawn(axes)) < 10_000
+    whole = time_history(oscillator(100), t_span=(0, 1)).quantities[0]
+    assert whole.get_xlim() == (0, 1)
+    assert whole.get_title(loc="left") == "Dry friction oscillator"
+
+
+def test_a_jump_is_dashed_and_interrupts_the_curve() -> None:
+    solution = ball()
+    h, w = time_history(solution).quantities
+    jumps = [line for line in w.get_lines() if line.get_linestyle() == "--" and len(line.get_xdata()) > 2]
+    assert len(jumps) == 1
+    t, values = jumps[0].get_xydata().T
+    first = solution.events[0]
+    assert (t[0], t[1]) == (first.t, first.t)
+    assert (values[0], values[1]) == pytest.approx((first.x_minus[1], first.x_plus[1]))
+    assert np.isnan(drawn(w)).any() and not np.isnan(drawn(h)).any()
+
+
+def test_strips_show_the_modes_of_every_component() -> None:
+    solution = oscillator(2)
+    two = replace(solution, modes={**solution.modes, "g": (FakeInterval("stick", 0.0, solution.t_end),)})
+    strip = time_history(two, ["x"]).modes
+    assert [label.get_text() for label in strip.get_yticklabels()] == ["f", "g"]
+    first, second = (bars.get_paths() for bars in strip.collections)
+    assert len(first) == len(solution.modes["f"]) and len(second) == 1
+
+
+def test_monitors_are_marked() -> None:
+    solution = oscillator(2)
+    crossing = FakeEvent(0.4 * PERIOD, "crossing", "", "", "", kind="monitor")
+    axes = time_history(replace(solution, events=(*solution.events, crossing)), ["x"]).quantities[0]
+    marked = [line for line in axes.get_lines() if line.get_marker() == "v"]
+    assert [line.get_xdata()[0] for line in marked] == [crossing.t]
+
+
+def test_phase_portrait_sets_stick_apart() -> None:
+    axes = phase_portrait(oscillator(100))
+    dots = [line for line in axes.get_lines() if line.get_marker() == "o"]
+    assert len(dots) == 1 and dots[0].get_color() == "#222222"
+    assert np.all(dots[0].get_ydata() == 0)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [µm]", "v [mm/s]")
+
+
+def test_friction_loop_is_thick_in_stick_and_dashed_in_jumps() -> None:
+    axes = friction_loop(oscillator(100))
+    assert axes.get_ylabel() == "f [N]"
+    widths = {
+        round(float(c.get_linewidth()[0]), 1) for c in axes.collections if isinstance(c, LineCollection)
+    }
+    assert widths == {1.2, 3.0, 0.9}
+    assert [t.get_text() for t in axes.get_legend().get_texts()] == ["slip+", "slip-", "stick", "jump"]
+
+
+def test_axes_of_the_caller_are_used() -> None:
+    figure = Figure()
+    x, f, modes = figure.subplots(3)
+    history = time_history(oscillator(2), ["x", "f"], axes=[x, f, modes])
+    assert history.quantities == (x, f) and history.modes is modes
+    axes = Figure().subplots()
+    assert phase_portrait(ball(), axes=axes) is axes
+    assert friction_loop(oscillator(2), axes=axes) is axes
+
+
+def test_nothing_global_is_touched() -> None:
+    before = dict(matplotlib.rcParams)
+    time_history(oscillator(2))
+    phase_portrait(ball())
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize(
+    "draw, message",
+    [
+        (lambda: time_history(oscillator(2), ["y"]), "no state or output 'y'"),
+        (lambda: time_history(oscillator(2), ["x"], axes=[]), "0 axes"),
+        (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside of the run"),
+        (lambda: friction_loop(ball()), "no outputs"),
+        (lambda: phase_portrait(oscillator(2), "x", "w"), "no state or output 'w'"),
+        (lambda: save(phase_portrait(ball()), "picture.jpg"), "picture.jpg"),
+    ],
+)
+def test_what_cannot_be_drawn_says_why(draw, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        draw()
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_save(tmp_path, suffix: str) -> None:
+    path = save(time_history(oscillator(2)), tmp_path / f"run.{suffix}")
+    assert path.stat().st_size > 10_000
+    save(phase_portrait(ball()), path)
+    save(phase_portrait(ball()).figure, path)
