@@ -107,7 +107,7 @@ def _run(
     start = system.start_state(x0)
     tolerances = Tolerances(_rtol(rtol), _atol(model, atol, rtol, start), _step(max_step, "max_step"),
                             None if first_step is None else _step(first_step, "first_step"))  # fmt: skip
-    discrete = np.array([model.discrete_start_values()[d.name] for d in model.discrete], dtype=float)
+    discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
     grid = None if t_eval is None else _grid(t_eval, span)
     began = time.perf_counter()

@@ -83,7 +83,7 @@ class Locator:
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
-        states = flow.project(times, step.dense(times))
+        states = step.dense(times)
         exits, crossings, grazings = [], [], []
         guard_ends = np.ones_like(self.sides)
         if len(self.numbers):
@@ -117,6 +117,6 @@ class Locator:
 
         def sample(theta: np.ndarray) -> np.ndarray:
             times = step.s0 + width * theta
-            return function(times, self.flow.project(times, step.dense(times)))[:, column]
+            return function(times, step.dense(times))[:, column]
 
         return sample

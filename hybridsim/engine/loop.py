@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.segment import Arrival, SegmentRun
+from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Outcome, Settling, Situation
 from hybridsim.engine.stepping import Method, StepFailure, Watch
 from hybridsim.engine.system import System
@@ -88,22 +88,21 @@ class ModeLoop:
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
-        for seen in run.sightings:
-            self._occur(
-                self.origin.plus(seen.s), "monitor", self.system.monitor_names[seen.number], "", "", "",
-                seen.direction, seen.x, seen.x,
-            )  # fmt: skip
-        for g, s, distance in run.grazings:
-            c = int(self.system.owner[g])
-            automaton, mode = self.system.automata[c], int(run.flow.z[c])
-            name = automaton.guard_names[mode][automaton.guards[mode].index(g)]
-            x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
-            self._occur(
-                self.origin.plus(s), "near-grazing", automaton.name, name, automaton.modes[mode],
-                automaton.modes[mode], 0, x, x,
-            )  # fmt: skip
-            record.warn(f"near-grazing: {automaton.name}.{name} in mode {automaton.modes[mode]}")
-        record.occurrences.sort(key=lambda o: abs(o.instant.minus(Instant(self.task.t0))))
+        passed = [(seen.s, self._sighting(seen)) for seen in run.sightings]
+        passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in run.grazings]
+        record.occurrences += [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
+
+    def _sighting(self, seen: Sighting) -> Occurrence:
+        name = self.system.monitor_names[seen.number]
+        return Occurrence(self.origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x)
+
+    def _grazing(self, run: SegmentRun, guard: int, s: float, distance: float) -> Occurrence:
+        c = int(self.system.owner[guard])
+        automaton, number = self.system.automata[c], int(run.flow.z[c])
+        mode, name = automaton.modes[number], automaton.guard_names[number][automaton.guards[number].index(guard)]
+        x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
+        self.record.warn(f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero")
+        return Occurrence(self.origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)
 
     # -- events ---------------------------------------------------------------------------------------------
 

@@ -32,18 +32,15 @@ class Compiled:
         """Everything about the model that the functions do not say."""
         return self.module.DATA
 
-    def address(self, name: str) -> Any:
-        """Address of one of flow, project, guards, surfaces, monitors, quantities; compiled on first use."""
-        return self._address(name)
-
     @cached_property
     def _kept(self) -> dict[str, tuple[Any, Any]]:
         return {}
 
-    def _address(self, name: str) -> Any:
-        from hybridsim.engine.jit import compile_model_function
-
+    def address(self, name: str) -> Any:
+        """Address of one of flow, project, guards, surfaces, monitors, quantities; compiled on first use."""
         if name not in self._kept:
+            from hybridsim.engine.jit import compile_model_function
+
             self._kept[name] = compile_model_function(getattr(self.module, name))
         return self._kept[name][0]
 

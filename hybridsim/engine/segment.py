@@ -91,25 +91,21 @@ class SegmentRun:
                 step, arrival = self._examine(stepper, step)
             else:
                 arrival = self._take_roots(step)
-            x = arrival.x if arrival else self._projected(step)
             self.knots.append(step.s1)
-            self.states.append(x)
+            self.states.append(step.x1)
             self.interpolants.append(step.dense)
             if self.progress:
                 self.progress(self.origin.plus(step.s1))
             if arrival:
                 return arrival
             if step.s1 == bound:
-                return Arrival(step.s1, x)
+                return Arrival(step.s1, self._projected(step))
 
     def segment(self) -> Segment:
         """The finished piece of trajectory."""
-        knots = np.array(self.knots)
-        flow = self.flow
-        return Segment(
-            self.origin, flow.z, flow.p, knots, np.array(self.states).reshape(len(knots), -1),
-            Pieces(knots, tuple(self.interpolants)),
-        )  # fmt: skip
+        knots, flow = np.array(self.knots), self.flow
+        states = flow.project(knots, np.array(self.states).reshape(len(knots), -1))
+        return Segment(self.origin, flow.z, flow.p, knots, states, Pieces(knots, tuple(self.interpolants)))
 
     def _start(self, bound: float, first_step: float | None) -> Stepper:
         if self.system.n == 0:
@@ -230,10 +226,12 @@ class SegmentRun:
     # -- events that the method locates itself --------------------------------------------------------------
 
     def _take_roots(self, step: Step) -> Arrival | None:
+        if not step.roots:
+            return None
         x = self._projected(step)
-        fired = tuple(r.number for r in step.roots or () if not r.is_monitor and r.direction < 0)
+        fired = tuple(r.number for r in step.roots if not r.is_monitor and r.direction < 0)
         stopping = []
-        for root in step.roots or ():
+        for root in step.roots:
             if root.is_monitor:
                 self.locator.monitor_sides[root.number] = root.direction
                 if not self._wanted(root.number, root.direction):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from hybridsim.engine.rows import evaluate
+from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.system import System
 
 Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
@@ -87,20 +87,16 @@ class Flow:
     z: np.ndarray
     counters: Counters
     forward: bool = True
-    _address: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        self._address = self.system.address("flow")
-
-    @property
-    def n(self) -> int:
-        """Number of states."""
-        return self.system.n
+        system = self.system
+        self.n = system.n
+        self._flow, self._guards, self._monitors = (system.address(k) for k in ("flow", "guards", "monitors"))
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         """dx/dt in a fresh array; NaN where the model has no value."""
-        out = np.empty(self.system.n)
-        evaluate(self._address, float(s), x, self.p, self.z, out)
+        out = np.empty(self.n)
+        evaluate(self._flow, float(s), x, self.p, self.z, out)
         return out
 
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -109,13 +105,17 @@ class Flow:
         return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.pins else x
 
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Guard values (k, guards)."""
+        """Guard values (k, guards); held states are evaluated from their constraints on the way."""
         self.counters.guard_evaluations += len(s)
-        return self.system.rows("guards", self.system.guard_count, s, x, self.p, self.z)
+        out = np.empty((len(s), self.system.guard_count))
+        evaluate_rows(self._guards, s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out)
+        return out
 
     def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Monitor values (k, monitors)."""
-        return self.system.rows("monitors", len(self.system.monitor_names), s, x, self.p, self.z)
+        """Monitor values (k, monitors), likewise."""
+        out = np.empty((len(s), len(self.system.monitor_names)))
+        evaluate_rows(self._monitors, s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out)
+        return out
 
 
 class Stepper(Protocol):

@@ -92,7 +92,7 @@ class System:
         self._base = np.zeros(self.layout.size)
         self._base[: self.layout.parameters] = list(self._values.values())
         self._base[self.layout.pin_at] = 1.0
-        self._rates = self._plain("rates", self._base, data["rates"])
+        self.rates = self._plain("rates", self._base, data["rates"])
         self.signals = tuple(Signal(i, self._values) for i in model.inputs)
         self.owner = np.zeros(self.guard_count, dtype=np.int64)  # component of each guard
         for c, automaton in enumerate(self.automata):
@@ -114,7 +114,7 @@ class System:
         at = self.layout
         p[at.discrete_at : at.discrete_at + at.discrete] = discrete
         p[at.origin_at] = float(origin)
-        for k, rate in enumerate(self._rates):
+        for k, rate in enumerate(self.rates):
             p[at.phases_at + k] = phase(origin, float(rate), 0.0)
         for k, signal in enumerate(self.signals):
             place = at.signals_at + SIGNAL_SLOTS * k

@@ -15,8 +15,8 @@ ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "scipy_explicit:ScipyDOP853",
     "scipy_explicit:ScipyRK45",
-    # "sundials:CvodeAdams",
-    # "sundials:CvodeBDF",
+    "sundials:CvodeAdams",
+    "sundials:CvodeBDF",
     # "published:Rk4Dichotomy",
     # "published:Rk4Sign",
 )

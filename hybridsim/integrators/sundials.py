@@ -1,0 +1,180 @@
+"""CVODE of SUNDIALS through scikit-sundae, with its own root finding, restarted at every event."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hybridsim.engine.hermite import hermite
+from hybridsim.engine.stepping import Dense, Flow, Root, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.integrators.base import Integrator
+
+_MISSES = (
+    "CVODE compares the signs of a guard at both ends of a step and so misses two zeros within one step "
+    "(SUNDIALS, CVODE user guide, section on rootfinding)"
+)
+# More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
+_MAX_STEPS = 10_000_000
+
+
+class CvodeStepper:
+    """Steps CVODE through one segment.
+
+    CVODE's step control sees the states alone. While a mode holds them still, a step would grow over many periods of
+    a forcing that only the guards feel, and the sign test at its ends would see nothing. So the sine of every angle
+    that grows in time is integrated along: the error control then resolves the forcing in every mode.
+    """
+
+    def __init__(
+        self, method: str, flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances,
+        first_step: float | None, watch: Watch,
+    ) -> None:  # fmt: skip
+        from sksundae.cvode import CVODE
+
+        self.flow, self.bound, self.watch = flow, bound, watch
+        self.kinds = [(int(g), False) for g in watch.guards]
+        self.kinds += [(k, True) for k in range(len(watch.monitor_sides))]
+        options: dict[str, Any] = {}
+        if self.kinds:
+            options = {"eventsfn": self._events(x0), "num_events": len(self.kinds)}
+        at = flow.system.layout.phases_at
+        self.rates = np.asarray(flow.system.rates)
+        self.phases = flow.p[at : at + len(self.rates)]
+        atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
+        self.solver = CVODE(
+            self._rhs(), method=method, rtol=tolerances.rtol, atol=atol, first_step=first_step or 0.0,
+            max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step, max_num_steps=_MAX_STEPS, **options,
+        )  # fmt: skip
+        self.solver.init_step(0.0, np.concatenate([x0, np.sin(self.phases)]))
+        self.s, self.x = 0.0, x0
+
+    def _rhs(self) -> Callable[[float, np.ndarray, np.ndarray], None]:
+        flow, n, rates, phases = self.flow, self.flow.n, self.rates, self.phases
+
+        def rhs(s: float, x: np.ndarray, dx: np.ndarray) -> None:
+            flow.counters.rhs_evaluations += 1
+            dx[:n] = flow.rhs(s, np.ascontiguousarray(x[:n]))
+            dx[n:] = rates * np.cos(phases + rates * s)
+
+        return rhs
+
+    def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
+        """Interpolation made when it is first asked for: most steps never are."""
+        made: list[Dense] = []
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            if not made:
+                made.append(hermite(s0, s1, self._series(s0, x0), self._series(s1, x1)))
+            return made[0](s)
+
+        return dense
+
+    def _series(self, s: float, x: np.ndarray) -> np.ndarray:
+        zero = np.zeros(self.flow.n)
+        return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
+
+    def _events(self, x0: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], None]:
+        """The functions to watch; what is zero at the start by decree is divided by the power of s it begins with.
+
+        So no function starts at zero and none can fire again from the zero that ended the last segment.
+        """
+        flow, watch = self.flow, self.watch
+        zero = np.zeros(flow.n)
+        at_start = flow.system.series(0.0, x0, flow.p, flow.z, zero, 0.0)
+        leading, orders = [], []
+        for number, is_monitor in self.kinds:
+            side = (watch.monitor_sides if is_monitor else watch.sides)[number]
+            order = int((watch.monitor_orders if is_monitor else watch.orders)[number]) if side else 0
+            series = (at_start.monitors if is_monitor else at_start.guards)[number]
+            orders.append(order)
+            leading.append(side * abs(series[order]) if order else 0.0)
+        power, start = np.array(orders), np.array(leading)
+
+        def events(s: float, x: np.ndarray, out: np.ndarray) -> None:
+            time, state = np.array([s]), np.array(x[: flow.n], dtype=float)[None, :]
+            values = flow.guards(time, state)[0][watch.guards]
+            if len(watch.monitor_sides):
+                values = np.concatenate([values, flow.monitors(time, state)[0]])
+            if s == 0.0:
+                values = np.where(power > 0, start, values)
+            else:
+                values = values / abs(s) ** power
+            out[:] = values
+
+        events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]
+        return events
+
+    def step(self) -> Step:
+        """One internal step of CVODE, cut at a root or at the bound."""
+        result = self.solver.step(self.bound, method="onestep", tstop=self.bound)
+        if not result.success:
+            raise StepFailure(f"CVODE: {result.message}")
+        s0, x0 = self.s, self.x
+        s1, x1 = float(result.t), np.array(result.y[: self.flow.n], dtype=float)
+        if s1 == s0:
+            raise StepFailure("CVODE: no progress")
+        self.s, self.x = s1, x1
+        roots: tuple[Root, ...] = ()
+        if result.status == 2 and result.i_events is not None:  # noqa: PLR2004 - CV_ROOT_RETURN
+            signs = result.i_events[-1]
+            roots = tuple(
+                Root(number, int(sign), is_monitor)
+                for (number, is_monitor), sign in zip(self.kinds, signs, strict=True)
+                if sign
+            )
+        return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1), roots)
+
+    def restep(self, step: Step, s: float) -> Step:
+        """Not needed: the step ends at the root."""
+        raise NotImplementedError("CVODE ends its step at a root")
+
+
+@dataclass(frozen=True)
+class CvodeBDF(Integrator):
+    """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
+
+    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. At events: CVODE's own
+    root finding, then a fresh start of order 1; dense output is the two-point Hermite polynomial of degree 7.
+    """
+
+    name: ClassVar[str] = "cvode-bdf"
+    title: ClassVar[str] = "SUNDIALS CVODE, BDF, with its own root finding"
+    order: ClassVar[str] = "1 to 5"
+    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
+    when: ClassVar[str] = "stiff modes"
+    lacks: ClassVar[dict[str, str]] = {"multiple-roots": _MISSES}
+    dense_is_accurate: ClassVar[bool] = True
+
+    def start(
+        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, watch)
+
+
+@dataclass(frozen=True)
+class CvodeAdams(Integrator):
+    """Adams-Moulton formulas of orders 1 to 12, variable step.
+
+    When to choose it: long smooth stretches between events at tight tolerances. At events as `cvode-bdf`.
+    """
+
+    name: ClassVar[str] = "cvode-adams"
+    title: ClassVar[str] = "SUNDIALS CVODE, Adams, with its own root finding"
+    order: ClassVar[str] = "1 to 12"
+    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
+    when: ClassVar[str] = "long smooth stretches, not stiff"
+    lacks: ClassVar[dict[str, str]] = {
+        "multiple-roots": _MISSES,
+        "stiff": "functional order drops with the step: use cvode-bdf",
+    }
+    dense_is_accurate: ClassVar[bool] = True
+
+    def start(
+        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, watch)
