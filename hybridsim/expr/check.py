@@ -187,14 +187,8 @@ class _Checker:
         return self.every(self.number, node.args)
 
 
-def check_tree(
-    tree: ast.expr, text: str, place: Place, max_depth: int, max_nodes: int, *, columns: bool = True
-) -> frozenset[str]:
-    """Refuse a tree that is not whitelisted, too deep or too large; returns the names it depends on.
-
-    ``columns`` says whether the nodes' columns are offsets into ``text`` (they are not after a substitution).
-    """
-    checker = _Checker(text, place, columns)
+def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_nodes: int) -> None:
+    """Refuse a tree that is too deep or too large, before anything walks it; ``expr`` is what to show."""
     level: list[ast.AST] = [tree]
     depth = nodes = 0
     while level:
@@ -203,7 +197,7 @@ def check_tree(
             what = "nested too deeply" if depth > max_depth else "too large"
             raise ExpressionError(
                 f"the expression is {what} ({max_depth} levels and {max_nodes} parts are allowed)",
-                place=place.at(text),
+                place=place.at(expr),
                 remedy="name parts of it in [definitions], or group a long sum: (a + b + ...) + (c + ...).",
             )
         level = [
@@ -212,6 +206,14 @@ def check_tree(
             for child in ast.iter_child_nodes(node)
             if isinstance(child, (ast.expr, ast.keyword, ast.comprehension))
         ]
+
+
+def check_tree(tree: ast.expr, text: str, place: Place, *, columns: bool = True) -> frozenset[str]:
+    """Refuse a tree that is not whitelisted; returns the names it depends on.
+
+    ``columns`` says whether the nodes' columns are offsets into ``text`` (they are not after a substitution).
+    """
+    checker = _Checker(text, place, columns)
     checker.any(tree)
     return frozenset(checker.names)
 

@@ -12,7 +12,7 @@ from numbers import Integral, Real
 from typing import SupportsFloat
 
 from hybridsim.errors import ExpressionError, Place, nearest
-from hybridsim.expr.check import check_tree
+from hybridsim.expr.check import check_size, check_tree
 from hybridsim.expr.grammar import (
     CONSTANTS,
     FUNCTIONS,
@@ -111,7 +111,8 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
             # Python warns of odd spellings such as `1if x else 2`; that is no news to the user of a model.
             warnings.simplefilter("ignore")
             tree = ast.parse(text, mode="eval").body
-        names = check_tree(tree, text, where, MAX_DEPTH, MAX_LENGTH)
+        check_size(tree, text, where, MAX_DEPTH, MAX_LENGTH)
+        names = check_tree(tree, text, where)
     except (SyntaxError, ValueError) as fault:
         column = getattr(fault, "offset", None)
         column = None if column is None else min(max(column - 1, 0), len(text))
@@ -156,8 +157,9 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
     where = expr.place or Place()
     try:
         tree = _replaced(expr.tree, parts)
+        check_size(tree, expr.text, where, MAX_DERIVED_DEPTH, MAX_DERIVED_NODES)
         text = write(tree)
-        names = check_tree(tree, text, where, MAX_DERIVED_DEPTH, MAX_DERIVED_NODES, columns=False)
+        names = check_tree(tree, text, where, columns=False)
     except RecursionError:
         raise expr.error(
             f"'{_short(expr.text)}' is nested too deeply once its names are put in", remedy="simplify it."

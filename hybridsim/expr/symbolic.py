@@ -109,7 +109,7 @@ def _binary(op: ast.operator, left: Any, right: Any) -> Any:
             return left * right
         case ast.Div():
             return left / right
-    if right.is_Float and right == int(right):
+    if right.is_Float and float(right).is_integer():
         right = sympy.Integer(int(right))  # x**2.0 differentiates like x**2
     if left.is_Rational and right.is_Rational and not (left.is_Integer and right.is_Integer and right >= 0):
         # Exact powers of fractions can be made to grow without bound; a double cannot.

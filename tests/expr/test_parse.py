@@ -1,0 +1,247 @@
+"""What is an expression and what is not, and what is said about the latter."""
+
+from __future__ import annotations
+
+import ast
+import math
+import pickle
+import sys
+
+import pytest
+from expr.strategies import expressions, scraps
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybridsim.errors import ExpressionError, Place
+from hybridsim.expr import Expression, parse, require_names
+from hybridsim.expr.grammar import FUNCTIONS
+
+ALLOWED_NODES = (
+    ast.Constant, ast.Name, ast.UnaryOp, ast.BinOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Call, ast.Load,
+    ast.operator, ast.unaryop, ast.boolop, ast.cmpop,
+)  # fmt: skip
+
+# text -> what the message must hold
+REFUSED = {
+    "": "empty",
+    "   ": "empty",
+    "x.y": "attributes",
+    "x.__class__.__mro__": "attributes",
+    "().__class__": "attributes",
+    "(1).real": "attributes",
+    "__import__(x)": "__import__",
+    "eval(x)": "'eval'",
+    "open(x)": "'open'",
+    "x(1)": "'x'",
+    "sin(x)(1)": "by their names",
+    "(sin if x > 0 else cos)(x)": "by their names",
+    "'text'": "'",
+    'f"{x}"': "character",
+    "x[0]": "[",
+    "[x]": "[",
+    "{x}": "{",
+    "(x, y)": "tuple",
+    "x, y": "tuple",
+    "(lambda: x)": ":",
+    "lambda x: x": ":",
+    "(y := x)": ":",
+    "x = 1": "not an expression",
+    "x; y": ";",
+    "x # y": "#",
+    "[y for y in x]": "[",
+    "(y for y in x)": "generator",
+    "min(y for y in x)": "2 or more",
+    "min(*x)": "unpacking",
+    "sin(**x)": "named",
+    "sin(x=1)": "named",
+    "sin()": "1 argument",
+    "sin(x, y)": "1 argument, 2 given",
+    "min(x)": "2 or more",
+    "atan2(x)": "2 arguments",
+    "sin": "function",
+    "sin + 1": "function",
+    "x^2": "**",
+    "x % 2": "remainder",
+    "x // 2": "not allowed",
+    "x @ y": "@",
+    "x & y": "and",
+    "x | y": "or",
+    "~x": "not",
+    "x in y": "not allowed",
+    "x is y": "not allowed",
+    "None": "NoneType",
+    "...": "ellipsis",
+    "1j": "complex",
+    "1e999": "too large",
+    "-1e999": "too large",
+    "9" * 400: "too large",
+    "9007199254740993": "too large to be exact",
+    "9**9**9": "out of bounds",
+    "x**1000": "out of bounds",
+    "x**-1000": "out of bounds",
+    "x**(2**40)": "out of bounds",
+    "(10.0**60)**60": "no finite real value",
+    "((0.1**60)**60)": "too small",
+    "1/0": "division by zero",
+    "x + 1/(2 - 2)": "division by zero",
+    "sqrt(-1)": "not defined at (-1)",
+    "(-8)**(1/3)": "not defined",
+    "log(0)": "not defined",
+    "exp(1000)": "too large",
+    "sin(x > 0)": "number is needed",
+    "(x > 0) + 1": "number is needed",
+    "x and y": "condition is needed",
+    "not x": "condition is needed",
+    "1 if x else 2": "condition is needed",
+    "x > 0 if y > 0 else 1": "one branch",
+    "(x > 0) > 0": "number is needed",
+    "__x": "two underscores",
+    "ω*t": "Greek is spelled",
+    "x\0y": "U+0000",
+    "x y": "not an expression",
+    "x +": "not an expression",
+    "(x": "not an expression",
+    "007": "not an expression",
+    "yield x": "not an expression",
+    "await x": "await",
+    "x" * 2001: "2001 characters",
+    "(" * 150 + "x" + ")" * 150 + "+(" * 60: "",
+    "-" * 1500 + "x": "nested",
+    "+".join("x" * 500): "nested",
+    "sin(" * 100 + "x" + ")" * 100: "nested",
+    "(" * 900 + "x" + ")" * 900: "nested",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda text: ascii(text[:25]))
+def test_refused_with_place_and_remedy(text: str) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse(text, Place("scene.toml", 7))
+    error = caught.value
+    assert REFUSED[text] in f"{error.message} {error.remedy}"
+    assert error.remedy
+    assert str(error).startswith("scene.toml:7: ")
+    assert error.exit_code == 3
+    assert len(str(error)) < 600
+
+
+@pytest.mark.parametrize(
+    "value", [math.nan, math.inf, -math.inf, 10**400, None, [1], {"a": 1}, b"x", object(), 1j], ids=repr
+)
+def test_values_that_are_no_expressions(value: object) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse(value)  # type: ignore[arg-type]
+    assert caught.value.remedy
+
+
+@given(st.one_of(scraps, st.text(max_size=60), expressions.map(lambda text: text.replace("(", "", 1))))
+def test_any_text_is_an_expression_or_an_expression_error(text: str) -> None:
+    try:
+        expr = parse(text)
+    except ExpressionError as error:
+        assert error.remedy and str(error)
+    else:
+        assert all(isinstance(node, ALLOWED_NODES) for node in ast.walk(expr.tree))
+        called = {node.func.id for node in ast.walk(expr.tree) if isinstance(node, ast.Call)}
+        assert called <= FUNCTIONS.keys()
+
+
+def test_deep_nesting_is_refused_whatever_the_depth_of_the_stack() -> None:
+    """The parser and the walk may run out of stack; that is an error of the expression like any other."""
+
+    def at_depth(levels: int) -> None:
+        if levels:
+            return at_depth(levels - 1)
+        with pytest.raises(ExpressionError, match="nested"):
+            parse("sin(" * 70 + "x" + ")" * 70)
+
+    room = 120  # frames left: enough to fail in an orderly way, too few to walk 70 levels
+    used = len(_stack())
+    at_depth(sys.getrecursionlimit() - used - room)
+
+
+def _stack() -> list[object]:
+    frames = []
+    frame = sys._getframe()
+    while frame is not None:
+        frames.append(frame)
+        frame = frame.f_back  # type: ignore[assignment]
+    return frames
+
+
+@pytest.mark.parametrize("blank", ["\n", "\t", "\r\n", "   "])
+def test_an_expression_may_run_over_lines(blank: str) -> None:
+    assert parse(f"a +{blank}b").names == {"a", "b"}
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(3, "3"), (-3, "-3"), (0.1, "0.1"), (1e5, "100000.0"), (True, "True"), (2**60, repr(float(2**60)))],
+)
+def test_numbers_are_expressions(value: float, text: str) -> None:
+    assert parse(value).text == text
+    assert parse(value).is_constant
+
+
+def test_names_are_what_it_depends_on() -> None:
+    expr = parse("a*sin(omega*t) + pi - min(b, 2)")
+    assert expr.names == {"a", "omega", "t", "b"}
+
+
+@pytest.mark.parametrize(
+    ("text", "boolean"),
+    [
+        ("x > 0", True),
+        ("not (x > 0)", True),
+        ("x > 0 and a < b or b == 2", True),
+        ("True", True),
+        ("x > 0 if a > 0 else a < 3", True),
+        ("x if a > 0 else 3", False),
+        ("-x", False),
+        ("max(x, 0)", False),
+    ],
+)
+def test_conditions_are_told_from_numbers(text: str, boolean: bool) -> None:
+    assert parse(text).is_boolean is boolean
+
+
+def test_equal_by_text_wherever_written() -> None:
+    here, there = parse("k*x", Place("a.toml", 1)), parse("  k*x ", Place("b.toml", 2))
+    assert here == there and hash(here) == hash(there)
+    assert here != parse("x*k")
+    assert parse(here) is here
+    assert pickle.loads(pickle.dumps(here)) == here
+
+
+def test_unknown_name_points_at_it_and_suggests() -> None:
+    expr = parse("F0*sin(omga*t)", Place("dfcs.toml", 20))
+    with pytest.raises(ExpressionError) as caught:
+        require_names(expr, {"F0", "omega", "t"})
+    assert str(caught.value).splitlines() == [
+        "dfcs.toml:20: unknown name 'omga'",
+        "    F0*sin(omga*t)",
+        "           ^",
+        "did you mean 'omega'?",
+    ]
+    require_names(expr, {"F0", "omga", "t", "more"})
+
+
+def test_a_long_line_is_cut_around_the_caret() -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse("a * " * 30 + "b.c" + " * d" * 30, Place("m.toml", 1))
+    _, shown, caret, _ = str(caught.value).splitlines()
+    assert len(shown) < 120
+    assert shown[caret.index("^")] == "b"
+
+
+def test_a_file_cannot_steer_the_terminal() -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse("x\x1b[2J\x9b31m")
+    assert str(caught.value).replace("\n", "").isprintable()
+
+
+def test_an_expression_is_frozen() -> None:
+    expr = parse("x")
+    with pytest.raises(AttributeError):
+        expr.text = "y"  # type: ignore[misc]
+    assert isinstance(expr, Expression)
