@@ -73,8 +73,12 @@ class Outcome:
 class Settling:
     """One event being settled."""
 
-    def __init__(self, system: System, at: Situation, before: np.ndarray, forward: bool) -> None:
+    def __init__(
+        self, system: System, at: Situation, before: np.ndarray, forward: bool, scope: Iterable[int] | None = None
+    ) -> None:
         self.system = system
+        # the components that are decided here; a method with rules of its own for surfaces leaves those out
+        self.scope = set(range(len(system.automata))) if scope is None else set(scope)
         self.at = at
         self.before = before  # modes before the event, -1 for what has none yet
         self.forward = forward
@@ -100,7 +104,7 @@ class Settling:
         if failure:
             return self._stop(*failure)
         open_ &= surfaces
-        if self.jumped or (self.at.z < 0).any():
+        if surfaces and (self.jumped or (self.at.z < 0).any()):
             open_ |= self._take_sides()
         limit = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in self.system.automata))
         for _ in range(limit):
@@ -121,7 +125,7 @@ class Settling:
             if failure:
                 return self._stop(*failure)
             open_ = leaving & surfaces
-            if self.jumped:
+            if surfaces and self.jumped:
                 open_ |= self._take_sides()
         names = ", ".join(f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True))
         guards = ", ".join(sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]}))
@@ -150,7 +154,7 @@ class Settling:
         return found
 
     def _surface_components(self) -> set[int]:
-        return {c for c, a in enumerate(self.system.automata) if a.has_surface}
+        return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
 
     def _fired_guards(self) -> list[tuple[int, int, int]]:
         """(component, index in its mode, number) of the located guards."""
@@ -175,10 +179,7 @@ class Settling:
 
     def _judge_all(self) -> dict[int, int]:
         decreed = self._decreed(self.at.z, self._continuous(self.at.z, range(len(self.system.automata))))
-        return {
-            c: self._judge(self.at.z, self.at.x, decreed, [c])
-            for c in range(len(self.system.automata))
-        }  # fmt: skip
+        return {c: self._judge(self.at.z, self.at.x, decreed, [c]) for c in sorted(self.scope)}
 
     def _note_undecided(self, component: int) -> None:
         automaton = self.system.automata[component]

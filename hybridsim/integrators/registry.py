@@ -17,8 +17,8 @@ _OURS = (
     "scipy_explicit:ScipyRK45",
     "sundials:CvodeAdams",
     "sundials:CvodeBDF",
-    # "published:Rk4Dichotomy",
-    # "published:Rk4Sign",
+    "published:Rk4Dichotomy",
+    "published:Rk4Sign",
 )
 
 
