@@ -1,0 +1,124 @@
+"""Runs a scene with one setting of an integrator and measures it against the truth."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import hybridsim as hs
+from conformance.scene import END, Scene
+
+SCENES = Path(__file__).with_name("scenes")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Errors of one run, relative (see `Scene`), and what was wrong beyond them."""
+
+    wrong: tuple[str, ...]
+    time_error: float
+    state_error: float
+
+
+def label(event: Any) -> str:
+    """component:mode for a transition, else the name of the monitor or schedule."""
+    return f"{event.component}:{event.target}" if event.kind == "transition" else event.component
+
+
+def load(scene: Scene) -> Any:
+    """The scene's model."""
+    path = SCENES / f"{scene.file}.toml"
+    return hs.load(str(path) if path.exists() else scene.file)
+
+
+def run(scene: Scene, integrator: str, **settings: Any) -> Any:
+    """Simulate the scene."""
+    return hs.simulate(
+        load(scene),
+        scene.span,
+        params=dict(scene.params),
+        x0=dict(scene.start),
+        integrator=integrator,
+        **{**scene.options, **settings},
+    )
+
+
+def measure(scene: Scene, solution: Any, lacks: Mapping[str, str]) -> Measured:
+    """Hold a solution against the truth; checks of what the integrator lacks are left out."""
+    wrong = ending(scene, solution)
+    time_error = state_error = 0.0
+    if not wrong and scene.truth.events is not None:
+        wrong, time_error = compare_events(scene, solution)
+    if not wrong:
+        state_error = compare_states(scene, solution)
+    for capability, check in scene.truth.checks:
+        if capability not in lacks:
+            wrong += check(solution)
+    return Measured(tuple(wrong), time_error, state_error)
+
+
+def ending(scene: Scene, solution: Any) -> list[str]:
+    """How and when the run ended."""
+    truth, wrong = scene.truth, []
+    if truth.status is not None and solution.status != truth.status:
+        wrong.append(f"ended as {solution.status!r}, not {truth.status!r}: {solution.message}")
+    if solution.status not in ("finished", "terminated") and not solution.message:
+        wrong.append(f"ended as {solution.status!r} without a word")
+    end = scene.span[1] if truth.end is None and truth.status == "finished" else truth.end
+    if end is not None and not wrong and abs(solution.t_end - end) > 1e-3 * scene.unit:
+        wrong.append(f"ended at t = {solution.t_end!r}, not {end!r}")
+    return wrong
+
+
+def counted(scene: Scene, solution: Any) -> list[tuple[float, str]]:
+    """The events that the truth speaks of."""
+    kinds = ("transition", "monitor", "scheduled") if scene.count_scheduled else ("transition", "monitor")
+    first, last = scene.span
+    return [
+        (event.t, label(event))
+        for event in solution.events
+        if event.kind in kinds
+        and (scene.start_is_event or event.t != first)
+        and (scene.end_margin == 0.0 or abs(event.t - last) > scene.end_margin)
+    ]
+
+
+def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
+    """Same events in the same order (within one instant in any order), and the largest error of their times."""
+    found, expected = counted(scene, solution), list(scene.truth.events or ())
+    position, error = 0, 0.0
+    for t, group in groupby(expected, key=lambda event: event[0]):
+        names = [name for _, name in group]
+        here = found[position : position + len(names)]
+        if Counter(names) != Counter(name for _, name in here):
+            seen = ", ".join(f"{name} at {at!r}" for at, name in here) or "nothing"
+            total = f"{len(found)} events found, {len(expected)} expected"
+            return [f"event {position}: {' and '.join(names)} expected at {t!r}, found {seen}; {total}"], 0.0
+        error = max(error, *(abs(at - t) / scene.unit for at, _ in here))
+        position += len(names)
+    if position < len(found):
+        extra = ", ".join(f"{name} at {t!r}" for t, name in found[position : position + 3])
+        return [f"{len(found) - position} events too many after {position}, first {extra}"], 0.0
+    return [], error
+
+
+def compare_states(scene: Scene, solution: Any) -> float:
+    """Largest error of a state, relative to the largest true value of that state in the scene."""
+    rows = scene.truth.states
+    if not rows:
+        return 0.0
+    largest = [
+        max((abs(value) for value in column if value is not None), default=1.0)
+        for column in zip(*(values for _, values in rows), strict=True)
+    ]
+    error = 0.0
+    for t, values in rows:
+        found = solution(solution.t_end if t == END else t)
+        for got, value, size in zip(found, values, largest, strict=True):
+            if value is not None:
+                error = max(error, abs(got - value) / (size or 1.0))
+    return float(error)

@@ -1,0 +1,89 @@
+"""What a conformance scene is: a model, a run, and the truth about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+VOCABULARY = (
+    "contacts",
+    "transitions",
+    "monitors",
+    "scheduled",
+    "multiple-roots",
+    "exact-stick",
+    "backward",
+    "stiff",
+    "adaptive",
+)
+TOLERANCES = (1e-6, 1e-9, 1e-12)
+
+END = math.inf  # as the time of a state: where the run ends
+
+Check = Callable[[Any], list[str]]  # a solution -> what is wrong with it
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What must come out.
+
+    Parameters
+    ----------
+    events : (t, label) of every event, in order; labels as in `judge.label`. None: not compared.
+    states : (t, values in the order of the states), right-continuous; END for the time where the run ends,
+        None for a value not compared.
+    status, end : how and when the run ends; status None: the checks decide.
+    checks : functions of the solution that return sentences about what is wrong, each with the capability it is
+        about ("" for every integrator).
+    """
+
+    events: tuple[tuple[float, str], ...] | None = ()
+    states: tuple[tuple[float, tuple[float | None, ...]], ...] = ()
+    status: str | None = "finished"
+    end: float | None = None
+    checks: tuple[tuple[str, Check], ...] = ()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A model file of scenes/ (or the name of a packaged model), a run of it, and the truth.
+
+    Parameters
+    ----------
+    needs : capabilities without which the scene cannot be run.
+    unit : a time that is long for this motion, such as its period: errors of time are relative to it, and a
+        fixed-step method divides it.
+    tol_t, tol_x : errors allowed at the tightest tolerance: of event times in units of `unit`, of states in
+        units of their largest true value.
+    floor : error below which no improvement is asked for (digits of the truth, conditioning of the scene).
+    count_scheduled : whether scheduled events are among the expected ones.
+    start_is_event : whether an event at t0 itself counts; with a contact the engine only finds its mode there.
+    end_margin : events this close to the end of the run are not counted (the motion ends on an event).
+    speed : a speed that is fast for this motion, for methods with a zero-velocity interval.
+    tolerances : rtol from loose to tight.
+    """
+
+    name: str
+    file: str
+    span: tuple[float, float]
+    truth: Truth
+    needs: frozenset[str] = frozenset()
+    params: Mapping[str, Any] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    unit: float = 1.0
+    tol_t: float = 1e-8
+    tol_x: float = 1e-8
+    floor: float = 1e-11
+    count_scheduled: bool = False
+    start_is_event: bool = True
+    end_margin: float = 0.0
+    speed: float = 1.0
+    tolerances: tuple[float, ...] = TOLERANCES
+
+    def __post_init__(self) -> None:
+        unknown = set(self.needs) - set(VOCABULARY)
+        if unknown:
+            raise ValueError(f"scene {self.name} needs {sorted(unknown)}, which is not in the vocabulary")
