@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 # The smallest rtol that means anything: a hundred units in the last place, as SciPy has it.
 SMALLEST_RTOL = 100 * 2.0**-52
-_COMPILED = ("flow", "project", "guards", "surfaces", "monitors", "quantities")
 
 
 def simulate(
@@ -87,26 +86,53 @@ def simulate(
     method = make_integrator("scipy-dop853" if integrator == "auto" else integrator, options)
     began = time.perf_counter()
     system = System(model)
-    for name in _COMPILED:
+    for name in system.hot_functions():
         system.address(name)
     compile_time = time.perf_counter() - began
     _refuse_lacking(method, model, system, span)
-    return _run(model, system, method, span, x0_states, _modes(system, z0), progress, compile_time, t_eval,
-                rtol, atol, max_step, first_step)  # fmt: skip
+    return _run(
+        model,
+        system,
+        method,
+        span,
+        x0_states,
+        _modes(system, z0),
+        progress,
+        compile_time,
+        t_eval,
+        rtol,
+        atol,
+        max_step,
+        first_step,
+    )
 
 
 def _run(
-    model: Model, system: System, method: Integrator, span: tuple[float, float], x0: Mapping[str, float],
-    z0: np.ndarray, progress: Callable[[float], None] | None, compile_time: float, t_eval: Sequence[float] | None,
-    rtol: float, atol: Any, max_step: float, first_step: float | None,
-) -> Solution:  # fmt: skip
+    model: Model,
+    system: System,
+    method: Integrator,
+    span: tuple[float, float],
+    x0: Mapping[str, float],
+    z0: np.ndarray,
+    progress: Callable[[float], None] | None,
+    compile_time: float,
+    t_eval: Sequence[float] | None,
+    rtol: float,
+    atol: Any,
+    max_step: float,
+    first_step: float | None,
+) -> Solution:
     from hybridsim.engine.stepping import Tolerances
     from hybridsim.engine.trajectory import Task
     from hybridsim.solution import Solution
 
     start = system.start_state(x0)
-    tolerances = Tolerances(_rtol(rtol), _atol(model, atol, rtol, start), _step(max_step, "max_step"),
-                            None if first_step is None else _step(first_step, "first_step"))  # fmt: skip
+    tolerances = Tolerances(
+        _rtol(rtol),
+        _atol(model, atol, rtol, start),
+        _step(max_step, "max_step"),
+        None if first_step is None else _step(first_step, "first_step"),
+    )
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
     grid = None if t_eval is None else _grid(t_eval, span)
@@ -131,12 +157,16 @@ def _start(model: Model, x0: Mapping[str, float] | Sequence[float] | None) -> tu
     discrete = [d.name for d in model.discrete]
     for name, value in x0.items():
         if name not in names + discrete:
-            raise UsageError(f"x0 names {name!r}, which is no state of model {model.name}",
-                             remedy=nearest(name, names + discrete, kind="states"))  # fmt: skip
+            raise UsageError(
+                f"x0 names {name!r}, which is no state of model {model.name}",
+                remedy=nearest(name, names + discrete, kind="states"),
+            )
         if not math.isfinite(float(value)):
             raise UsageError(f"x0 of {name} is {value!r}", remedy="give a finite number")
     changed = {n: v for n, v in x0.items() if n in discrete}
-    return {n: float(v) for n, v in x0.items() if n in names}, model.with_start(**changed) if changed else model
+    return {n: float(v) for n, v in x0.items() if n in names}, model.with_start(
+        **changed
+    ) if changed else model
 
 
 def _span(t_span: tuple[float, float]) -> tuple[float, float]:
@@ -145,7 +175,9 @@ def _span(t_span: tuple[float, float]) -> tuple[float, float]:
     except (TypeError, ValueError):
         raise UsageError(f"t_span is {t_span!r}", remedy="give two numbers, (t0, t1)") from None
     if not (math.isfinite(t0) and math.isfinite(t1)):
-        raise UsageError(f"t_span is {t_span!r}", remedy="give two finite numbers; a monitor can end a run early")
+        raise UsageError(
+            f"t_span is {t_span!r}", remedy="give two finite numbers; a monitor can end a run early"
+        )
     return t0, t1
 
 
@@ -170,13 +202,21 @@ def _atol(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray
     if isinstance(atol, Mapping):
         for name, value in atol.items():
             if name not in names:
-                raise UsageError(f"atol names {name!r}, which is no state of model {model.name}",
-                                 remedy=nearest(name, names, kind="states"))  # fmt: skip
+                raise UsageError(
+                    f"atol names {name!r}, which is no state of model {model.name}",
+                    remedy=nearest(name, names, kind="states"),
+                )
             default[names.index(name)] = value
         atol = default
-    values = np.broadcast_to(np.asarray(atol, dtype=float), default.shape) if np.ndim(atol) == 0 else np.array(atol)
+    values = (
+        np.broadcast_to(np.asarray(atol, dtype=float), default.shape)
+        if np.ndim(atol) == 0
+        else np.array(atol)
+    )
     if values.shape != default.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(f"atol is {atol!r}", remedy=f"give a number >= 0, or one for each of {', '.join(names)}")
+        raise UsageError(
+            f"atol is {atol!r}", remedy=f"give a number >= 0, or one for each of {', '.join(names)}"
+        )
     return values.astype(float)
 
 
@@ -185,12 +225,16 @@ def _modes(system: System, z0: Mapping[str, str] | None) -> np.ndarray:
     for name, mode in (z0 or {}).items():
         components = [a.name for a in system.automata]
         if name not in components:
-            raise UsageError(f"z0 names {name!r}, which is no component of model {system.model.name}",
-                             remedy=nearest(name, components, kind="components"))  # fmt: skip
+            raise UsageError(
+                f"z0 names {name!r}, which is no component of model {system.model.name}",
+                remedy=nearest(name, components, kind="components"),
+            )
         automaton = system.automata[components.index(name)]
         if mode not in automaton.modes:
-            raise UsageError(f"z0 of {name} is {mode!r}, which is no mode of it",
-                             remedy=nearest(mode, automaton.modes, kind="modes"))  # fmt: skip
+            raise UsageError(
+                f"z0 of {name} is {mode!r}, which is no mode of it",
+                remedy=nearest(mode, automaton.modes, kind="modes"),
+            )
         z[components.index(name)] = automaton.modes.index(mode)
     return z
 
@@ -198,7 +242,11 @@ def _modes(system: System, z0: Mapping[str, str] | None) -> np.ndarray:
 def _grid(t_eval: Sequence[float], span: tuple[float, float]) -> np.ndarray:
     grid = np.asarray(t_eval, dtype=float)
     low, high = min(span), max(span)
-    if grid.ndim != 1 or not np.isfinite(grid).all() or (len(grid) and (grid.min() < low or grid.max() > high)):
+    if (
+        grid.ndim != 1
+        or not np.isfinite(grid).all()
+        or (len(grid) and (grid.min() < low or grid.max() > high))
+    ):
         raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
     return grid
 

@@ -70,9 +70,15 @@ class Solution:
     """
 
     def __init__(
-        self, model: Model, system: System, trajectory: Trajectory, integrator: str, wall_time: float,
-        compile_time: float, grid: np.ndarray | None,
-    ) -> None:  # fmt: skip
+        self,
+        model: Model,
+        system: System,
+        trajectory: Trajectory,
+        integrator: str,
+        wall_time: float,
+        compile_time: float,
+        grid: np.ndarray | None,
+    ) -> None:
         self.model = model
         self.integrator = integrator
         self._system = system
@@ -142,8 +148,10 @@ class Solution:
         known = (*self._system.names, *(q for q in self._system.quantities if " in " not in q))
         known = (*known, *(d.name for d in self.model.discrete))
         if name not in known:
-            raise UsageError(f"model {self.model.name} has no quantity {name!r}",
-                             remedy=nearest(name, known, kind="quantities"))  # fmt: skip
+            raise UsageError(
+                f"model {self.model.name} has no quantity {name!r}",
+                remedy=nearest(name, known, kind="quantities"),
+            )
         if t is None and self._grid is None:
             parts = [self._quantity(name, g, g.s, g.x) for g in self._segments]
             return np.concatenate(parts) if parts else np.zeros(0)
@@ -161,7 +169,9 @@ class Solution:
         discrete = [d.name for d in self.model.discrete]
         if name in discrete:
             return np.full(len(s), segment.p[system.layout.discrete_at + discrete.index(name)])
-        values = system.rows("quantities", len(system.quantities), s, np.ascontiguousarray(x), segment.p, segment.z)
+        values = system.rows(
+            "quantities", len(system.quantities), s, np.ascontiguousarray(x), segment.p, segment.z
+        )
         chosen = name
         for c, automaton in enumerate(system.automata):
             special = f"{name} in {automaton.name}.{automaton.modes[segment.z[c]]}"
@@ -211,7 +221,17 @@ class Solution:
     def events(self) -> tuple[Event, ...]:
         """All events in order of time: transitions, monitors, scheduled events, near-grazings."""
         return tuple(
-            Event(float(o.instant), o.kind, o.component, o.guard, o.source, o.target, o.direction, o.x_minus, o.x_plus)
+            Event(
+                float(o.instant),
+                o.kind,
+                o.component,
+                o.guard,
+                o.source,
+                o.target,
+                o.direction,
+                o.x_minus,
+                o.x_plus,
+            )
             for o in self._trajectory.occurrences
         )
 
@@ -282,8 +302,10 @@ class Solution:
     @property
     def y_events(self) -> list[np.ndarray]:
         """States (events, n) of each monitor, under SciPy's name."""
-        found = [[e.x_minus for e in self.events if e.component == m.name and e.kind == "monitor"]
-                 for m in self.model.monitors]  # fmt: skip
+        found = [
+            [e.x_minus for e in self.events if e.component == m.name and e.kind == "monitor"]
+            for m in self.model.monitors
+        ]
         return [np.array(rows).reshape(-1, self._system.n) for rows in found]
 
     # -- files ----------------------------------------------------------------------------------------------
@@ -317,7 +339,9 @@ class Solution:
             f"  {self.message}",
         ]
         if self._segments:
-            final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(self.names, self._segments[-1].x[-1], strict=True))
+            final = ", ".join(
+                f"{n} = {v:.9g}" for n, v in zip(self.names, self._segments[-1].x[-1], strict=True)
+            )
             lines += [f"  t from {self.t_start:.9g} to {self.t_end:.9g}; at the end {final}"]
         stats = self.stats
         lines += [

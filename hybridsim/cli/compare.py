@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.output import Written, require_folder
+from hybridsim.cli.progress import Progress
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Comparison
@@ -32,7 +33,16 @@ def add_to(commands: Any) -> None:
         type=values.positives,
         help="relative tolerances of the adaptive integrators",
     )
-    parser.add_argument("--repeat", metavar="N", type=values.count, help="timed repetitions of every run")
+    parser.add_argument(
+        "--steps", metavar="N,N", type=values.counts, help="steps a period of the fixed-step integrators"
+    )
+    parser.add_argument(
+        "--repeat",
+        metavar="N",
+        type=values.count,
+        default=3,
+        help="timed repetitions of every run (default: 3)",
+    )
     parser.add_argument(
         "--out", metavar="FOLDER", type=Path, help="folder of the results (default: compare-MODEL, here)"
     )
@@ -46,22 +56,22 @@ def execute(args: argparse.Namespace, written: Written) -> int:
     if folder is not None:
         require_folder(folder, "--out")
     model = values.changed_model(args)
-    t_end = values.end_time(model, args.t_end)
+    span = (0.0, values.end_time(model, args.t_end))
     folder = folder or Path(f"compare-{model.name}")
     require_folder(folder, "--out")
 
     import hybridsim
 
-    settings: dict[str, Any] = {
-        keyword: value
-        for keyword, value in (
-            ("integrators", args.integrators),
-            ("rtol", args.rtol),
-            ("repeat", args.repeat),
+    with Progress() as progress:
+        comparison = hybridsim.compare(
+            model,
+            t_span=span,
+            integrators=args.integrators,
+            rtols=args.rtol,
+            steps=args.steps,
+            repeat=args.repeat,
+            progress=lambda done, total, what: progress(done / total, what),
         )
-        if value is not None
-    }
-    comparison = hybridsim.compare(model, t_span=(0.0, t_end), **settings)
     if args.json:
         print(comparison.to_json())
     else:

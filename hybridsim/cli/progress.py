@@ -8,20 +8,22 @@ from types import TracebackType
 from typing import Self
 
 _WAIT = 1.0  # seconds; what is done sooner needs no progress
+_WIDTH = 79  # a line that wraps cannot be taken back
 _PAUSE = 0.1  # seconds between updates, so that showing costs nothing
 
 
 class Progress:
-    """Callable with the finished fraction of the work; silent where stderr is no terminal."""
+    """Callable with the finished fraction of the work and what is next; silent where stderr is no terminal."""
 
     def __init__(self) -> None:
-        self._shown = False
+        self._shown = 0
         self._next = time.monotonic() + _WAIT
 
-    def __call__(self, fraction: float) -> None:
+    def __call__(self, fraction: float, what: str = "") -> None:
         if time.monotonic() >= self._next and sys.stderr.isatty():
-            print(f"\r{100 * fraction:5.1f} %", end="", file=sys.stderr, flush=True)
-            self._shown = True
+            line = f"{100 * fraction:5.1f} %  {what}"[:_WIDTH].rstrip()
+            print("\r" + line.ljust(self._shown), end="", file=sys.stderr, flush=True)
+            self._shown = len(line)
             self._next = time.monotonic() + _PAUSE
 
     def __enter__(self) -> Self:
@@ -29,4 +31,4 @@ class Progress:
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if self._shown:
-            print("\r" + " " * 8 + "\r", end="", file=sys.stderr, flush=True)
+            print("\r" + " " * self._shown + "\r", end="", file=sys.stderr, flush=True)

@@ -52,6 +52,11 @@ def count(text: str) -> int:
     return int(text)
 
 
+def counts(text: str) -> tuple[int, ...]:
+    """Whole numbers above zero, separated by commas."""
+    return tuple(count(part.strip()) for part in text.split(","))
+
+
 def names(text: str) -> tuple[str, ...]:
     """Names, separated by commas."""
     found = tuple(part.strip() for part in text.split(","))

@@ -44,14 +44,13 @@ def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 @kernel
 def open_question(series: Any, bounds: Any, decreed: int) -> bool:
     """Whether a guard without a side is a question of rounding (and not zero identically)."""
-    for k in range(decreed, series.shape[0]):
-        if series[k] != 0.0 or bounds[k] != 0.0:
-            return True
-    return False
+    return any(series[k] != 0.0 or bounds[k] != 0.0 for k in range(decreed, series.shape[0]))
 
 
 @kernel
-def judge(series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any) -> int:
+def judge(
+    series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
+) -> int:
     """Judge the guards of one candidate: LEAVES if any goes negative, UNDECIDED if any is open, else FINE.
 
     series, bounds (guards, orders); decreed, active, sides, orders (guards,). The sides and orders found are

@@ -41,7 +41,7 @@ def _printer() -> Any:
             from sympy import Rational
 
             base = self.parenthesize(e.base, 100)
-            if e.exp.is_Integer and abs(int(e.exp)) <= 64:  # noqa: PLR2004 - as in the tape
+            if e.exp.is_Integer and abs(int(e.exp)) <= 64:
                 n = int(e.exp)
                 return f"{base}**{n}" if n > 0 else f"1.0/{base}**{-n}" if n < -1 else f"1.0/{base}"
             if e.exp in (Rational(1, 2), 0.5):
@@ -99,7 +99,9 @@ class Emitter:
         """The text of the whole module."""
         program, model = self.program, self.program.model
         states = range(len(model.states))
-        guards = sorted({n for i in program.items for n in _names(i) if n.startswith("guard_")}, key=_by_numbers)
+        guards = sorted(
+            {n for i in program.items for n in _names(i) if n.startswith("guard_")}, key=_by_numbers
+        )
         parts = [
             _HEADER.format(name=model.name),
             self._function("flow", [(f"out[{i}]", program.derivatives[i]) for i in states]),
@@ -177,7 +179,9 @@ class Emitter:
     def _placed(self, e: Any) -> Any:
         from sympy import Symbol
 
-        replaced = {s: Symbol(self.inputs[s.name], real=True) for s in e.free_symbols if s.name in self.inputs}
+        replaced = {
+            s: Symbol(self.inputs[s.name], real=True) for s in e.free_symbols if s.name in self.inputs
+        }
         return e.xreplace(replaced)
 
     def _function(self, name: str, outputs: list[tuple[str, Any]]) -> str:
@@ -230,9 +234,7 @@ class Emitter:
         index = {n: k for k, n in enumerate(guards)}
         return {
             "guards": tuple(
-                tuple(
-                    tuple(index[f"guard_{c}_{g}"] for g in range(len(m.guards))) for m in component.modes
-                )
+                tuple(tuple(index[f"guard_{c}_{g}"] for g in range(len(m.guards))) for m in component.modes)
                 for c, component in enumerate(program.components)
             ),
             "guard_count": len(guards),
@@ -244,7 +246,7 @@ class Emitter:
             "quantities": tuple(n for n, _ in self.quantities()),
             "resets": tuple((key, tuple(mapping)) for key, mapping in self.resets()),
             "tape": self._tape(guards),
-        }  # fmt: skip
+        }
 
     def _tape(self, guards: list[str]) -> dict[str, Any]:
         program = self.program
@@ -257,7 +259,9 @@ class Emitter:
             if isinstance(item, Assign):
                 parts.append((-1, (tuple(builder.rows([(item.name, item.expression)], shared)),)))
             else:
-                parts.append((item.component, tuple(self._branch(builder, item, m) for m in range(len(item.branches)))))
+                parts.append(
+                    (item.component, tuple(self._branch(builder, item, m) for m in range(len(item.branches))))
+                )
         found = {
             "states": tuple(builder.register(f"raw_{i}") for i in range(len(program.model.states))),
             "time": builder.registers.get("s", -1),

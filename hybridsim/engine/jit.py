@@ -49,7 +49,7 @@ if ENABLED:
             lambda: numba.njit(cache=True, nogil=True, error_model="numpy")(function),
         )
 
-    def compile_model_function(function: Callable[..., int]) -> tuple[int, Any]:
+    def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
         """Compile one generated function; return its address and the object that keeps it alive."""
         compiled = _with_cache_folder(
             str(kernel_folder() / "models"),

@@ -48,7 +48,7 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
         if right - left <= math.ulp(right) or high == 0.0:
             break
         theta = left + (right - left) * (low / (low - high)) if low < high else math.nan
-        if not left < theta < right or kept > 2:  # noqa: PLR2004 - one end stays put: halve instead
+        if not left < theta < right or kept > 2:
             theta, kept = 0.5 * (left + right), 0
             if not left < theta < right:
                 break

@@ -44,7 +44,10 @@ class ModeLoop:
         try:
             self._run()
         except StepFailure as failure:
-            self.record.status, self.record.message = "step-failure", f"after t = {float(self.origin)!r}: {failure}"
+            self.record.status, self.record.message = (
+                "step-failure",
+                f"after t = {float(self.origin)!r}: {failure}",
+            )
         except KeyboardInterrupt:
             self.record.status = "interrupted"
             self.record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
@@ -79,9 +82,18 @@ class ModeLoop:
         numbers = np.flatnonzero(system.active(outcome.z))
         watch = Watch(numbers, outcome.sides, outcome.orders, outcome.monitor_sides, outcome.monitor_orders)
         return SegmentRun(
-            system, self.method, self.origin, self.p, outcome.z, outcome.x, watch, self.task.tolerances,
-            self.record.counters, self.forward, self.progress,
-        )  # fmt: skip
+            system,
+            self.method,
+            self.origin,
+            self.p,
+            outcome.z,
+            outcome.x,
+            watch,
+            self.task.tolerances,
+            self.record.counters,
+            self.forward,
+            self.progress,
+        )
 
     def _keep(self, run: SegmentRun) -> None:
         """Append a segment and what was seen on the way."""
@@ -94,14 +106,21 @@ class ModeLoop:
 
     def _sighting(self, seen: Sighting) -> Occurrence:
         name = self.system.monitor_names[seen.number]
-        return Occurrence(self.origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x)
+        return Occurrence(
+            self.origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x
+        )
 
     def _grazing(self, run: SegmentRun, guard: int, s: float, distance: float) -> Occurrence:
         c = int(self.system.owner[guard])
         automaton, number = self.system.automata[c], int(run.flow.z[c])
-        mode, name = automaton.modes[number], automaton.guard_names[number][automaton.guards[number].index(guard)]
+        mode, name = (
+            automaton.modes[number],
+            automaton.guard_names[number][automaton.guards[number].index(guard)],
+        )
         x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
-        self.record.warn(f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero")
+        self.record.warn(
+            f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
+        )
         return Occurrence(self.origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)
 
     # -- events ---------------------------------------------------------------------------------------------
@@ -133,7 +152,9 @@ class ModeLoop:
         self.short = self.short + 1 if near and outcome.changes else 0
         if not stop and self.short >= _ACCUMULATION_COUNT:
             self.record.status = "accumulation"
-            self.record.message = f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
+            self.record.message = (
+                f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
+            )
             return True
         return stop
 
@@ -149,7 +170,9 @@ class ModeLoop:
                 s_error = max(s_error, abs(value / slope))
         slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
         x_error = 4.0 * UNIT * segment.scale + s_error * slopes
-        holding = [system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold]
+        holding = [
+            system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold
+        ]
         x_error[holding] = UNIT * np.abs(arrival.x[holding])
         return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 
@@ -159,7 +182,7 @@ class ModeLoop:
         if not fired:
             return ()
         series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
-        together = {g: 0.0 for g in fired}
+        together = dict.fromkeys(fired, 0.0)
         for g in np.flatnonzero(system.active(at.z)):
             value, bound = series.guards[g], series.guard_bounds[g]
             if g not in together and abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0:
@@ -167,16 +190,25 @@ class ModeLoop:
         return tuple(sorted(together, key=lambda g: together[g]))
 
     def _refuse_backward(self, arrival: Arrival, schedules: tuple[int, ...]) -> str:
-        resets = [self.system.model.schedules[k].name for k in schedules if self.system.model.schedules[k].reset]
-        resets += [self.system.monitor_names[k] for k in arrival.stopping if self.system.model.monitors[k].reset]
+        resets = [
+            self.system.model.schedules[k].name for k in schedules if self.system.model.schedules[k].reset
+        ]
+        resets += [
+            self.system.monitor_names[k] for k in arrival.stopping if self.system.model.monitors[k].reset
+        ]
         if resets:
             return f"running backward, the reset of {', '.join(resets)} has no unique past"
         return entered_here(self.system, self.outcome.z, arrival.fired)
 
     def _adopt(
-        self, instant: Instant, outcome: Outcome, x_minus: np.ndarray, schedules: tuple[int, ...],
-        stopping: tuple[int, ...], monitor_sides: np.ndarray | None = None,
-    ) -> bool:  # fmt: skip
+        self,
+        instant: Instant,
+        outcome: Outcome,
+        x_minus: np.ndarray,
+        schedules: tuple[int, ...],
+        stopping: tuple[int, ...],
+        monitor_sides: np.ndarray | None = None,
+    ) -> bool:
         """Make the state after an event the start of the next segment and record the event; True to stop."""
         system, record = self.system, self.record
         self.origin, self.outcome = instant, outcome
@@ -186,9 +218,16 @@ class ModeLoop:
         for change in outcome.changes:
             automaton = system.automata[change.component]
             self._occur(
-                instant, "transition", automaton.name, change.guard, automaton.modes[change.source],
-                automaton.modes[change.target], -1, x_minus, outcome.x,
-            )  # fmt: skip
+                instant,
+                "transition",
+                automaton.name,
+                change.guard,
+                automaton.modes[change.source],
+                automaton.modes[change.target],
+                -1,
+                x_minus,
+                outcome.x,
+            )
             record.counters.events += 1
         terminated = []
         for k in schedules:
@@ -200,7 +239,10 @@ class ModeLoop:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
         if terminated:
-            record.status, record.message = "terminated", f"ended by {terminated[0]} at t = {float(instant)!r}"
+            record.status, record.message = (
+                "terminated",
+                f"ended by {terminated[0]} at t = {float(instant)!r}",
+            )
             return True
         if not self.forward and held(system, outcome.z):
             record.status = "backward-nonunique"
@@ -209,9 +251,13 @@ class ModeLoop:
         return False
 
     def _crossed_monitors(
-        self, instant: Instant, outcome: Outcome, x_minus: np.ndarray, stopping: tuple[int, ...],
+        self,
+        instant: Instant,
+        outcome: Outcome,
+        x_minus: np.ndarray,
+        stopping: tuple[int, ...],
         monitor_sides: np.ndarray | None,
-    ) -> list[str]:  # fmt: skip
+    ) -> list[str]:
         """Record the monitors whose side differs across the event; return those that end the run."""
         ended = []
         for k, monitor in enumerate(self.system.model.monitors):
@@ -226,8 +272,18 @@ class ModeLoop:
             ended += [monitor.name] if monitor.action == "terminate" else []
         return ended
 
-    def _occur(self, instant: Instant, kind: str, component: str, guard: str, source: str, target: str,
-               direction: int, x_minus: np.ndarray, x_plus: np.ndarray) -> None:  # fmt: skip
+    def _occur(
+        self,
+        instant: Instant,
+        kind: str,
+        component: str,
+        guard: str,
+        source: str,
+        target: str,
+        direction: int,
+        x_minus: np.ndarray,
+        x_plus: np.ndarray,
+    ) -> None:
         self.record.occurrences.append(
             Occurrence(instant, kind, component, guard, source, target, direction, x_minus, x_plus)
         )

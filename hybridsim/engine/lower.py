@@ -39,9 +39,7 @@ class Program:
 
     def __post_init__(self) -> None:
         model = self.model
-        self.layout = Layout(
-            len(model.parameters), len(model.discrete), len(self.rates), len(model.inputs)
-        )
+        self.layout = Layout(len(model.parameters), len(model.discrete), len(self.rates), len(model.inputs))
 
 
 class Lowering:
@@ -52,7 +50,7 @@ class Lowering:
 
         self.sp = sp
         self.model = model
-        self.components = tuple(model.all_components())
+        self.components: tuple[Any, ...] = tuple(model.all_components())
         names = [p.name for p in model.parameters] + [s.name for s in model.states]
         names += [d.name for d in model.discrete] + [i.name for i in model.inputs]
         names += [n for n, _ in model.definitions] + ["t"]
@@ -123,10 +121,18 @@ class Lowering:
         guard_items, conditions = self._guards()
         items += guard_items
         program = Program(
-            model, self.components, ordered(items), derivatives,
-            [(c, f"surface_{c}") for c in surfaces], pins, self.rates, clusters,
-            [self._jump(c) for c in surfaces], self._linear(der, definitions), conditions,
-        )  # fmt: skip
+            model,
+            self.components,
+            ordered(items),
+            derivatives,
+            [(c, f"surface_{c}") for c in surfaces],
+            pins,
+            self.rates,
+            clusters,
+            [self._jump(c) for c in surfaces],
+            self._linear(der, definitions),
+            conditions,
+        )
         return program
 
     def _inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
@@ -189,9 +195,10 @@ class Lowering:
         remaining = dict(pins)
         while remaining:
             free = [
-                c for c, i in remaining.items()
+                c
+                for c, i in remaining.items()
                 if not surfaces[c].free_symbols & {self.states[j] for d, j in remaining.items() if d != c}
-            ]  # fmt: skip
+            ]
             if not free:
                 return False
             for c in free:
@@ -274,11 +281,17 @@ class Lowering:
         clusters: list[list[int]] = []
         for c in order:
             linked = [g for g in clusters if any(effect[c, d] != 0 or effect[d, c] != 0 for d in g)]
-            clusters = [g for g in clusters if g not in linked] + [sorted([c, *(d for g in linked for d in g)])]
+            clusters = [g for g in clusters if g not in linked] + [
+                sorted([c, *(d for g in linked for d in g)])
+            ]
         return clusters
 
     def _solve(
-        self, cluster: list[int], unknown: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
+        self,
+        cluster: list[int],
+        unknown: dict[int, Any],
+        rate: dict[int, Any],
+        effect: dict[tuple[int, int], Any],
     ) -> list[Item]:
         sp = self.sp
         items: list[Item] = []
@@ -299,7 +312,7 @@ class Lowering:
         if len(cluster) == 1:
             c = cluster[0]
             value = -rate[c] / effect[c, c]
-            if value.count_ops() < 200:  # noqa: PLR2004 - beyond it the form is not for reading any more
+            if value.count_ops() < 200:
                 value = sp.expand(sp.cancel(sp.together(value)))
             return [branches(c, unknown[c].name, value, declared(c))]
         # joint solve: rows of components that do not hold read "unknown = its declared value"
@@ -319,7 +332,11 @@ class Lowering:
         return items
 
     def _eliminate(
-        self, cluster: list[int], unknown: dict[int, Any], matrix: dict[tuple[int, int], Any], right: dict[int, Any]
+        self,
+        cluster: list[int],
+        unknown: dict[int, Any],
+        matrix: dict[tuple[int, int], Any],
+        right: dict[int, Any],
     ) -> list[Item]:
         """Gaussian elimination without exchanges (the effect of forces on accelerations is definite)."""
         sp = self.sp
@@ -354,7 +371,9 @@ class Lowering:
         by_state = {i: c for c, i in pins.items()}
         for i, (name, e) in enumerate(zip(names, der, strict=True)):
             state = self.model.states[i].name
-            overriding = [c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)]
+            overriding = [
+                c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)
+            ]
             if i in by_state:
                 overriding.append(by_state[i])
             if not overriding:
@@ -388,7 +407,8 @@ class Lowering:
                         guard = mode.guards[g]
                         value = self.convert(guard.expr)
                         conditions[c, m, g] = tuple(
-                            None if choice.when is None else self.convert(choice.when) for choice in guard.then
+                            None if choice.when is None else self.convert(choice.when)
+                            for choice in guard.then
                         )
                     else:
                         value = self.sp.Integer(1)
@@ -421,7 +441,10 @@ class Lowering:
         return {
             component.name: tuple(
                 base
-                and all(affine(self._inline(self.convert(e), definitions)) for e in [*m.set.values(), *m.der.values()])
+                and all(
+                    affine(self._inline(self.convert(e), definitions))
+                    for e in [*m.set.values(), *m.der.values()]
+                )
                 for m in component.modes
             )
             for component in self.components

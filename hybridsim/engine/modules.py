@@ -50,14 +50,27 @@ _loaded: dict[str, Compiled] = {}
 
 def compiled(model: Model) -> Compiled:
     """The compiled form of a model, from memory, from disk, or lowered now."""
-    key = hashlib.sha256(model.structure().encode()).hexdigest()[:24]
-    if key not in _loaded:
-        _loaded[key] = _load(model, f"hybridsim_model_{key}")
-    return _loaded[key]
+    name = _name(model)
+    if name not in _loaded:
+        _loaded[name] = _load(model, name)
+    return _loaded[name]
+
+
+def is_cached(model: Model) -> bool:
+    """Whether the generated module of a model is on disk."""
+    return _path(_name(model)).exists()
+
+
+def _name(model: Model) -> str:
+    return f"hybridsim_model_{hashlib.sha256(model.structure().encode()).hexdigest()[:24]}"
+
+
+def _path(name: str) -> Path:
+    return model_folder() / f"{name}.py"
 
 
 def _load(model: Model, name: str) -> Compiled:
-    path = model_folder() / f"{name}.py"
+    path = _path(name)
     seconds = 0.0
     if not path.exists():
         from hybridsim.engine.emit import emit

@@ -35,7 +35,9 @@ POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 def _transforms() -> tuple[np.ndarray, np.ndarray]:
     """Matrices from the values at every second point to Bernstein coefficients and to the points between."""
     nodes = POINTS[::2]
-    basis = np.array([[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS])
+    basis = np.array(
+        [[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS]
+    )
     to_bernstein = np.linalg.inv(basis[::2])
     between = basis[1::2] @ to_bernstein
     assert len(nodes) == DEGREE + 1
@@ -91,10 +93,7 @@ def _sign(b: np.ndarray, bound: np.ndarray) -> int:
 @kernel
 def _within(b: np.ndarray, bound: np.ndarray) -> bool:
     """Whether the whole piece lies inside its bounds: halving would tell no more."""
-    for i in range(b.shape[0]):
-        if abs(b[i]) > bound[i]:
-            return False
-    return True
+    return all(abs(b[i]) <= bound[i] for i in range(b.shape[0]))
 
 
 @kernel

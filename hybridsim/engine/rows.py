@@ -21,7 +21,9 @@ def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: A
 
 
 @kernel
-def project_and_evaluate(project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any) -> None:
+def project_and_evaluate(
+    project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any
+) -> None:
     """Put held states on their constraints in place, then evaluate a function there."""
     work = states[0].copy()
     for k in range(times.shape[0]):

@@ -11,7 +11,17 @@ import numpy as np
 from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.locate import Findings, Hit, Locator
-from hybridsim.engine.stepping import Counters, Dense, Flow, Method, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import (
+    Counters,
+    Dense,
+    Flow,
+    Method,
+    Step,
+    StepFailure,
+    Stepper,
+    Tolerances,
+    Watch,
+)
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Pieces, Segment
@@ -59,10 +69,19 @@ class SegmentRun:
     """Integrates one segment and keeps what it passed."""
 
     def __init__(
-        self, system: System, method: Method, origin: Instant, p: np.ndarray, z: np.ndarray, x: np.ndarray,
-        watch: Watch, tolerances: Tolerances, counters: Counters, forward: bool,
+        self,
+        system: System,
+        method: Method,
+        origin: Instant,
+        p: np.ndarray,
+        z: np.ndarray,
+        x: np.ndarray,
+        watch: Watch,
+        tolerances: Tolerances,
+        counters: Counters,
+        forward: bool,
         progress: Callable[[Instant], None] | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.system, self.method, self.origin = system, method, origin
         self.tolerances, self.counters, self.progress = tolerances, counters, progress
         self.watch = watch
@@ -124,10 +143,11 @@ class SegmentRun:
         found = self.locator.search(step)
         first = self._first_stop(found)
         for hit in found.crossings:
-            if self._wanted(hit.number, hit.direction) and (first is None or hit.theta < first[0].theta):
-                if self.monitors[hit.number].action == "record":
-                    ended = self._refine(stepper, step, hit, is_monitor=True)
-                    self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
+            passed = first is None or hit.theta < first[0].theta
+            recorded = self.monitors[hit.number].action == "record"
+            if passed and recorded and self._wanted(hit.number, hit.direction):
+                ended = self._refine(stepper, step, hit, is_monitor=True)
+                self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
         limit = first[0].theta if first else 1.0
         for g, grazing in found.grazings:
             if grazing.theta < limit:
@@ -149,9 +169,10 @@ class SegmentRun:
     def _first_stop(self, found: Findings) -> tuple[Hit, bool] | None:
         stops = [(hit, False) for hit in found.exits]
         stops += [
-            (hit, True) for hit in found.crossings
+            (hit, True)
+            for hit in found.crossings
             if self.monitors[hit.number].action != "record" and self._wanted(hit.number, hit.direction)
-        ]  # fmt: skip
+        ]
         return min(stops, key=lambda stop: stop[0].theta, default=None)
 
     def _remember_monitors(self, found: Findings, theta: float) -> None:

@@ -74,7 +74,12 @@ class Settling:
     """One event being settled."""
 
     def __init__(
-        self, system: System, at: Situation, before: np.ndarray, forward: bool, scope: Iterable[int] | None = None
+        self,
+        system: System,
+        at: Situation,
+        before: np.ndarray,
+        forward: bool,
+        scope: Iterable[int] | None = None,
     ) -> None:
         self.system = system
         # the components that are decided here; a method with rules of its own for surfaces leaves those out
@@ -127,10 +132,15 @@ class Settling:
             open_ = leaving & surfaces
             if surfaces and self.jumped:
                 open_ |= self._take_sides()
-        names = ", ".join(f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True))
-        guards = ", ".join(sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]}))
+        names = ", ".join(
+            f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
+        )
+        guards = ", ".join(
+            sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]})
+        )
         return self._stop(
-            "cascade", f"transitions did not come to rest after {limit} rounds ({names}); guards that fire: {guards}"
+            "cascade",
+            f"transitions did not come to rest after {limit} rounds ({names}); guards that fire: {guards}",
         )
 
     def _take_sides(self) -> set[int]:
@@ -159,7 +169,12 @@ class Settling:
     def _fired_guards(self) -> list[tuple[int, int, int]]:
         """(component, index in its mode, number) of the located guards."""
         table = self.system.guards_of(self.at.z)
-        return [(c, j, int(g)) for c, row in enumerate(table) for j, g in enumerate(row) if g >= 0 and self.fired[g]]
+        return [
+            (c, j, int(g))
+            for c, row in enumerate(table)
+            for j, g in enumerate(row)
+            if g >= 0 and self.fired[g]
+        ]
 
     def _series(self, z: np.ndarray, x: np.ndarray) -> Series:
         at = self.at
@@ -235,9 +250,15 @@ class Settling:
         return None
 
     def _merge(
-        self, key: tuple[object, ...], x_one: np.ndarray, p_one: np.ndarray, x_plus: np.ndarray, p_plus: np.ndarray,
-        x_error: np.ndarray, writer: dict[str, tuple[str, float]],
-    ) -> str | None:  # fmt: skip
+        self,
+        key: tuple[object, ...],
+        x_one: np.ndarray,
+        p_one: np.ndarray,
+        x_plus: np.ndarray,
+        p_plus: np.ndarray,
+        x_error: np.ndarray,
+        writer: dict[str, tuple[str, float]],
+    ) -> str | None:
         """Merge the values that one reset set into x+; two resets that disagree are a message."""
         system = self.system
         if key not in system.resets:
@@ -276,26 +297,37 @@ class Settling:
         sizes = [len(automata[c].modes) for c in taking_part]
         if int(np.prod(sizes)) > _MOST_CANDIDATES:
             names = ", ".join(automata[c].name for c in taking_part)
-            return "inconsistent", f"{len(taking_part)} coupled components at their surfaces at once ({names})"
+            return (
+                "inconsistent",
+                f"{len(taking_part)} coupled components at their surfaces at once ({names})",
+            )
         candidates = joint_candidates(sizes)
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
-        verdicts = np.array([self._joint_verdict(c, taking_part, cluster) for c in candidates], dtype=np.int64)
+        verdicts = np.array(
+            [self._joint_verdict(c, taking_part, cluster) for c in candidates], dtype=np.int64
+        )
         holds = np.array([automata[c].hold for c in taking_part])
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
-            return "nonunique", self._say(taking_part, candidates[verdicts == FINE], "several motions are admissible")
+            return "nonunique", self._say(
+                taking_part, candidates[verdicts == FINE], "several motions are admissible"
+            )
         if number == NONE:
             return "inconsistent", self._say(taking_part, candidates, "no motion is admissible")
         source, x_minus = at.z.copy(), at.x.copy()
-        guards = {c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0}
+        guards = {
+            c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0
+        }
         for c, mode in zip(taking_part, candidates[number], strict=True):
             at.z[c] = mode
             if source[c] != mode:
                 for g in automata[c].guards[source[c]] if source[c] >= 0 else ():
                     self.fired[g] = False
                 if source[c] >= 0:
-                    self.changes.append(Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x))
+                    self.changes.append(
+                        Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x)
+                    )
         return None
 
     def _pinned_states(self, components: list[int]) -> np.ndarray:
@@ -363,7 +395,9 @@ class Settling:
     def _say(self, components: list[int], candidates: np.ndarray, what: str) -> str:
         automata = self.system.automata
         rows = [
-            ", ".join(f"{automata[c].name}: {automata[c].modes[m]}" for c, m in zip(components, row, strict=True))
+            ", ".join(
+                f"{automata[c].name}: {automata[c].modes[m]}" for c, m in zip(components, row, strict=True)
+            )
             for row in candidates
         ]
         state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, self.at.x, strict=True))
@@ -373,9 +407,7 @@ class Settling:
 
     def _monitors(self) -> tuple[np.ndarray, np.ndarray]:
         series = self._series(np.maximum(self.at.z, 0), self.at.x)
-        found = [
-            side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)
-        ]  # fmt: skip
+        found = [side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)]
         sides = np.array([f[0] for f in found], dtype=np.int64)
         orders = np.array([f[1] for f in found], dtype=np.int64)
         if not self.forward:
@@ -388,13 +420,34 @@ class Settling:
         continuous = not self.jumped and self._continuous(at.z, range(len(self.system.automata)))
         orders = np.where(self.orders > ORDER, 0, self.orders)
         return Outcome(
-            at.x, at.p, at.z, self.sides, orders, monitor_sides, np.where(monitor_orders > ORDER, 0, monitor_orders),
-            self.changes, continuous, "", "", self.warnings,
-        )  # fmt: skip
+            at.x,
+            at.p,
+            at.z,
+            self.sides,
+            orders,
+            monitor_sides,
+            np.where(monitor_orders > ORDER, 0, monitor_orders),
+            self.changes,
+            continuous,
+            "",
+            "",
+            self.warnings,
+        )
 
     def _stop(self, status: str, message: str) -> Outcome:
         at = self.at
         empty = np.zeros(len(self.system.monitor_names), dtype=np.int64)
         return Outcome(
-            at.x, at.p, at.z, self.sides, self.orders, empty, empty, self.changes, False, status, message, self.warnings
+            at.x,
+            at.p,
+            at.z,
+            self.sides,
+            self.orders,
+            empty,
+            empty,
+            self.changes,
+            False,
+            status,
+            message,
+            self.warnings,
         )

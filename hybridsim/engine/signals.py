@@ -53,7 +53,9 @@ class Signal:
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
         """The first knot strictly after an instant (before it, backward in time)."""
         if self.kind == "table":
-            ahead = [k for k in self._times if (Instant(k).minus(after) > 0.0) == forward and Instant(k) != after]
+            ahead = [
+                k for k in self._times if (Instant(k).minus(after) > 0.0) == forward and Instant(k) != after
+            ]
             return None if not ahead else Instant(ahead[0] if forward else ahead[-1])
         if self.kind == "chirp":
             end = Instant(self._number["duration"])
@@ -79,9 +81,10 @@ class Signal:
     def _wave_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
         number = self._number
         behind = [
-            knot for knot in self._wave_knots(origin)
+            knot
+            for knot in self._wave_knots(origin)
             if (knot[0].minus(origin) <= 0.0 if forward else knot[0].minus(origin) < 0.0)
-        ]  # fmt: skip
+        ]
         start, value, slope = max(behind, key=lambda knot: float(knot[0]))
         scale = number["amplitude"]
         return (
@@ -127,7 +130,9 @@ def _table(declared: Input) -> tuple[list[float], list[tuple[float, float, float
         from scipy.interpolate import CubicSpline
 
         c = CubicSpline(times, values, bc_type="natural").c
-        rows = [(float(c[3, i]), float(c[2, i]), float(c[1, i]), float(c[0, i])) for i in range(len(times) - 1)]
+        rows = [
+            (float(c[3, i]), float(c[2, i]), float(c[1, i]), float(c[0, i])) for i in range(len(times) - 1)
+        ]
     else:
         with np.errstate(divide="ignore", invalid="ignore"):
             slopes = np.where(np.diff(times) > 0.0, np.diff(values) / np.diff(times), 0.0)

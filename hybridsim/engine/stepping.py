@@ -91,7 +91,7 @@ class Flow:
     def __post_init__(self) -> None:
         system = self.system
         self.n = system.n
-        self._flow, self._guards, self._monitors = (system.address(k) for k in ("flow", "guards", "monitors"))
+        self._flow = system.address("flow")
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         """dx/dt in a fresh array; NaN where the model has no value."""
@@ -108,13 +108,17 @@ class Flow:
         """Guard values (k, guards); held states are evaluated from their constraints on the way."""
         self.counters.guard_evaluations += len(s)
         out = np.empty((len(s), self.system.guard_count))
-        evaluate_rows(self._guards, s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out)
+        evaluate_rows(
+            self.system.address("guards"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
+        )
         return out
 
     def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Monitor values (k, monitors), likewise."""
         out = np.empty((len(s), len(self.system.monitor_names)))
-        evaluate_rows(self._monitors, s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out)
+        evaluate_rows(
+            self.system.address("monitors"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
+        )
         return out
 
 
@@ -131,9 +135,17 @@ class Stepper(Protocol):
 class Method(Protocol):
     """What the mode loop uses of an integrator."""
 
-    dense_is_accurate: bool
+    @property
+    def dense_is_accurate(self) -> bool:
+        """Whether the dense output is as accurate as the method."""
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a segment at local time 0 towards s_bound (negative when time runs backward)."""

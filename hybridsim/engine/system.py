@@ -57,14 +57,19 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
     names = tuple(m.name for m in component.modes)
     surface = component.surface
     return Automaton(
-        component.name, names, guards,
+        component.name,
+        names,
+        guards,
         tuple(tuple(g.name for g in m.guards) for m in component.modes),
         tuple(tuple(tuple(names.index(c.to) for c in g.then) for g in m.guards) for m in component.modes),
         tuple(tuple(g.fatal for g in m.guards) for m in component.modes),
-        *((names.index(surface.above), names.index(surface.below), names.index(surface.hold)) if surface
-          else (-1, -1, -1)),
+        *(
+            (names.index(surface.above), names.index(surface.below), names.index(surface.hold))
+            if surface
+            else (-1, -1, -1)
+        ),
         initial=-1 if component.initial is None else names.index(component.initial),
-    )  # fmt: skip
+    )
 
 
 class System:
@@ -129,6 +134,14 @@ class System:
         """Mode of every component by name."""
         return {a.name: a.modes[m] for a, m in zip(self.automata, z, strict=True)}
 
+    def hot_functions(self) -> tuple[str, ...]:
+        """The functions that every run needs compiled; the others are compiled when they are first used."""
+        names = ["flow"]
+        names += ["guards"] if self.guard_count else []
+        names += ["project"] if self.pins else []
+        names += ["monitors"] if self.monitor_names else []
+        return tuple(names)
+
     # -- functions ------------------------------------------------------------------------------------------
 
     def address(self, name: str) -> Any:
@@ -154,7 +167,9 @@ class System:
         evaluate(self.address("project"), s, np.ascontiguousarray(x), p, z, out)
         return out
 
-    def rows(self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def rows(
+        self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray
+    ) -> np.ndarray:
         """A function at many points: s (k,), x (k, n) -> (k, count)."""
         out = np.empty((len(s), count))
         evaluate_rows(self.address(name), s, x, p, z, out)
@@ -170,7 +185,9 @@ class System:
         """Number of the first choice of a guard whose condition holds; -1 if none."""
         return self.code.module.choose(component, mode, guard, s, x, p, z)
 
-    def apply_reset(self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any) -> None:
+    def apply_reset(
+        self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
+    ) -> None:
         """Write the values that one reset sets; everything is evaluated at (s, x, p, z)."""
         if key in self.resets:
             self.code.module.reset(self.resets[key][0], s, x, p, z, x_plus, p_plus)

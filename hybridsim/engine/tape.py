@@ -100,7 +100,9 @@ class TapeBuilder:
                 out = self._op(rows, SUB if subtract else (ADD if e.is_Add else MUL), out, value)
         return out
 
-    def _emit_power(self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+    def _emit_power(
+        self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
+    ) -> int:
         import sympy as sp
 
         if exponent.is_Integer and abs(int(exponent)) <= _MAX_INTEGER_POWER:
@@ -133,13 +135,19 @@ class TapeBuilder:
 
         one = self._constant(1.0)
         simple: Mapping[Any, int] = {
-            sp.exp: EXP, sp.Abs: ABS, sp.sign: SIGN, sp.Not: NOT, sp.tan: TANGENT,
-        }  # fmt: skip
+            sp.exp: EXP,
+            sp.Abs: ABS,
+            sp.sign: SIGN,
+            sp.Not: NOT,
+            sp.tan: TANGENT,
+        }
         chained: Mapping[Any, int] = {sp.Min: MIN, sp.Max: MAX, sp.And: AND, sp.Or: OR}
         ordered: Mapping[Any, tuple[int, bool]] = {
-            sp.StrictLessThan: (LESS, False), sp.StrictGreaterThan: (LESS, True),
-            sp.LessThan: (LESS_EQUAL, False), sp.GreaterThan: (LESS_EQUAL, True),
-        }  # fmt: skip
+            sp.StrictLessThan: (LESS, False),
+            sp.StrictGreaterThan: (LESS, True),
+            sp.LessThan: (LESS_EQUAL, False),
+            sp.GreaterThan: (LESS_EQUAL, True),
+        }
         kind = e.func
         if kind in simple:
             return self._op(rows, simple[kind], a[0])
@@ -176,7 +184,9 @@ class TapeBuilder:
                 return self._op(rows, INTEGRAL, root, a[0], ASIN)
             return self._op(rows, INTEGRAL, self._op(rows, NEG, root), a[0], ACOS)
         if kind is sp.atan:
-            return self._op(rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN)
+            return self._op(
+                rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN
+            )
         if kind is sp.atan2:
             # on the unit circle turned by the leading angle the rest is an ordinary arc tangent
             return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)

@@ -38,7 +38,9 @@ class Timetable:
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
         """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
         return tuple(
-            k for k in range(len(self._schedules)) if (first := self._first(k)) is not None and first.minus(start) == 0
+            k
+            for k in range(len(self._schedules))
+            if (first := self._first(k)) is not None and first.minus(start) == 0
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
@@ -57,11 +59,13 @@ class Timetable:
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
         slack = math.ulp(nearest.high)
         together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
-        latest = max((t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after)))
+        latest = max(
+            (t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after))
+        )
         return Appointment(latest, tuple(sorted(k for k in together if k >= 0)))
 
     def _first(self, k: int) -> Instant | None:
-        times, start, period, _ = self._schedules[k]
+        times, start, _period, _ = self._schedules[k]
         if times:
             return Instant(times[0])
         return Instant(start)

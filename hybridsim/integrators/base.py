@@ -27,7 +27,7 @@ CAPABILITIES = {
 }
 
 
-class Integrator(ABC):  # noqa: B024 - one of start() or run() must be given, see rule 2
+class Integrator(ABC):
     """How a piecewise-smooth system is integrated.
 
     The contract, in the order in which it matters:
@@ -62,7 +62,13 @@ class Integrator(ABC):  # noqa: B024 - one of start() or run() must be given, se
     dense_is_accurate: ClassVar[bool] = False
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
         raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")

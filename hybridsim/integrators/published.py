@@ -18,7 +18,16 @@ from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Occurrence, Segment, Task, Trajectory
 from hybridsim.errors import UsageError
 from hybridsim.integrators.base import Integrator
-from hybridsim.integrators.rk4_kernels import BOUND, FULL, MONITOR, NOT_FINITE, SIGN, ZONE, rk4_step, run_steps
+from hybridsim.integrators.rk4_kernels import (
+    BOUND,
+    FULL,
+    MONITOR,
+    NOT_FINITE,
+    SIGN,
+    ZONE,
+    rk4_step,
+    run_steps,
+)
 
 _ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"
@@ -78,14 +87,16 @@ class FixedStepRun:
         except KeyboardInterrupt:
             record.status = "interrupted"
             record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
-        record.counters.rhs_evaluations, record.counters.guard_evaluations = int(self.counts[0]), int(self.counts[1])
+        record.counters.rhs_evaluations, record.counters.guard_evaluations = (
+            int(self.counts[0]),
+            int(self.counts[1]),
+        )
         return record
 
     def _run(self) -> None:
         due = self.timetable.due_at_start(self.origin)
-        if self.declared or due:
-            if self._settle(self.origin, (), due, self.task.x0, starting=True):
-                return
+        if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
+            return
         while self.origin != self.end:
             appointment = self.timetable.next(self.origin, forward=True)
             if appointment and appointment.instant.minus(self.end) > 0.0:
@@ -106,15 +117,35 @@ class FixedStepRun:
         p, bound = self._vector(), target.minus(self.origin)
         times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
         modes = np.empty((_ROWS, len(self.z)), dtype=np.int64)
-        numbers = system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
-        flags = (set_.rule, int(set_.every_stage), int(set_.dichotomy), int(set_.zeroed), int(set_.located),
-                 int(set_.rest_of_step))  # fmt: skip
+        numbers = (
+            system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
+        )
+        flags = (
+            set_.rule,
+            int(set_.every_stage),
+            int(set_.dichotomy),
+            int(set_.zeroed),
+            int(set_.located),
+            int(set_.rest_of_step),
+        )
         start_z = self.z.copy()
         count, why = run_steps(
-            self.addresses, (set_.step, set_.eps, float(set_.halvings), self.first, float(system.guard_count)), flags,
-            self.table, numbers, 0.0, bound, p, self.x, self.z, len(system.monitor_names), times, states, modes,
+            self.addresses,
+            (set_.step, set_.eps, float(set_.halvings), self.first, float(system.guard_count)),
+            flags,
+            self.table,
+            numbers,
+            0.0,
+            bound,
+            p,
+            self.x,
+            self.z,
+            len(system.monitor_names),
+            times,
+            states,
+            modes,
             self.counts,
-        )  # fmt: skip
+        )
         self.first = 0.0
         self._keep(p, times[:count], states[:count], modes[:count], start_z)
         s, x = float(times[count - 1]), states[count - 1]
@@ -139,7 +170,9 @@ class FixedStepRun:
         """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
         system, set_ = self.system, self.settings
         x, z = self.x, self.z
-        watched = [int(g) for g in system.guards_of(z)[self.declared].ravel() if g >= 0] if self.declared else []
+        watched = (
+            [int(g) for g in system.guards_of(z)[self.declared].ravel() if g >= 0] if self.declared else []
+        )
         before = self._monitors(s, x, p)
         low, high, best = 0.0, set_.step, x
         for _ in range(set_.halvings):
@@ -149,7 +182,9 @@ class FixedStepRun:
                 after = self._monitors(s + tau, trial, p)
                 beyond = bool(((before != 0.0) & ((before > 0.0) != (after > 0.0))).any())
             else:
-                guards = system.rows("guards", system.guard_count, np.array([s + tau]), trial[None, :], p, z)[0]
+                guards = system.rows("guards", system.guard_count, np.array([s + tau]), trial[None, :], p, z)[
+                    0
+                ]
                 beyond = bool((guards[watched] < 0.0).any())
             if beyond:
                 high = tau
@@ -170,15 +205,33 @@ class FixedStepRun:
     def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
         set_, system = self.settings, self.system
         out = np.empty(system.n)
-        rk4_step(self.addresses, set_.rule, set_.every_stage, set_.eps, set_.zeroed, self.table, s, tau, self.x, p,
-                 self.z, out, np.zeros(max(len(self.table), 1)), np.zeros(max(system.guard_count, 1)))  # fmt: skip
+        rk4_step(
+            self.addresses,
+            set_.rule,
+            set_.every_stage,
+            set_.eps,
+            set_.zeroed,
+            self.table,
+            s,
+            tau,
+            self.x,
+            p,
+            self.z,
+            out,
+            np.zeros(max(len(self.table), 1)),
+            np.zeros(max(system.guard_count, 1)),
+        )
         self.counts[0] += 4
         return out
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        return self.system.rows("monitors", len(self.system.monitor_names), np.array([s]), x[None, :], p, self.z)[0]
+        return self.system.rows(
+            "monitors", len(self.system.monitor_names), np.array([s]), x[None, :], p, self.z
+        )[0]
 
-    def _monitor_events(self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray) -> bool:
+    def _monitor_events(
+        self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray
+    ) -> bool:
         stop = False
         for k in crossed:
             monitor = self.system.model.monitors[k]
@@ -195,9 +248,14 @@ class FixedStepRun:
         return stop
 
     def _settle(
-        self, instant: Instant, fired: tuple[int, ...], schedules: tuple[int, ...], x_minus: np.ndarray,
-        monitors: tuple[int, ...] = (), starting: bool = False,
-    ) -> bool:  # fmt: skip
+        self,
+        instant: Instant,
+        fired: tuple[int, ...],
+        schedules: tuple[int, ...],
+        x_minus: np.ndarray,
+        monitors: tuple[int, ...] = (),
+        starting: bool = False,
+    ) -> bool:
         """Transitions and resets by the event contract, for all components but those with a surface."""
         system, record = self.system, self.record
         self.origin = instant
@@ -212,7 +270,17 @@ class FixedStepRun:
             automaton = system.automata[change.component]
             source, target = automaton.modes[change.source], automaton.modes[change.target]
             record.occurrences.append(
-                Occurrence(instant, "transition", automaton.name, change.guard, source, target, -1, x_minus, outcome.x)
+                Occurrence(
+                    instant,
+                    "transition",
+                    automaton.name,
+                    change.guard,
+                    source,
+                    target,
+                    -1,
+                    x_minus,
+                    outcome.x,
+                )
             )
             record.counters.events += 1
         for k in schedules:
@@ -221,7 +289,10 @@ class FixedStepRun:
                 Occurrence(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             )
             if schedule.terminate:
-                record.status, record.message = "terminated", f"ended by {schedule.name} at t = {float(instant)!r}"
+                record.status, record.message = (
+                    "terminated",
+                    f"ended by {schedule.name} at t = {float(instant)!r}",
+                )
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
         return record.status != "finished"
@@ -249,12 +320,23 @@ class FixedStepRun:
             automaton = self.system.automata[c]
             self.record.counters.events += 1
             self.record.occurrences.append(
-                Occurrence(self.origin.plus(float(s)), "transition", automaton.name, "", automaton.modes[source[c]],
-                           automaton.modes[target[c]], -1, x, x)
-            )  # fmt: skip
+                Occurrence(
+                    self.origin.plus(float(s)),
+                    "transition",
+                    automaton.name,
+                    "",
+                    automaton.modes[source[c]],
+                    automaton.modes[target[c]],
+                    -1,
+                    x,
+                    x,
+                )
+            )
 
 
-def _step(system: System, step: float | None, period: float | None, steps_per_period: float, name: str) -> float:
+def _step(
+    system: System, step: float | None, period: float | None, steps_per_period: float, name: str
+) -> float:
     """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
     for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -321,15 +403,24 @@ class Rk4Dichotomy(Integrator):
         if not (math.isfinite(self.eps_v) and self.eps_v > 0.0):
             raise UsageError(f"{self.name}: eps_v is {self.eps_v!r}", remedy="give a positive number")
         if not (isinstance(self.max_bisections, int) and self.max_bisections >= 1):
-            raise UsageError(f"{self.name}: max_bisections is {self.max_bisections!r}", remedy="give a whole number")
+            raise UsageError(
+                f"{self.name}: max_bisections is {self.max_bisections!r}", remedy="give a whole number"
+            )
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""
         step = _step(system, self.step, self.period, self.steps_per_period, self.name)
         settings = _Settings(
-            step, ZONE, self.friction == "stage", True, self.stick_velocity == "zero", self.release == "located",
-            self.after_event == "rest-of-step", self.eps_v, self.max_bisections,
-        )  # fmt: skip
+            step,
+            ZONE,
+            self.friction == "stage",
+            True,
+            self.stick_velocity == "zero",
+            self.release == "located",
+            self.after_event == "rest-of-step",
+            self.eps_v,
+            self.max_bisections,
+        )
         return FixedStepRun(system, task, settings, progress).run()
 
 
@@ -342,7 +433,7 @@ class Rk4Sign(Integrator):
     steps_per_period, period, step : as for `rk4-dichotomy`.
     friction : "stage": the sign is taken at every stage; "step": at the start of each step.
 
-    When to choose it: never for an answer; to see what chatter through a stick costs. Its mode sequence is that chatter.
+    When to choose it: never for an answer; to see what chatter through a stick costs. Its modes are that chatter.
     Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057, Eq. 2.
     """
 
@@ -351,7 +442,10 @@ class Rk4Sign(Integrator):
     order: ClassVar[str] = "4 between events, 1 through them"
     reference: ClassVar[str] = _PAPER
     when: ClassVar[str] = "to see what not modelling stick does"
-    lacks: ClassVar[dict[str, str]] = {**_FIXED, "exact-stick": "it has no stick: the velocity chatters around zero"}
+    lacks: ClassVar[dict[str, str]] = {
+        **_FIXED,
+        "exact-stick": "it has no stick: the velocity chatters around zero",
+    }
 
     steps_per_period: float = 1200.0
     period: float | None = None

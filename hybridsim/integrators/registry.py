@@ -58,10 +58,15 @@ def integrator_class(name: str) -> type[Integrator]:
     return found[name]
 
 
+def option_names(cls: type[Any]) -> tuple[str, ...]:
+    """The options of an integrator: the fields of its dataclass."""
+    return tuple(f.name for f in fields(cls))
+
+
 def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
     """The integrator of a name with its options set."""
     cls = integrator_class(name)
-    known = [f.name for f in fields(cls)]  # type: ignore[arg-type] - every integrator is a dataclass (rule 1)
+    known = option_names(cls)
     for option in options:
         if option not in known:
             remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"

@@ -15,8 +15,19 @@ ZONE, SIGN = 0, 1
 
 
 @kernel
-def choose_modes(addresses: Any, rule: int, eps: float, zeroed: bool, table: Any, s: float, x: Any, p: Any, z: Any,
-                 surfaces: Any, guards: Any) -> None:  # fmt: skip
+def choose_modes(
+    addresses: Any,
+    rule: int,
+    eps: float,
+    zeroed: bool,
+    table: Any,
+    s: float,
+    x: Any,
+    p: Any,
+    z: Any,
+    surfaces: Any,
+    guards: Any,
+) -> None:
     """Modes of the surface components from the state, in place.
 
     ZONE is Eq. 4 of the paper: beyond eps the mode of that side; inside it the holding mode while the unknown stays
@@ -50,7 +61,9 @@ def choose_modes(addresses: Any, rule: int, eps: float, zeroed: bool, table: Any
 
 
 @kernel
-def slope(addresses: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, out: Any, work: Any) -> None:
+def slope(
+    addresses: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, out: Any, work: Any
+) -> None:
     """dx/dt; under SIGN an exact zero takes the mean of both sides, which is sgn(0) = 0 for a symmetric law."""
     at_zero = False
     if rule == SIGN:
@@ -73,15 +86,29 @@ def slope(addresses: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: An
 
 
 @kernel
-def rk4_step(addresses: Any, rule: int, every_stage: bool, eps: float, zeroed: bool, table: Any, s: float, h: float,
-             x: Any, p: Any, z: Any, out: Any, surfaces: Any, guards: Any) -> None:  # fmt: skip
+def rk4_step(
+    addresses: Any,
+    rule: int,
+    every_stage: bool,
+    eps: float,
+    zeroed: bool,
+    table: Any,
+    s: float,
+    h: float,
+    x: Any,
+    p: Any,
+    z: Any,
+    out: Any,
+    surfaces: Any,
+    guards: Any,
+) -> None:
     """One classic Runge-Kutta step of length h from (s, x) in z; the modes held over it, or chosen at every stage."""
     n = x.shape[0]
     k = np.empty((4, n))
     work, stage, modes = np.empty(n), np.empty(n), z.copy()
     slope(addresses, rule, table, s, x, p, modes, k[0], work)
     for j in range(1, 4):
-        c = 0.5 if j < 3 else 1.0  # noqa: PLR2004 - the last stage is at the end of the step
+        c = 0.5 if j < 3 else 1.0
         for i in range(n):
             stage[i] = x[i] + c * h * k[j - 1, i]
         if every_stage:
@@ -94,10 +121,7 @@ def rk4_step(addresses: Any, rule: int, every_stage: bool, eps: float, zeroed: b
 @kernel
 def _leaves(values: Any, numbers: Any) -> bool:
     """Whether one of the watched guards is negative."""
-    for i in range(numbers.shape[0]):
-        if numbers[i] >= 0 and values[numbers[i]] < 0.0:
-            return True
-    return False
+    return any(numbers[i] >= 0 and values[numbers[i]] < 0.0 for i in range(numbers.shape[0]))
 
 
 @kernel
@@ -119,8 +143,23 @@ def _released(values: Any, table: Any, z: Any) -> bool:
 
 
 @kernel
-def run_steps(addresses: Any, settings: Any, flags: Any, table: Any, watched: Any, s: float, bound: float, p: Any,
-              x: Any, z: Any, monitor_count: int, times: Any, states: Any, modes: Any, counters: Any) -> tuple[int, int]:  # fmt: skip
+def run_steps(
+    addresses: Any,
+    settings: Any,
+    flags: Any,
+    table: Any,
+    watched: Any,
+    s: float,
+    bound: float,
+    p: Any,
+    x: Any,
+    z: Any,
+    monitor_count: int,
+    times: Any,
+    states: Any,
+    modes: Any,
+    counters: Any,
+) -> tuple[int, int]:
     """Fixed steps from (s, x) towards the bound, until something needs the caller.
 
     addresses: flow, surfaces, guards, monitors, project. settings: step, eps, halvings, length of a first step (0:
@@ -168,9 +207,9 @@ def run_steps(addresses: Any, settings: Any, flags: Any, table: Any, watched: An
             call(addresses[3], s, x, p, z, monitors)
             call(addresses[3], s + h, trial, p, z, monitors_after)
             for k in range(monitor_count):
-                if monitors[k] != 0.0 and (monitors[k] > 0.0) != (monitors_after[k] > 0.0):
-                    if monitors[k] * monitors_after[k] <= 0.0:
-                        return row, MONITOR
+                changed = (monitors[k] > 0.0) != (monitors_after[k] > 0.0)
+                if monitors[k] != 0.0 and changed and monitors[k] * monitors_after[k] <= 0.0:
+                    return row, MONITOR
         if dichotomy:
             freed = located and _released(guards, table, z)
             call(addresses[1], s + h, trial, p, z, after)
@@ -180,7 +219,22 @@ def run_steps(addresses: Any, settings: Any, flags: Any, table: Any, watched: An
                 tau = h
                 for _ in range(halvings):
                     tau = 0.5 * (low + high)
-                    rk4_step(addresses, rule, every_stage, eps, zeroed, table, s, tau, x, p, z, trial, after, guards)
+                    rk4_step(
+                        addresses,
+                        rule,
+                        every_stage,
+                        eps,
+                        zeroed,
+                        table,
+                        s,
+                        tau,
+                        x,
+                        p,
+                        z,
+                        trial,
+                        after,
+                        guards,
+                    )
                     counters[0] += 4
                     counters[2] += 1
                     if k >= 0:
@@ -198,7 +252,22 @@ def run_steps(addresses: Any, settings: Any, flags: Any, table: Any, watched: An
                 if k < 0:
                     # the end of the bracket where the limit is passed, so that the release is seen
                     tau = high
-                    rk4_step(addresses, rule, every_stage, eps, zeroed, table, s, tau, x, p, z, trial, after, guards)
+                    rk4_step(
+                        addresses,
+                        rule,
+                        every_stage,
+                        eps,
+                        zeroed,
+                        table,
+                        s,
+                        tau,
+                        x,
+                        p,
+                        z,
+                        trial,
+                        after,
+                        guards,
+                    )
                     counters[0] += 4
                 if rest and abs(h) > abs(tau):
                     planned = abs(h - tau)

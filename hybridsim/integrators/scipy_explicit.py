@@ -19,17 +19,28 @@ class SolverStepper:
     """Steps an instance of `scipy.integrate.OdeSolver` through one segment."""
 
     def __init__(
-        self, solver_class: Any, flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances,
+        self,
+        solver_class: Any,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
         first_step: float | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.solver_class, self.flow, self.tolerances = solver_class, flow, tolerances
         self.solver = self._solver(0.0, x0, bound, first_step)
 
     def _solver(self, s0: float, x0: np.ndarray, bound: float, first_step: float | None) -> Any:
         return self.solver_class(
-            self._rhs, s0, x0, bound, first_step=first_step, max_step=self.tolerances.max_step,
-            rtol=self.tolerances.rtol, atol=self.tolerances.atol,
-        )  # fmt: skip
+            self._rhs,
+            s0,
+            x0,
+            bound,
+            first_step=first_step,
+            max_step=self.tolerances.max_step,
+            rtol=self.tolerances.rtol,
+            atol=self.tolerances.atol,
+        )
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1
@@ -74,7 +85,13 @@ class ScipyRK45(Integrator):
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
         from scipy.integrate import RK45
@@ -97,7 +114,13 @@ class ScipyDOP853(Integrator):
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
         from scipy.integrate import DOP853

@@ -29,9 +29,15 @@ class CvodeStepper:
     """
 
     def __init__(
-        self, method: str, flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances,
-        first_step: float | None, watch: Watch,
-    ) -> None:  # fmt: skip
+        self,
+        method: str,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> None:
         from sksundae.cvode import CVODE
 
         self.flow, self.bound, self.watch = flow, bound, watch
@@ -45,9 +51,15 @@ class CvodeStepper:
         self.phases = flow.p[at : at + len(self.rates)]
         atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
         self.solver = CVODE(
-            self._rhs(), method=method, rtol=tolerances.rtol, atol=atol, first_step=first_step or 0.0,
-            max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step, max_num_steps=_MAX_STEPS, **options,
-        )  # fmt: skip
+            self._rhs(),
+            method=method,
+            rtol=tolerances.rtol,
+            atol=atol,
+            first_step=first_step or 0.0,
+            max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,
+            max_num_steps=_MAX_STEPS,
+            **options,
+        )
         self.solver.init_step(0.0, np.concatenate([x0, np.sin(self.phases)]))
         self.s, self.x = 0.0, x0
 
@@ -118,7 +130,7 @@ class CvodeStepper:
             raise StepFailure("CVODE: no progress")
         self.s, self.x = s1, x1
         roots: tuple[Root, ...] = ()
-        if result.status == 2 and result.i_events is not None:  # noqa: PLR2004 - CV_ROOT_RETURN
+        if result.status == 2 and result.i_events is not None:
             signs = result.i_events[-1]
             roots = tuple(
                 Root(number, int(sign), is_monitor)
@@ -149,7 +161,13 @@ class CvodeBDF(Integrator):
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
         return CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, watch)
@@ -174,7 +192,13 @@ class CvodeAdams(Integrator):
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
-        self, flow: Flow, x0: np.ndarray, s_bound: float, tolerances: Tolerances, first_step: float | None, watch: Watch
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
         return CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, watch)
