@@ -52,7 +52,7 @@ def compare(
     t_span : (t0, t1), t1 > t0; (0, 100 T) if not given, (0, 10) where the model has no forcing period T.
     integrators : names, (name, options) or `Series`; all registered ones if not given.
     rtols : tolerances of the integrators that adapt their step.
-    steps : steps a period of those that do not.
+    steps : steps a period of those that do not; without a period, a tenth of the run counts as one.
     params, x0 : parameter values and initial values by name, in place of the declared ones.
     repeat : timed repetitions of each run, in turns over all of them, after one that warms up.
     reference : what the errors are relative to: None for a closed form where one is known, else two accurate
@@ -71,7 +71,7 @@ def compare(
     model = model.with_(**(params or {})).with_start(**(x0 or {})).validate()
     period = forcing_period(model)
     span = _span(t_span, period)
-    series = choose_series(integrators, rtols, steps)
+    series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
     run = functools.partial(_simulate, model, span)
     total = 2 + sum(len(line.values) for line in series) * (1 + repeat)
     done = 0

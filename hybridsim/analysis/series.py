@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ from hybridsim.integrators import integrator_class, list_integrators
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 STEPS_PER_PERIOD = (300, 600, 1200, 2400, 4800)
+_PERIODS = 10  # that a run without a period counts as, where a step is a share of one
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class Series:
         if not self.values:
             raise UsageError(f"no values of {self.varied} for {self.integrator}", remedy="give at least one")
         if not self.label:
-            details = ", ".join(f"{name}={_shown(value)}" for name, value in self.options.items())
+            shown = {name: value for name, value in self.options.items() if name != "period"}
+            details = ", ".join(f"{name}={_shown(value)}" for name, value in shown.items())
             object.__setattr__(
                 self, "label", f"{self.integrator} ({details})" if details else self.integrator
             )
@@ -55,8 +58,9 @@ def _shown(value: Any) -> str:
 
 def choose_series(
     wanted: Sequence[str | tuple[str, Mapping[str, Any]] | Series] | None,
-    rtols: Sequence[float] | None,
-    steps: Sequence[int] | None,
+    rtols: Sequence[float] | None = None,
+    steps: Sequence[int] | None = None,
+    untimed_span: float | None = None,
 ) -> tuple[Series, ...]:
     """The lines of a comparison.
 
@@ -65,28 +69,58 @@ def choose_series(
     wanted : names, (name, options) or `Series`; all registered integrators if not given.
     rtols : tolerances of the integrators that adapt their step.
     steps : steps a period of those that do not.
+    untimed_span : length of the run where the model has no period; its tenth then stands for one.
     """
     if isinstance(wanted, str):
         wanted = [wanted]
+    line = functools.partial(_line, rtols=rtols, steps=steps, untimed_span=untimed_span)
     chosen: list[Series] = []
-    for item in default_choice() if wanted is None else wanted:
-        if isinstance(item, Series):
-            chosen.append(item)
-            continue
-        name, options = (item, {}) if isinstance(item, str) else item
-        if "adaptive" in integrator_class(name).lacks:
-            values = tuple(STEPS_PER_PERIOD if steps is None else steps)
-            chosen.append(Series(name, "steps_per_period", values, options))
-        else:
-            chosen.append(Series(name, "rtol", tuple(RTOLS if rtols is None else rtols), options))
+    if wanted is None:
+        for integrator in list_integrators():
+            chosen += [
+                line(integrator.name, options, label) for options, label in _shown_unasked(integrator.name)
+            ]
+    else:
+        for item in wanted:
+            name, options = (
+                (item, {}) if isinstance(item, str) else item if isinstance(item, tuple) else ("", {})
+            )
+            chosen.append(item if isinstance(item, Series) else line(name, options))
     if not chosen:
         raise UsageError("no integrators to compare", remedy="name some, see hybridsim.list_integrators()")
-    repeated = [series.label for series in chosen if [s.label for s in chosen].count(series.label) > 1]
+    labels = [series.label for series in chosen]
+    repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
         raise UsageError(f"two lines are called {repeated[0]!r}", remedy="give one of them another label")
     return tuple(chosen)
 
 
-def default_choice() -> list[str | tuple[str, Mapping[str, Any]] | Series]:
-    """Every registered integrator."""
-    return [integrator.name for integrator in list_integrators()]
+def _line(
+    name: str,
+    options: Mapping[str, Any],
+    label: str = "",
+    *,
+    rtols: Sequence[float] | None,
+    steps: Sequence[int] | None,
+    untimed_span: float | None,
+) -> Series:
+    if "adaptive" not in integrator_class(name).lacks:
+        return Series(name, "rtol", tuple(RTOLS if rtols is None else rtols), options, label)
+    counts = tuple(STEPS_PER_PERIOD if steps is None else steps)
+    if untimed_span is None:
+        return Series(name, "steps_per_period", counts, options, label)
+    return Series(name, "steps_per_period", counts, {**options, "period": untimed_span / _PERIODS}, label)
+
+
+def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
+    """Options and label of each line of an integrator; more than one where a choice decides what it is worth."""
+    if name != "rk4-dichotomy":
+        return [({}, "")]
+    published: Any = integrator_class(name)
+
+    def eps_v(steps: float) -> float:
+        return published.eps_v * (published.steps_per_period / steps) ** 2
+
+    # As published, a body in stick creeps, and the zone of zero velocity is as wide however short the step.
+    refined = {"stick_velocity": "zero", "eps_v": eps_v}
+    return [({}, ""), (refined, f"{name}, v zeroed, eps_v falling")]

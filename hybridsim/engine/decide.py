@@ -44,7 +44,10 @@ def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 @kernel
 def open_question(series: Any, bounds: Any, decreed: int) -> bool:
     """Whether a guard without a side is a question of rounding (and not zero identically)."""
-    return any(series[k] != 0.0 or bounds[k] != 0.0 for k in range(decreed, series.shape[0]))
+    for k in range(decreed, series.shape[0]):
+        if series[k] != 0.0 or bounds[k] != 0.0:
+            return True
+    return False
 
 
 @kernel

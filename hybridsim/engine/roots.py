@@ -93,7 +93,10 @@ def _sign(b: np.ndarray, bound: np.ndarray) -> int:
 @kernel
 def _within(b: np.ndarray, bound: np.ndarray) -> bool:
     """Whether the whole piece lies inside its bounds: halving would tell no more."""
-    return all(abs(b[i]) <= bound[i] for i in range(b.shape[0]))
+    for i in range(b.shape[0]):
+        if abs(b[i]) > bound[i]:
+            return False
+    return True
 
 
 @kernel

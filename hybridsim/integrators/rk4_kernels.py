@@ -121,7 +121,10 @@ def rk4_step(
 @kernel
 def _leaves(values: Any, numbers: Any) -> bool:
     """Whether one of the watched guards is negative."""
-    return any(numbers[i] >= 0 and values[numbers[i]] < 0.0 for i in range(numbers.shape[0]))
+    for i in range(numbers.shape[0]):
+        if numbers[i] >= 0 and values[numbers[i]] < 0.0:
+            return True
+    return False
 
 
 @kernel
