@@ -66,8 +66,9 @@ def multiple(start: float, k: int, period: float) -> Instant:
 
 
 def phase(instant: Instant, rate: float, offset: float) -> float:
-    """(rate*instant + offset) modulo 2 pi, in (-pi, pi], for an angle of any number of turns.
+    """(rate*instant + offset) modulo 2 pi, for an angle of any number of turns.
 
+    In [-pi, pi], or beyond an end of it by as much as the rounding of the whole angle where that is half a turn.
     The product and the reduction are carried in two doubles: after 1e6 turns the angle is still
     good to one ulp, where a plain ``rate*t`` would have lost six digits.
     """
