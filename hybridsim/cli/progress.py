@@ -13,7 +13,7 @@ _PAUSE = 0.1  # seconds between updates, so that showing costs nothing
 
 
 class Progress:
-    """Callable with the finished fraction of the work and what is next; silent where stderr is no terminal."""
+    """Callable with the finished fraction and what comes next; silent where stderr is no terminal."""
 
     def __init__(self) -> None:
         self._shown = 0

@@ -141,7 +141,7 @@ def _summary(solution: Solution) -> list[str]:
     ]
     for component, modes in _shares(solution).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
-        lines.append(f"  modes of {component:<4}{shares}")
+        lines.append(f"  {f'modes of {component}':<12} {shares}")
     if solution.t.size:
         units = {state.name: state.unit for state in model.states}
         final = ", ".join(f"{name} = {value:.9g} {units[name]}".rstrip() for name, value in _final(solution))
