@@ -54,7 +54,8 @@ def compare(
     rtols : tolerances of the integrators that adapt their step.
     steps : steps a period of those that do not; without a period, a tenth of the run counts as one.
     params, x0 : parameter values and initial values by name, in place of the declared ones.
-    repeat : timed repetitions of each run, in turns over all of them, after one that warms up.
+    repeat : timed repetitions of each run, in turns over all of them, after one that warms up; runs of seconds
+        are repeated less often.
     reference : what the errors are relative to: None for a closed form where one is known, else two accurate
         runs of different kind; "closed form" or "runs" to insist; a Solution; or a function t -> states.
     progress : called as progress(done, total, what is next).

@@ -11,6 +11,7 @@ from typing import Any
 
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.rows import QUANTITIES, Reading, Row
+from hybridsim.analysis.timing import ENOUGH
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,8 @@ class Comparison:
         return [
             "State errors: the largest of all states, relative to each one's amplitude in the reference.",
             f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
-            f"Wall time: median of {self.repeat} after a warm-up, in turns over all rows.",
+            f"Wall time of a call: median of {self.repeat} after a warm-up, in turns over all rows;",
+            f"fewer of a run that takes more than {ENOUGH / self.repeat:.2g} s.",
             f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPU",
             f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
             *(f"warning: {warning}" for warning in self.warnings),

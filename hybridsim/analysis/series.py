@@ -82,10 +82,11 @@ def choose_series(
             ]
     else:
         for item in wanted:
-            name, options = (
-                (item, {}) if isinstance(item, str) else item if isinstance(item, tuple) else ("", {})
-            )
-            chosen.append(item if isinstance(item, Series) else line(name, options))
+            if isinstance(item, Series):
+                chosen.append(item)
+            else:
+                name, options = (item, {}) if isinstance(item, str) else item
+                chosen.append(line(name, options))
     if not chosen:
         raise UsageError("no integrators to compare", remedy="name some, see hybridsim.list_integrators()")
     labels = [series.label for series in chosen]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridsim.engine.roots import POINTS, Crossing, Grazing, find_roots
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.roots import POINTS, Crossing, Grazing, find_roots, quiet
 from hybridsim.engine.stepping import Flow, Step, Watch
 
 _POLISH = 200  # iterations: bisection alone needs 52; the search ends when the bracket is down to neighbours
@@ -76,6 +77,7 @@ class Locator:
         self.flow = flow
         self.numbers = watch.guards
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
+        self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
 
     def search(self, step: Step) -> Findings:
@@ -88,27 +90,43 @@ class Locator:
         guard_ends = np.ones_like(self.sides)
         if len(self.numbers):
             values = flow.guards(times, states)
-            for g in self.numbers:
-                sample = self._sampler(step, flow.guards, int(g))
-                side = int(self.sides[g])
-                found, grazed, end = find_roots(
-                    sample, values[:, g], int(self.orders[g]) if side else 0, side or 1, stop_at_first=-1
+            still = quiet(values, self.numbers, self.sides, self.orders)
+            for g in self.numbers[~still]:
+                sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
+                order = int(self.orders[g]) if side else 0
+                found, grazed, guard_ends[g] = find_roots(
+                    sample, values[:, g], order, side or 1, -1, self._rounding(step, int(g), False)
                 )
-                guard_ends[g] = end
                 grazings += [(int(g), z) for z in grazed]
                 exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
         monitor_ends = self.monitor_sides.copy()
         if len(self.monitor_sides):
             values = flow.monitors(times, states)
-            for k in range(values.shape[1]):
-                sample = self._sampler(step, flow.monitors, k)
-                side = int(self.monitor_sides[k])
-                found, _, end = find_roots(
-                    sample, values[:, k], int(self.monitor_orders[k]) if side else 0, side, stop_at_first=0
+            still = quiet(values, self.monitor_numbers, self.monitor_sides, self.monitor_orders)
+            for k in self.monitor_numbers[~still]:
+                sample, side = self._sampler(step, flow.monitors, int(k)), int(self.monitor_sides[k])
+                order = int(self.monitor_orders[k]) if side else 0
+                found, _, monitor_ends[k] = find_roots(
+                    sample, values[:, k], order, side, 0, self._rounding(step, int(k), True)
                 )
-                monitor_ends[k] = end
-                crossings += [Hit(polish(sample, c), k, c.direction) for c in found]
+                crossings += [Hit(polish(sample, c), int(k), c.direction) for c in found]
         return Findings(_in_order(exits), _in_order(crossings), tuple(grazings), guard_ends, monitor_ends)
+
+    def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
+        """Rounding error of a guard's or monitor's values on the step, worked out when it is asked for."""
+        known: list[float] = []
+
+        def bound() -> float:
+            if not known:
+                flow = self.flow
+                errors = 4.0 * UNIT * np.maximum(np.abs(step.x0), np.abs(step.x1))
+                s_error = math.ulp(max(abs(step.s0), abs(step.s1)))
+                series = flow.system.series(step.s1, step.x1, flow.p, flow.z, errors, s_error)
+                bounds = series.monitor_bounds if is_monitor else series.guard_bounds
+                known.append(float(bounds[number, 0]))
+            return known[0]
+
+        return bound
 
     def _sampler(
         self, step: Step, function: Callable[[np.ndarray, np.ndarray], np.ndarray], column: int

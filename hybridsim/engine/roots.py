@@ -19,6 +19,7 @@ from math import comb
 import numpy as np
 
 from hybridsim.engine.jit import kernel
+from hybridsim.engine.stepping import StepFailure
 
 DEGREE = 8
 SAMPLES = 2 * DEGREE + 1
@@ -26,6 +27,8 @@ SAMPLES = 2 * DEGREE + 1
 # square root of the unit roundoff, so that a dip must be deeper than rounding to count and halving stays short.
 _ACCEPT = 2.0**-30
 _DEEPEST = 40  # halvings of a step: beyond 2**-40 of it a piece is accepted with whatever bound it has
+_ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
+_MOST_PIECES = 1_000_000  # a guard that needs more oscillates a hundred thousand times within one step
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 
 # Chebyshev points of the second kind on [0, 1]
@@ -128,21 +131,62 @@ def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
     return rows[:count], count
 
 
-def represent(samples: np.ndarray) -> tuple[np.ndarray, float]:
-    """Bernstein coefficients of the piece sampled at `POINTS`, and the bound of its error."""
-    chosen = samples[::2]
-    misfit = float(np.max(np.abs(_BETWEEN @ chosen - samples[1::2])))
-    rounding = 4.0 * 2.0**-53 * _GROWTH * float(np.max(np.abs(chosen)))
-    return _TO_BERNSTEIN @ chosen, 2.0 * misfit + rounding
+@kernel
+def _represent(samples: np.ndarray, coefficients: np.ndarray) -> tuple[float, float]:
+    """Fill the Bernstein coefficients of the piece sampled at `POINTS`; return its error bound and largest value."""
+    misfit, largest = 0.0, 0.0
+    for i in range(DEGREE + 1):
+        coefficients[i] = 0.0
+        for j in range(DEGREE + 1):
+            coefficients[i] += _TO_BERNSTEIN[i, j] * samples[2 * j]
+    for i in range(DEGREE):
+        value = -samples[2 * i + 1]
+        for j in range(DEGREE + 1):
+            value += _BETWEEN[i, j] * samples[2 * j]
+        if not abs(value) <= misfit:
+            misfit = abs(value)
+    for j in range(DEGREE + 1):
+        largest = max(largest, abs(samples[2 * j]))
+    return 2.0 * misfit + 4.0 * 2.0**-53 * _GROWTH * largest, largest
 
 
-def deflate(b: np.ndarray, bound: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Divide out theta**order: the first `order` Bernstein coefficients are zero by decree."""
-    for _ in range(min(order, len(b) - 1)):
-        n = len(b) - 1
-        factor = n / np.arange(1, n + 1)
-        b, bound = b[1:] * factor, bound[1:] * factor
-    return b, bound
+@kernel
+def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: int) -> int:
+    """Divide out theta**order in place: the first `order` coefficients are zero by decree. Returns how many are left.
+
+    The sign of what then leads is known by decree too, whatever rounding made of it.
+    """
+    n = coefficients.shape[0]
+    for _ in range(order):
+        for i in range(1, n):
+            factor = (n - 1) / i
+            coefficients[i - 1] = coefficients[i] * factor
+            bounds[i - 1] = bounds[i] * factor
+        n -= 1
+    if order > 0 and side != 0:
+        coefficients[0] = side * max(side * coefficients[0], 2.0 * bounds[0])
+    return n
+
+
+@kernel
+def quiet(values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray) -> np.ndarray:
+    """Which of the functions certainly keep their side over a whole step, from their samples (17, functions)."""
+    result = np.zeros(numbers.shape[0], dtype=np.bool_)
+    coefficients, bounds = np.empty(DEGREE + 1), np.empty(DEGREE + 1)
+    samples = np.empty(SAMPLES)
+    for k in range(numbers.shape[0]):
+        g = numbers[k]
+        if sides[g] == 0:
+            continue
+        for i in range(SAMPLES):
+            samples[i] = values[i, g]
+        error, largest = _represent(samples, coefficients)
+        if not error <= _ACCEPT * largest:
+            continue
+        bounds[:] = error
+        n = _deflated(coefficients, bounds, orders[g], sides[g])
+        result[k] = _sign(coefficients[:n], bounds[:n]) == sides[g]
+    return result
 
 
 def find_roots(
@@ -151,6 +195,7 @@ def find_roots(
     order: int,
     side: int,
     stop_at_first: int,
+    rounding: Callable[[], float],
 ) -> tuple[list[Crossing], list[Grazing], int]:
     """All changes of side of one guard over a step, theta in (0, 1].
 
@@ -159,6 +204,7 @@ def find_roots(
     sample : callable, thetas (k,) -> values (k,)
     first : values at `POINTS` over the whole step
     order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
+    rounding : bound of the rounding error of one value; asked for only where halving a piece does not help
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
     Returns the crossings and grazings in order, and the sign at the end of the step (0 where it is within the bound).
@@ -166,27 +212,29 @@ def find_roots(
     crossings: list[Crossing] = []
     grazings: list[Grazing] = []
     last, open_from = side, -1.0  # last certain sign; where the open stretch after it began
-    low = math.inf
+    low, pieces = math.inf, 0
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
     while waiting:
         a, b, samples, depth = waiting.pop()
         if samples is None:
             samples = sample(a + (b - a) * POINTS)
-        coefficients, error = represent(samples)
-        largest = float(np.max(np.abs(samples)))
-        if not math.isfinite(error) or (error > _ACCEPT * largest and depth < _DEEPEST):
-            if depth >= _DEEPEST:
-                break  # not a number beyond here: the step's own error control will see it
+        pieces += 1
+        if pieces > _MOST_PIECES:
+            raise StepFailure(
+                f"a guard could not be resolved within one step in {pieces} pieces: lower max_step"
+            )
+        coefficients = np.empty(DEGREE + 1)
+        error, largest = _represent(samples, coefficients)
+        if depth == _DEEPEST and not math.isfinite(error):
+            break  # not a number beyond here: the step's own error control will see it
+        resolved = error <= _ACCEPT * largest or depth == _DEEPEST
+        if not resolved and not (depth >= _ROUNDING_DEPTH and error <= _GROWTH * rounding()):
             middle = 0.5 * (a + b)
             waiting += [(middle, b, None, depth + 1), (a, middle, None, depth + 1)]
             continue
-        bounds = np.full(len(coefficients), error)
-        if a == 0.0 and order > 0:
-            coefficients, bounds = deflate(coefficients, bounds, order)
-            if side != 0:
-                # the leading coefficient's sign is known by decree, whatever rounding made of it
-                coefficients[0] = side * max(side * coefficients[0], 2.0 * bounds[0])
-        rows, count = sign_pattern(coefficients, bounds)
+        bounds = np.full(DEGREE + 1, error)
+        n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
+        rows, count = sign_pattern(coefficients[:n], bounds[:n])
         for left, right, sign in rows[:count]:
             x, y = a + (b - a) * left, a + (b - a) * right
             if sign == 0:

@@ -72,6 +72,29 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
     )
 
 
+class _Registers:
+    """Where the tape's inputs and results are, as index arrays."""
+
+    def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
+        def numbers(key: str) -> np.ndarray:
+            return np.array(tape[key], dtype=np.int64)
+
+        self.count: int = tape["registers"]
+        self.time: int = tape["time"]
+        self.constants = np.array([r for r, _ in tape["constants"]], dtype=np.int64)
+        self.values = np.array([v for _, v in tape["constants"]])
+        self.parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
+        self.sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
+        is_phase = (self.sources >= layout.phases_at) & (self.sources < layout.signals_at)
+        self.phases = self.parameters[is_phase]
+        self.states, self.derivatives = numbers("states"), numbers("derivatives")
+        self.guards, self.surfaces, self.monitors = (
+            numbers("guards"),
+            numbers("surfaces"),
+            numbers("monitors"),
+        )
+
+
 class System:
     """A model with values: what integrators and the mode loop work on."""
 
@@ -103,6 +126,7 @@ class System:
         for c, automaton in enumerate(self.automata):
             for numbers in automaton.guards:
                 self.owner[list(numbers)] = c
+        self._registers = _Registers(data["tape"], self.layout)
         self._tapes: dict[bytes, np.ndarray] = {}
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
 
@@ -222,21 +246,14 @@ class System:
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
     ) -> Series:
         """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
-        tape = self.code.data["tape"]
-        V, E = new_registers(tape["registers"], ORDER)
-        for register, value in tape["constants"]:
-            V[register, 0] = value
-        at = self.layout
-        for register, place in tape["parameters"]:
-            V[register, 0] = p[place]
-            if at.phases_at <= place < at.signals_at:
-                E[register, 0] = 2.0 * UNIT * abs(p[place])
-        if tape["time"] >= 0:
-            V[tape["time"], 0], E[tape["time"], 0] = s, s_error
-            V[tape["time"], 1] = 1.0
-        states = np.array(tape["states"], dtype=np.int64)
-        V[states, 0], E[states, 0] = x, x_error
-        derivatives = np.array(tape["derivatives"], dtype=np.int64)
-        run_tape(self._tape(z), ORDER, states, derivatives, V, E)
-        g, f, m = (list(tape[k]) for k in ("guards", "surfaces", "monitors"))
-        return Series(V[g], E[g], V[f], E[f], V[m], E[m], V[states])
+        place = self._registers
+        V, E = new_registers(place.count, ORDER)
+        V[place.constants, 0] = place.values
+        V[place.parameters, 0] = p[place.sources]
+        E[place.phases, 0] = 2.0 * UNIT * np.abs(V[place.phases, 0])
+        if place.time >= 0:
+            V[place.time, 0], E[place.time, 0], V[place.time, 1] = s, s_error, 1.0
+        V[place.states, 0], E[place.states, 0] = x, x_error
+        run_tape(self._tape(z), ORDER, place.states, place.derivatives, V, E)
+        g, f, m = place.guards, place.surfaces, place.monitors
+        return Series(V[g], E[g], V[f], E[f], V[m], E[m], V[place.states])
