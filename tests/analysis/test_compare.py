@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 import math
+import time
 from functools import cache
 
 import pytest
@@ -180,6 +181,14 @@ def test_timing_goes_in_turns() -> None:
     times = timed_in_turns([lambda: order.append("a"), lambda: order.append("b")], 3)
     assert order == ["a", "b"] * 3
     assert [len(spent) for spent in times] == [3, 3] and all(t >= 0 for spent in times for t in spent)
+
+
+def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
+    monkeypatch.setattr("hybridsim.analysis.timing.ENOUGH", 0.02)
+    turns = []
+    times = timed_in_turns([lambda: time.sleep(0.03), lambda: None], 3, turns.append)
+    assert [len(spent) for spent in times] == [1, 3]
+    assert turns == [0, 1] * 3
 
 
 @pytest.mark.parametrize(
