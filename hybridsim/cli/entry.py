@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from hybridsim import __version__
 from hybridsim.cli import cache, check, compare, integrators, models, run
-from hybridsim.cli.output import Written, complain
+from hybridsim.cli.output import INTERRUPTED, Written, complain
 from hybridsim.cli.parser import Parser
 from hybridsim.errors import HybridsimError
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 COMMANDS: tuple[ModuleType, ...] = (run, compare, check, models, integrators, cache)
 
-INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 PIPE_CLOSED = 141  # 128 + SIGPIPE
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
-from hybridsim.cli.output import Written, complain, print_json, require_writable
+from hybridsim.cli.output import INTERRUPTED, Written, complain, print_json, require_writable
 from hybridsim.cli.progress import Progress
-from hybridsim.errors import UsageError
+from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
@@ -85,19 +85,23 @@ def execute(args: argparse.Namespace, written: Written) -> int:
         print("\n".join(_summary(solution)))
     for warning in solution.warnings:
         complain(f"warning: {warning}")
-    if not solution.t.size:  # stopped before the first step: there is nothing to write
-        complain(f"{solution.status}: {solution.message}")
-        return 1
+    if solution.t.size:  # else it stopped before the first step, and there is nothing to write
+        _write(solution, args, written)
+    if solution.success:
+        return 0
+    complain(f"{solution.status}: {solution.message}")
+    return INTERRUPTED if solution.status == "interrupted" else SimulationError.exit_code
+
+
+def _write(solution: Solution, args: argparse.Namespace, written: Written) -> None:
     if args.csv:
         solution.to_csv(args.csv)
         written.add(args.csv)
     if args.plot:
-        _draw(solution, args.plot)
+        from hybridsim.plot import save, time_history
+
+        save(time_history(solution), args.plot)
         written.add(args.plot)
-    if not solution.success:
-        complain(f"{solution.status}: {solution.message}")
-        return 1
-    return 0
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
@@ -185,9 +189,3 @@ def _record(solution: Solution) -> dict[str, Any]:
         ],
         "stats": solution.stats,
     }
-
-
-def _draw(solution: Solution, path: Path) -> None:
-    from hybridsim.plot import save, time_history
-
-    save(time_history(solution), path)
