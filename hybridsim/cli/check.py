@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.output import Written, print_json
 
 if TYPE_CHECKING:
+    from hybridsim.engine.report import Report
     from hybridsim.model import Component, Guard, Mode, Model
 
 
@@ -27,15 +29,18 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, written: Written) -> int:
     """Print the expanded automaton; a bad model has already been refused on loading."""
+    from hybridsim.engine.report import describe
+
     model = values.changed_model(args)
+    report = describe(model)
     if args.json:
-        print_json(_record(model))
+        print_json(_record(model, report))
     else:
-        print("\n".join(_lines(model)))
+        print("\n".join([*_model_lines(model, report), "", *_engine_lines(report)]))
     return 0
 
 
-def _lines(model: Model) -> Iterator[str]:
+def _model_lines(model: Model, report: Report) -> Iterator[str]:
     yield f"{model.name}: {model.title}" if model.title else model.name
     for label in ("source", "look"):
         if text := getattr(model, label):
@@ -53,7 +58,7 @@ def _lines(model: Model) -> Iterator[str]:
         yield f"  {state.name}' = {state.der.text}"
         yield f"      from {starts[state.name]:.12g} {state.unit}".rstrip()
     for component in model.all_components():
-        yield from _component_lines(component)
+        yield from _component_lines(component, report)
 
 
 def _same_number(text: str, number: str) -> bool:
@@ -63,13 +68,25 @@ def _same_number(text: str, number: str) -> bool:
         return False
 
 
-def _component_lines(component: Component) -> Iterator[str]:
+def _engine_lines(report: Report) -> Iterator[str]:
+    together = [", ".join(cluster) for cluster in report.clusters if len(cluster) > 1]
+    yield f"decided together: {'; '.join(together) or 'no components'}"
+    linear = [
+        f"{name}.{mode}" if name else "the states" for name, modes in report.linear.items() for mode in modes
+    ]
+    yield f"linear: {', '.join(linear) or 'nothing'}"
+    cost = f"about {report.compile_seconds:.1g} s, once" if report.compile_seconds else "nothing, it is known"
+    yield f"compiling: {report.operations} operations, {cost}"
+
+
+def _component_lines(component: Component, report: Report) -> Iterator[str]:
     starts = f"starts in {component.initial}" if component.initial else "starts as the initial state decides"
     yield f"\ncomponent {component.name} ({starts})"
     if surface := component.surface:
         yield (
             f"  surface {surface.function.text}: {surface.above} above, {surface.below} below, "
             f"{surface.hold} on it, solving for {surface.unknown}"
+            + (f", {held} held exactly" if (held := report.held.get(component.name)) else "")
         )
     for mode in component.modes:
         yield f"  mode {mode.name}"
@@ -95,7 +112,7 @@ def _choice_lines(guard: Guard) -> Iterator[str]:
         yield f"          else stops: {guard.fatal}"
 
 
-def _record(model: Model) -> dict[str, Any]:
+def _record(model: Model, report: Report) -> dict[str, Any]:
     return {
         "name": model.name,
         "title": model.title,
@@ -121,4 +138,5 @@ def _record(model: Model) -> dict[str, Any]:
             }
             for component in model.all_components()
         },
+        "engine": asdict(report),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hybridsim.engine.decide import LEAVES
@@ -23,6 +25,32 @@ def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
             mode = automaton.modes[z[system.owner[g]]]
             return f"mode {mode} of {automaton.name} began here or came through a transition: its past is not unique"
     return ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A guard of another mode whose zero may be where the present mode was entered: modes to evaluate it in, number."""
+
+    z: np.ndarray
+    guard: int
+    label: str
+
+
+def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
+    """The ways into the present modes by declared transitions that reset nothing."""
+    found = []
+    for c, automaton in enumerate(system.automata):
+        if automaton.has_surface:
+            continue
+        for m, guards in enumerate(automaton.guards):
+            for j, g in enumerate(guards):
+                for number, target in enumerate(automaton.targets[m][j]):
+                    if target == z[c] and m != z[c] and ("choice", c, m, j, number) not in system.resets:
+                        other = z.copy()
+                        other[c] = m
+                        name = f"guard {automaton.guard_names[m][j]} of mode {automaton.modes[m]} ({automaton.name})"
+                        found.append(Entry(other, g, name))
+    return tuple(found)
 
 
 def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:

@@ -130,6 +130,13 @@ class ModeLoop:
     ) -> bool:
         """Settle what happens where a segment ended; True where the run stops."""
         schedules = appointment.schedules if appointment else ()
+        if arrival.entered:
+            self.origin = instant
+            self.record.status = "backward-nonunique"
+            self.record.message = (
+                f"at t = {float(instant)!r}: {arrival.entered} is zero: the mode may have begun here"
+            )
+            return True
         if not (arrival.fired or arrival.stopping or appointment):
             self.origin = instant
             return True

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.engine.backward import Entry, entries
 from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.locate import Findings, Hit, Locator
+from hybridsim.engine.locate import Findings, Hit, Locator, polish
+from hybridsim.engine.roots import POINTS, find_roots
 from hybridsim.engine.stepping import (
     Counters,
     Dense,
@@ -42,12 +44,16 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Arrival:
-    """The end of a segment: local time and state, the guards located there and the monitors that stop the run."""
+    """The end of a segment: local time and state, the guards located there and the monitors that stop the run.
+
+    entered names, backward in time, a guard through which the present mode may have been entered.
+    """
 
     s: float
     x: np.ndarray
     fired: tuple[int, ...] = ()
     stopping: tuple[int, ...] = ()
+    entered: str = ""
 
 
 class Still:
@@ -94,6 +100,7 @@ class SegmentRun:
         self.sightings: list[Sighting] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.last_step: float | None = None
+        self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
         """Step to the first event, or to the bound."""
@@ -110,6 +117,8 @@ class SegmentRun:
                 step, arrival = self._examine(stepper, step)
             else:
                 arrival = self._take_roots(step)
+            if self.entries:
+                step, arrival = self._look_for_entries(step, arrival)
             self.knots.append(step.s1)
             self.states.append(step.x1)
             self.interpolants.append(step.dense)
@@ -243,6 +252,27 @@ class SegmentRun:
             s = corrected
             ended = stepper.restep(step, s)
         return ended
+
+    def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
+        """Backward in time: stop where the present mode may have been entered through a guard of another."""
+        for entry in self.entries:
+            sample = self._entry_sampler(step, entry)
+            found, _, _ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0)
+            if found:
+                s = step.s0 + (step.s1 - step.s0) * polish(sample, found[0])
+                step = Step(step.s0, s, step.x0, step.dense(np.array([s]))[0], step.dense, step.roots)
+                arrival = Arrival(s, self._projected(step), entered=entry.label)
+        return step, arrival
+
+    def _entry_sampler(self, step: Step, entry: Entry) -> Callable[[np.ndarray], np.ndarray]:
+        system, p = self.system, self.flow.p
+
+        def sample(theta: np.ndarray) -> np.ndarray:
+            times = step.s0 + (step.s1 - step.s0) * theta
+            states = np.ascontiguousarray(step.dense(times))
+            return system.rows("guards", system.guard_count, times, states, p, entry.z)[:, entry.guard]
+
+        return sample
 
     # -- events that the method locates itself --------------------------------------------------------------
 
