@@ -1,0 +1,142 @@
+"""A model as text: its quantities, the automaton it expands to, its events, what the engine makes of it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hybridsim.engine.report import Report
+    from hybridsim.expr import Expression
+    from hybridsim.model import Component, Guard, Input, Mode, Model, Monitor, Schedule
+
+
+def lines_of(model: Model, report: Report) -> Iterator[str]:
+    """The whole description, line by line."""
+    yield f"{model.name}: {model.title}" if model.title else model.name
+    for label in ("source", "look"):
+        if text := getattr(model, label):
+            yield from textwrap.wrap(f"{label}: {text}", width=100, subsequent_indent="  ")
+    yield from _section("parameters", _parameters(model))
+    yield from _section("states", _states(model))
+    yield from _section("discrete states", _discrete(model))
+    yield from _section("definitions", (f"{name} = {_flat(value)}" for name, value in model.definitions))
+    yield from _section("inputs", map(_input, model.inputs))
+    laws = {contact.name: contact.law.name for contact in model.contacts}
+    for component in model.all_components():
+        kind = f"contact, law {laws[component.name]}" if component.name in laws else "component"
+        yield from _section(f"{component.name}: {kind}", _component(component, report))
+    yield from _section("monitors", map(_monitor, model.monitors))
+    yield from _section("schedules", map(_schedule, model.schedules))
+    yield from _section("outputs", (f"{output.name} = {_flat(output.expr)}" for output in model.outputs))
+    yield from _section("engine", _engine(report))
+
+
+def _flat(expression: Expression) -> str:
+    """Text of an expression in one line; a file may have it in several."""
+    return " ".join(expression.text.split())
+
+
+def _section(title: str, lines: Iterable[str]) -> Iterator[str]:
+    for i, line in enumerate(lines):
+        if i == 0:
+            yield f"\n{title}"
+        yield f"  {line}"
+
+
+def _parameters(model: Model) -> Iterator[str]:
+    numbers = model.parameter_values()
+    for parameter in model.parameters:
+        formula = f"{_flat(parameter.value)} = " if parameter.value.names else ""
+        yield f"{parameter.name} = {formula}{numbers[parameter.name]:.12g} {parameter.unit}".rstrip()
+
+
+def _states(model: Model) -> Iterator[str]:
+    starts = model.start_values()
+    for state in model.states:
+        start = f"{starts[state.name]:.12g} {state.unit}".rstrip()
+        yield f"{state.name}' = {_flat(state.der)}   from {start}"
+
+
+def _discrete(model: Model) -> Iterator[str]:
+    starts = model.discrete_values()
+    for part in model.discrete:
+        yield f"{part.name}   from {starts[part.name]:.12g} {part.unit}".rstrip()
+
+
+def _input(declared: Input) -> str:
+    if declared.kind == "table":
+        return f"{declared.name}: table of {len(declared.times)} points, {declared.interpolation}"
+    numbers = ", ".join(f"{name} {_flat(value)}" for name, value in declared.expressions.items())
+    return f"{declared.name}: {declared.shape or declared.kind}, {numbers}"
+
+
+def _component(component: Component, report: Report) -> Iterator[str]:
+    yield f"starts in {component.initial}" if component.initial else "starts as the initial state decides"
+    sides: tuple[str, ...] = ()
+    if surface := component.surface:
+        sides = (surface.above, surface.below, surface.hold)
+        held = report.held.get(component.name)
+        yield (
+            f"{surface.above} where {_flat(surface.function)} > 0, {surface.below} where it is < 0; "
+            f"{surface.hold} keeps it at 0 by {surface.unknown}" + (f", with {held} exact" if held else "")
+        )
+    for mode in component.modes:
+        linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
+        yield f"mode {mode.name}{linear}"
+        yield from (f"    {line}" for line in _mode(mode, [side for side in sides if side != mode.name]))
+
+
+def _mode(mode: Mode, sides: list[str]) -> Iterator[str]:
+    for variable, expression in mode.set.items():
+        yield f"{variable} = {_flat(expression)}"
+    for state, expression in mode.der.items():
+        yield f"{state}' = {_flat(expression)}"
+    for guard in mode.guards:
+        yield f"while {_flat(guard.expr)} >= 0   ({guard.name})"
+        yield from (f"    {line}" for line in _then(guard, sides))
+
+
+def _then(guard: Guard, sides: list[str]) -> Iterator[str]:
+    for choice in guard.then:
+        condition = f"if {_flat(choice.when)}: " if choice.when else ""
+        yield f"{condition}to {choice.to}{_resets(choice.reset)}"
+    if guard.fatal:
+        yield f"else the run stops: {guard.fatal}"
+    elif not guard.then and sides:
+        yield f"to {' or '.join(sides)}, whichever is admissible"
+
+
+def _resets(reset: Mapping[str, Expression]) -> str:
+    changes = ", ".join(f"{name} := {_flat(value)}" for name, value in reset.items())
+    return f" with {changes}" if changes else ""
+
+
+def _monitor(monitor: Monitor) -> str:
+    does = _resets(monitor.reset).strip() or monitor.action
+    return f"{monitor.name}: {_flat(monitor.expr)} through 0, {monitor.direction}: {does}"
+
+
+def _schedule(schedule: Schedule) -> str:
+    if schedule.times:
+        when = "at " + ", ".join(_flat(time) for time in schedule.times)
+    else:
+        when = f"from {_flat(schedule.start) if schedule.start else '0'}"
+        if schedule.period:
+            when += f" every {_flat(schedule.period)}"
+        if schedule.count:
+            when += f", {schedule.count} times"
+    return f"{schedule.name}: {when}{_resets(schedule.reset)}" + (
+        ", ends the run" if schedule.terminate else ""
+    )
+
+
+def _engine(report: Report) -> Iterator[str]:
+    clusters = [", ".join(cluster) for cluster in report.clusters]
+    if clusters:
+        yield f"clusters, each decided jointly: {'; '.join(clusters)}"
+    cost = (
+        f"about {report.compile_seconds:.1g} s, once" if report.compile_seconds else "nothing, it is cached"
+    )
+    yield f"compiling its {report.operations} operations costs {cost}"
