@@ -30,7 +30,7 @@ class Instant(NamedTuple):
         return high + (error + (self.low - other.low))
 
     def __float__(self) -> float:
-        return self.high + self.low
+        return float(self.high + self.low)  # a NumPy double would be refused here
 
 
 def two_sum(a: float, b: float) -> tuple[float, float]:
