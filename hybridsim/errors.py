@@ -67,9 +67,6 @@ class HybridsimError(Exception):
             lines.append(self.remedy)
         return _printable("\n".join(lines))
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (type(self), self.__dict__)
-
 
 class ModelError(HybridsimError):
     """A model that cannot be; ``errors`` holds every fault found, each with its own place and remedy."""
@@ -85,7 +82,12 @@ class ModelError(HybridsimError):
         errors: Iterable[ModelError] = (),
     ) -> None:
         super().__init__(message, place=place, remedy=remedy)
-        self.errors: tuple[ModelError, ...] = tuple(errors) or (self,)
+        self._errors = tuple(errors)
+
+    @property
+    def errors(self) -> tuple[ModelError, ...]:
+        """Every fault by itself; this error alone if it stands for no others."""
+        return self._errors or (self,)
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
@@ -137,11 +139,3 @@ def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int |
     head, tail = ("..." if start else ""), ("..." if start + width < len(text) else "")
     shifted = None if column is None else column - start + len(head)
     return head + text[start : start + width] + tail, shifted
-
-
-def _rebuild(kind: type[HybridsimError], state: dict[str, object]) -> HybridsimError:
-    """Carry an error between processes whole (the default would lose place and remedy)."""
-    error = kind.__new__(kind)
-    error.__dict__.update(state)
-    error.args = (state["message"],)
-    return error

@@ -27,12 +27,11 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     ModelError with file and line: no such file or column, a cell that is no number.
     """
     rows = _rows(path)
-    if not rows:
-        raise ModelError(
-            "the table has no rows", place=Place(str(path)), remedy="give time and value in each row."
-        )
-    head = [cell.strip() for cell in rows[0][1]]
+    head = [cell.strip() for cell in rows[0][1]] if rows else []
     names = None if all(_is_number(cell) for cell in head) else head
+    if len(rows) < (2 if names else 1):
+        remedy = "give time and value in each row."
+        raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     indices = [_index(column, names, len(head), path) for column in columns]
     found: list[tuple[float, ...]] = []
     for index in indices:
@@ -43,6 +42,8 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     try:
         size = path.stat().st_size
+        if not path.is_file():  # a device or a pipe may have no end
+            raise ModelError(f"{path} is no file", remedy="give a CSV file.")
         if size > MAX_BYTES:
             raise ModelError(f"{path} has {size} bytes, {MAX_BYTES} are allowed", remedy="thin it out.")
         lines = path.read_text(encoding="utf-8-sig").splitlines()

@@ -62,6 +62,7 @@ def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
     try:
         times, values = read_columns(path, columns)
     except ModelError as fault:
-        table.fail(str(fault), f"the path is taken from {folder}.", "file")
+        where = fault.place.prefix if fault.place else ""
+        table.fail(where + fault.message, f"{fault.remedy} Paths are taken from {folder}.", "file")
         return {}
     return {"times": times, "values": values}

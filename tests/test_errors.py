@@ -1,0 +1,71 @@
+"""Messages: where, what, the source with a caret, and what to do."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from hybridsim.errors import (
+    ExpressionError,
+    HybridsimError,
+    ModelError,
+    Place,
+    SimulationError,
+    UsageError,
+    nearest,
+)
+
+
+def test_the_parts_of_a_message() -> None:
+    error = HybridsimError("no good", place=Place("m.toml", 3, 4, "a + b"), remedy="write c.")
+    assert str(error) == "m.toml:3: no good\n    a + b\n        ^\nwrite c."
+
+
+@pytest.mark.parametrize(
+    ("place", "head"),
+    [(None, ""), (Place(), ""), (Place("a"), "a: "), (Place("a", 2), "a:2: "), (Place(line=2), "line 2: ")],
+)
+def test_what_is_not_known_is_not_shown(place: Place | None, head: str) -> None:
+    assert str(HybridsimError("no good", place=place)) == head + "no good"
+
+
+@pytest.mark.parametrize(
+    ("kind", "code"),
+    [(HybridsimError, 1), (SimulationError, 1), (UsageError, 2), (ModelError, 3), (ExpressionError, 3)],
+)
+def test_exit_codes(kind: type[HybridsimError], code: int) -> None:
+    assert kind("x").exit_code == code
+    assert isinstance(kind("x"), HybridsimError)
+
+
+def test_bad_usage_is_a_value_error_for_those_who_know_scipy() -> None:
+    with pytest.raises(ValueError, match="x"):
+        raise UsageError("x")
+
+
+def test_collected_errors() -> None:
+    one, two = ModelError("first", place=Place("m", 1)), ExpressionError("second", place=Place("m", 2))
+    both = ModelError.collect([one, two], "model m")
+    assert both.errors == (one, two)
+    assert str(both).splitlines() == ["model m: 2 errors", "m:1: first", "m:2: second"]
+    assert ModelError.collect([one], "model m") is one
+    assert one.errors == (one,)
+    assert ModelError.collect([both, one], "more").errors == (one, two, one)
+
+
+def test_errors_travel_between_processes_whole() -> None:
+    error = ModelError.collect(
+        [ExpressionError("a", place=Place("m", 1, 2, "text"), remedy="r"), ModelError("b")], "m"
+    )
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error)
+    assert type(again.errors[0]) is ExpressionError and again.errors[0].place == Place("m", 1, 2, "text")
+
+
+def test_nearest_names() -> None:
+    assert nearest("omga", ["omega", "mu", "N"]) == "did you mean 'omega'?"
+    assert nearest("n", ["N", "mu"]) == "did you mean 'N'?"
+    assert nearest("zzz", ["b", "a"], kind="laws") == "known laws: a, b."
+    assert nearest("zzz", [], kind="laws") == "there are no laws here."
+    assert "(40 in all)" in nearest("zzz", [f"parameter_{i}" for i in range(40)])
