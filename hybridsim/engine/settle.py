@@ -115,7 +115,8 @@ class Settling:
         for _ in range(limit):
             failure = self._decide(open_)
             if failure:
-                return self._stop(*failure)
+                message = self._fatal_among(located)
+                return self._stop(*(("inconsistent", message) if message else failure))
             verdicts = self._judge_all()
             leaving = {c for c, v in verdicts.items() if v == LEAVES}
             for c, v in verdicts.items():
@@ -208,6 +209,15 @@ class Settling:
             for j, g in enumerate(automaton.guards[mode]):
                 if self.sides[g] < 0 and automaton.fatal[mode][j]:
                     return automaton.fatal[mode][j]
+        return None
+
+    def _fatal_among(self, located: set[int]) -> str | None:
+        """Message of a fatal guard that was located at zero: where nothing is admissible, it says why."""
+        for automaton in self.system.automata:
+            for guards, messages in zip(automaton.guards, automaton.fatal, strict=True):
+                for guard, message in zip(guards, messages, strict=False):
+                    if message and guard in located:
+                        return message
         return None
 
     # -- transitions by declared choices --------------------------------------------------------------------
