@@ -91,8 +91,8 @@ class ModelError(HybridsimError):
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """One error out of many: the only one itself, or a list of all under a title."""
-        found = tuple(single for error in errors for single in error.errors)
+        """One error out of many: the only one itself, or a list of all, by line, under a title."""
+        found = sorted((single for error in errors for single in error.errors), key=_line)
         if len(found) == 1:
             return found[0]
         message = "\n".join([f"{title}: {len(found)} errors", *(str(error) for error in found)])
@@ -124,6 +124,10 @@ def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
         return f"there are no {kind} here."
     shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
     return f"known {kind}: {shown}."
+
+
+def _line(error: HybridsimError) -> int:
+    return (error.place.line if error.place else None) or 0
 
 
 def _printable(text: str) -> str:

@@ -26,7 +26,9 @@ SAMPLES = 2 * DEGREE + 1
 # A piece is accepted when its error bound is below this share of the guard's largest value on it: about the
 # square root of the unit roundoff, so that a dip must be deeper than rounding to count and halving stays short.
 _ACCEPT = 2.0**-30
-_DEEPEST = 40  # halvings of a step: beyond 2**-40 of it a piece is accepted with whatever bound it has
+# Halvings of a step: theta itself is rounded to 2**-53, so a function of it cannot be resolved to 2**-30 of its size on
+# a piece narrower than 2**-23. A few halvings later a piece is accepted with whatever bound it has.
+_DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
 _MOST_PIECES = 1_000_000  # a guard that needs more oscillates a hundred thousand times within one step
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it

@@ -27,6 +27,7 @@ from hybridsim.integrators.rk4_kernels import (
     ZONE,
     rk4_step,
     run_steps,
+    workspace,
 )
 
 _ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
@@ -77,7 +78,8 @@ class FixedStepRun:
         names = ("flow", "surfaces", "guards", "monitors", "project")
         self.addresses = tuple(system.address(n) for n in names)
         self.counts = np.zeros(3, dtype=np.int64)
-        self.first = 0.0
+        self.law = (settings.rule, settings.every_stage, settings.eps)
+        self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
 
     def run(self) -> Trajectory:
         """Step to the end; what was computed is kept in any case."""
@@ -120,22 +122,15 @@ class FixedStepRun:
         numbers = (
             system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
         )
-        flags = (
-            set_.rule,
-            int(set_.every_stage),
-            int(set_.dichotomy),
-            int(set_.zeroed),
-            int(set_.located),
-            int(set_.rest_of_step),
-        )
+        flags = (set_.dichotomy, set_.zeroed, set_.located, set_.rest_of_step)
         start_z = self.z.copy()
         count, why = run_steps(
             self.addresses,
-            (set_.step, set_.eps, float(set_.halvings), self.first, float(system.guard_count)),
+            (set_.step, set_.halvings),
+            self.law,
             flags,
             self.table,
             numbers,
-            0.0,
             bound,
             p,
             self.x,
@@ -144,9 +139,9 @@ class FixedStepRun:
             times,
             states,
             modes,
+            self.work,
             self.counts,
         )
-        self.first = 0.0
         self._keep(p, times[:count], states[:count], modes[:count], start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
@@ -203,24 +198,8 @@ class FixedStepRun:
         return self._settle(instant, tuple(g for g in watched if guards[g] < 0.0), (), best)
 
     def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
-        set_, system = self.settings, self.system
-        out = np.empty(system.n)
-        rk4_step(
-            self.addresses,
-            set_.rule,
-            set_.every_stage,
-            set_.eps,
-            set_.zeroed,
-            self.table,
-            s,
-            tau,
-            self.x,
-            p,
-            self.z,
-            out,
-            np.zeros(max(len(self.table), 1)),
-            np.zeros(max(system.guard_count, 1)),
-        )
+        out = np.empty(self.system.n)
+        rk4_step(self.addresses, self.law, self.table, s, tau, self.x, p, self.z, out, self.work)
         self.counts[0] += 4
         return out
 

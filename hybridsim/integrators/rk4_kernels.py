@@ -15,11 +15,19 @@ ZONE, SIGN = 0, 1
 
 
 @kernel
+def _any_held(table: Any, z: Any) -> bool:
+    """Whether a surface component is in its holding mode."""
+    for k in range(table.shape[0]):
+        if z[table[k, 0]] == table[k, 3]:
+            return True
+    return False
+
+
+@kernel
 def choose_modes(
     addresses: Any,
     rule: int,
     eps: float,
-    zeroed: bool,
     table: Any,
     s: float,
     x: Any,
@@ -43,7 +51,7 @@ def choose_modes(
             z[c] = table[k, 2]
         else:
             z[c] = table[k, 3]
-    if rule == SIGN:
+    if rule == SIGN or not _any_held(table, z):
         return
     for _ in range(table.shape[0] + 1):
         call(addresses[2], s, x, p, z, guards)
@@ -87,35 +95,37 @@ def slope(
 
 @kernel
 def rk4_step(
-    addresses: Any,
-    rule: int,
-    every_stage: bool,
-    eps: float,
-    zeroed: bool,
-    table: Any,
-    s: float,
-    h: float,
-    x: Any,
-    p: Any,
-    z: Any,
-    out: Any,
-    surfaces: Any,
-    guards: Any,
+    addresses: Any, law: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, out: Any, work: Any
 ) -> None:
-    """One classic Runge-Kutta step of length h from (s, x) in z; the modes held over it, or chosen at every stage."""
-    n = x.shape[0]
-    k = np.empty((4, n))
-    work, stage, modes = np.empty(n), np.empty(n), z.copy()
-    slope(addresses, rule, table, s, x, p, modes, k[0], work)
+    """One classic Runge-Kutta step of length h from (s, x) in z; the modes held over it, or chosen at every stage.
+
+    law: rule, every stage, eps. work: slopes (4, n), states (2, n), modes, surface values, guard values.
+    """
+    rule, every_stage, eps = law
+    k, states, modes, surfaces, guards = work
+    stage, n = states[0], x.shape[0]
+    modes[:] = z
+    slope(addresses, rule, table, s, x, p, modes, k[0], states[1])
     for j in range(1, 4):
         c = 0.5 if j < 3 else 1.0
         for i in range(n):
             stage[i] = x[i] + c * h * k[j - 1, i]
         if every_stage:
-            choose_modes(addresses, rule, eps, zeroed, table, s + c * h, stage, p, modes, surfaces, guards)
-        slope(addresses, rule, table, s + c * h, stage, p, modes, k[j], work)
+            choose_modes(addresses, rule, eps, table, s + c * h, stage, p, modes, surfaces, guards)
+        slope(addresses, rule, table, s + c * h, stage, p, modes, k[j], states[1])
     for i in range(n):
         out[i] = x[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+
+
+def workspace(n: int, components: int, surfaces: int, guards: int) -> tuple[np.ndarray, ...]:
+    """Arrays that `rk4_step` works in."""
+    return (
+        np.empty((4, n)),
+        np.empty((2, n)),
+        np.empty(components, dtype=np.int64),
+        np.empty(max(surfaces, 1)),
+        np.empty(max(guards, 1)),
+    )
 
 
 @kernel
@@ -146,13 +156,62 @@ def _released(values: Any, table: Any, z: Any) -> bool:
 
 
 @kernel
+def _halve_step(
+    addresses: Any,
+    law: Any,
+    halvings: int,
+    table: Any,
+    s: float,
+    h: float,
+    x: Any,
+    p: Any,
+    z: Any,
+    row: int,
+    sign: float,
+    out: Any,
+    after: Any,
+    guards: Any,
+    work: Any,
+    counters: Any,
+) -> float:
+    """The dichotomy: halve the step of length h until surface `row` is within eps; row < 0: until a limit is passed.
+
+    Leaves the state there in `out` and returns the length of the step to it.
+    """
+    low, high, tau = 0.0, h, h
+    for _ in range(halvings):
+        tau = 0.5 * (low + high)
+        rk4_step(addresses, law, table, s, tau, x, p, z, out, work)
+        counters[0] += 4
+        counters[2] += 1
+        if row >= 0:
+            call(addresses[1], s + tau, out, p, z, after)
+            if abs(after[row]) <= law[2]:
+                return tau
+            beyond = after[row] * sign < 0.0
+        else:
+            call(addresses[2], s + tau, out, p, z, guards)
+            beyond = _released(guards, table, z)
+        if beyond:
+            high = tau
+        else:
+            low = tau
+    if row >= 0:
+        return tau
+    # the end of the bracket where the limit is passed, so that the release is seen
+    rk4_step(addresses, law, table, s, high, x, p, z, out, work)
+    counters[0] += 4
+    return high
+
+
+@kernel
 def run_steps(
     addresses: Any,
     settings: Any,
+    law: Any,
     flags: Any,
     table: Any,
     watched: Any,
-    s: float,
     bound: float,
     p: Any,
     x: Any,
@@ -161,30 +220,30 @@ def run_steps(
     times: Any,
     states: Any,
     modes: Any,
+    work: Any,
     counters: Any,
 ) -> tuple[int, int]:
-    """Fixed steps from (s, x) towards the bound, until something needs the caller.
+    """Fixed steps from local time 0 in (x, z) towards the bound, until something needs the caller.
 
-    addresses: flow, surfaces, guards, monitors, project. settings: step, eps, halvings, length of a first step (0:
-    none). flags: rule, every stage, dichotomy, zeroed, located release, rest of step. counters: rhs, guards, halvings.
+    addresses: flow, surfaces, guards, monitors, project. settings: step, halvings. law, work: as for `rk4_step`.
+    flags: dichotomy, zeroed, located release, rest of step. counters: rhs, guards, halvings.
     Row k of times, states, modes holds the start of step k and the modes it was taken in; the last row the end.
     Returns (number of rows, why it ended).
     """
-    step, eps, halvings, first = settings[0], settings[1], int(settings[2]), settings[3]
-    rule, every_stage, dichotomy = flags[0], flags[1] != 0, flags[2] != 0
-    zeroed, located, rest = flags[3] != 0, flags[4] != 0, flags[5] != 0
-    n, direction = x.shape[0], 1.0 if bound >= s else -1.0
-    surfaces, after = np.zeros(max(table.shape[0], 1)), np.zeros(max(table.shape[0], 1))
-    guards = np.zeros(max(int(settings[4]), 1))
+    step, halvings = settings
+    rule, _, eps = law
+    dichotomy, zeroed, located, rest = flags
+    n, s, direction = x.shape[0], 0.0, 1.0 if bound >= 0.0 else -1.0
+    surfaces, after, guards = work[3].copy(), work[3].copy(), work[4].copy()
     monitors, monitors_after = np.zeros(max(monitor_count, 1)), np.zeros(max(monitor_count, 1))
-    trial, work = np.empty(n), np.empty(n)
-    planned = first if first > 0.0 else step
-    row = 0
+    trial, held = np.empty(n), np.empty(n)
+    planned, row = step, 0
     while True:
-        choose_modes(addresses, rule, eps, zeroed, table, s, x, p, z, surfaces, guards)
-        if zeroed:
-            call(addresses[4], s, x, p, z, work)
-            x[:] = work
+        choose_modes(addresses, rule, eps, table, s, x, p, z, surfaces, guards)
+        if zeroed and _any_held(table, z):
+            call(addresses[4], s, x, p, z, held)
+            x[:] = held
+            call(addresses[1], s, x, p, z, surfaces)
         times[row] = s
         states[row] = x
         modes[row] = z
@@ -196,16 +255,16 @@ def run_steps(
         last = direction * (bound - s) <= planned * (1.0 + 1e-12)
         h = bound - s if last else direction * planned
         planned = step
-        call(addresses[1], s, x, p, z, surfaces)
-        rk4_step(addresses, rule, every_stage, eps, zeroed, table, s, h, x, p, z, trial, after, guards)
+        rk4_step(addresses, law, table, s, h, x, p, z, trial, work)
         counters[0] += 4
         for i in range(n):
             if not np.isfinite(trial[i]):
                 return row, NOT_FINITE
-        call(addresses[2], s + h, trial, p, z, guards)
-        counters[1] += 1
-        if _leaves(guards, watched):
-            return row, GUARD
+        if watched.shape[0] > 0:
+            call(addresses[2], s + h, trial, p, z, guards)
+            counters[1] += 1
+            if _leaves(guards, watched):
+                return row, GUARD
         if monitor_count > 0:
             call(addresses[3], s, x, p, z, monitors)
             call(addresses[3], s + h, trial, p, z, monitors_after)
@@ -214,68 +273,34 @@ def run_steps(
                 if monitors[k] != 0.0 and changed and monitors[k] * monitors_after[k] <= 0.0:
                     return row, MONITOR
         if dichotomy:
-            freed = located and _released(guards, table, z)
+            freed = False
+            if located and _any_held(table, z):
+                call(addresses[2], s + h, trial, p, z, guards)
+                counters[1] += 1
+                freed = _released(guards, table, z)
             call(addresses[1], s + h, trial, p, z, after)
             k = _reversed_surface(surfaces, after, table, z)
             if k >= 0 or freed:
-                low, high, sign = 0.0, h, surfaces[max(k, 0)]
-                tau = h
-                for _ in range(halvings):
-                    tau = 0.5 * (low + high)
-                    rk4_step(
-                        addresses,
-                        rule,
-                        every_stage,
-                        eps,
-                        zeroed,
-                        table,
-                        s,
-                        tau,
-                        x,
-                        p,
-                        z,
-                        trial,
-                        after,
-                        guards,
-                    )
-                    counters[0] += 4
-                    counters[2] += 1
-                    if k >= 0:
-                        call(addresses[1], s + tau, trial, p, z, after)
-                        if abs(after[k]) <= eps:
-                            break
-                        beyond = after[k] * sign < 0.0
-                    else:
-                        call(addresses[2], s + tau, trial, p, z, guards)
-                        beyond = _released(guards, table, z)
-                    if beyond:
-                        high = tau
-                    else:
-                        low = tau
-                if k < 0:
-                    # the end of the bracket where the limit is passed, so that the release is seen
-                    tau = high
-                    rk4_step(
-                        addresses,
-                        rule,
-                        every_stage,
-                        eps,
-                        zeroed,
-                        table,
-                        s,
-                        tau,
-                        x,
-                        p,
-                        z,
-                        trial,
-                        after,
-                        guards,
-                    )
-                    counters[0] += 4
-                if rest and abs(h) > abs(tau):
+                tau = _halve_step(
+                    addresses,
+                    law,
+                    halvings,
+                    table,
+                    s,
+                    h,
+                    x,
+                    p,
+                    z,
+                    k,
+                    surfaces[max(k, 0)],
+                    trial,
+                    after,
+                    guards,
+                    work,
+                    counters,
+                )
+                if rest and abs(h - tau) > 1e-9 * step:
                     planned = abs(h - tau)
-                    if planned < 1e-9 * step:
-                        planned = step
                 h, last = tau, False
         s = bound if last else s + h
         x[:] = trial

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from hybridsim.plot import style
-from hybridsim.plot.pieces import extent, pieces_of, unit_of, window_of
+from hybridsim.plot.pieces import Piece, extent, pieces_of, unit_of, window_of
 from hybridsim.plot.scale import label_axis
 
 if TYPE_CHECKING:
@@ -18,12 +19,11 @@ if TYPE_CHECKING:
 
     from hybridsim.solution import Solution
 
-_HELD, _FREE, _DOT = (
-    3.0,
-    1.2,
-    5.0,
-)  # widths of a held (stuck) piece and of others, and its size where it is a point
-_VISIBLE = 1e-3  # of the range
+Points = NDArray[np.float64]
+
+_HELD, _FREE = 3.0, 1.2  # line widths where a surface holds (stick), and elsewhere
+_DOT = 5.0  # size of a stretch that stays at a point
+_VISIBLE = 1e-3  # of the range: what is smaller is a point, or no jump
 
 
 def draw_orbit(
@@ -43,16 +43,12 @@ def draw_orbit(
     held_modes = set(surfaces.values())
     spans = [extent(pieces, name) for name in (across, up)]
     least = np.array([_VISIBLE * ((high - low) or 1.0) for low, high in spans])
-    lines: dict[str, list[np.ndarray]] = {}
-    dots: dict[str, list[np.ndarray]] = {}
-    ends = []
-    for piece in pieces:
-        points = np.column_stack([piece.values[across], piece.values[up]])
-        ends.append((points[0], points[-1]))
-        held = [mode for component, mode in piece.modes.items() if surfaces.get(component) == mode]
-        mode = (held or [*piece.modes.values(), ""])[0]
-        at_a_point = bool(np.all(np.ptp(points, axis=0) < least))
-        (dots if at_a_point else lines).setdefault(mode, []).append(points)
+    lines: dict[str, list[Points]] = {}
+    dots: dict[str, list[Points]] = {}
+    stretches, jumps = _stretches(pieces, across, up, surfaces, least)
+    for mode, points in stretches:
+        stays = bool(np.all(np.ptp(points, axis=0) < least))
+        (dots if stays else lines).setdefault(mode, []).append(points)
     for mode in dict.fromkeys([*lines, *dots]):
         colour = colours.get(mode, style.INK)
         width = _HELD if mode in held_modes else _FREE
@@ -62,11 +58,6 @@ def draw_orbit(
         if mode in dots:
             x, y = np.array([points[0] for points in dots[mode]]).T
             axes.plot(x, y, "o", color=colour, markersize=_DOT)
-    jumps = [
-        (before[1], after[0])
-        for before, after in itertools.pairwise(ends)
-        if np.any(np.abs(after[0] - before[1]) > least)
-    ]
     axes.add_collection(
         LineCollection(jumps, colors=style.FAINT, linewidths=0.9, linestyles=[(0, (3, 2))], zorder=1.5)
     )
@@ -95,3 +86,25 @@ def draw_orbit(
     title = ": ".join(part for part in (model.title or model.name, window.note) if part)
     axes.set_title(style.literal(title), fontsize=10, loc="left")
     return axes
+
+
+def _stretches(
+    pieces: Sequence[Piece], across: str, up: str, surfaces: Mapping[str, str], least: Points
+) -> tuple[list[tuple[str, Points]], list[tuple[Points, Points]]]:
+    """Continuous stretches of one mode, whatever ticked meanwhile, and the jumps between them."""
+    stretches: list[tuple[str, list[Points]]] = []
+    jumps = []
+    for piece in pieces:
+        points = np.column_stack([piece.values[across], piece.values[up]])
+        held = [mode for component, mode in piece.modes.items() if surfaces.get(component) == mode]
+        mode = (held or [*piece.modes.values(), ""])[0]
+        if stretches:
+            last_mode, parts = stretches[-1]
+            last = parts[-1][-1]
+            if np.any(np.abs(points[0] - last) > least):
+                jumps.append((last, points[0]))
+            elif mode == last_mode:
+                parts.append(points)
+                continue
+        stretches.append((mode, [points]))
+    return [(mode, np.concatenate(parts)) for mode, parts in stretches], jumps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -114,9 +115,10 @@ def _draw(axis: Axes, pieces: Sequence[Piece], name: str) -> None:
 
 
 def _mark(axis: Axes, events: Sequence[Event]) -> None:
-    """A thin line at each event, where they can be told apart; a triangle at the top for a monitor's."""
-    if len(events) <= _MOST_MARKS:
-        for event in events:
+    """A thin line at each event of a kind that can be told apart; a triangle at the top for a monitor's."""
+    kinds = Counter(event.kind for event in events)
+    for event in events:
+        if kinds[event.kind] <= _MOST_MARKS:
             axis.axvline(event.t, color=style.MARK, linewidth=0.6, zorder=0.9)
     monitors = [event.t for event in events if event.kind == "monitor"]
     if monitors and len(monitors) <= _MOST_MARKS:
