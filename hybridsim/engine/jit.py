@@ -100,7 +100,9 @@ else:
 
 
 def announce_compilation() -> None:
-    """Say once, on stderr, that the engine is being compiled, if no kernel of it is on disk yet."""
-    if ENABLED and not kernel_folder().exists():
-        kernel_folder().mkdir(parents=True, exist_ok=True)
+    """Say once, on stderr, that the engine is being compiled, if no run of it has been announced here yet."""
+    announced = kernel_folder() / "announced"  # the folder itself is made by numba as soon as a kernel is defined
+    if ENABLED and not announced.exists():
+        announced.parent.mkdir(parents=True, exist_ok=True)
+        announced.touch()
         print("hybridsim: compiling the engine, once (some 20 s) ...", file=sys.stderr, flush=True)
