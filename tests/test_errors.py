@@ -46,12 +46,12 @@ def test_bad_usage_is_a_value_error_for_those_who_know_scipy() -> None:
 
 def test_collected_errors() -> None:
     one, two = ModelError("first", place=Place("m", 1)), ExpressionError("second", place=Place("m", 2))
-    both = ModelError.collect([one, two], "model m")
+    both = ModelError.collect([two, one], "model m")
     assert both.errors == (one, two)
     assert str(both).splitlines() == ["model m: 2 errors", "m:1: first", "m:2: second"]
     assert ModelError.collect([one], "model m") is one
     assert one.errors == (one,)
-    assert ModelError.collect([both, one], "more").errors == (one, two, one)
+    assert ModelError.collect([both, one], "more").errors == (one, one, two)
 
 
 def test_errors_travel_between_processes_whole() -> None:
@@ -60,7 +60,7 @@ def test_errors_travel_between_processes_whole() -> None:
     )
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error)
-    assert type(again.errors[0]) is ExpressionError and again.errors[0].place == Place("m", 1, 2, "text")
+    assert type(again.errors[-1]) is ExpressionError and again.errors[-1].place == Place("m", 1, 2, "text")
 
 
 def test_nearest_names() -> None:
