@@ -101,7 +101,8 @@ else:
 
 def announce_compilation() -> None:
     """Say once, on stderr, that the engine is being compiled, if no run of it has been announced here yet."""
-    announced = kernel_folder() / "announced"  # the folder itself is made by numba as soon as a kernel is defined
+    # the folder alone proves nothing: numba makes it as soon as a kernel is defined
+    announced = kernel_folder() / "announced"
     if ENABLED and not announced.exists():
         announced.parent.mkdir(parents=True, exist_ok=True)
         announced.touch()
