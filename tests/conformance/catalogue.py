@@ -41,7 +41,7 @@ def contacts() -> tuple[Scene, ...]:
             "belt",
             tuple(fact["t_span"]),
             Truth(events, states, checks=(("exact-stick", exact_stick("f", {"v": 0.2})),)),
-            needs("contacts"),
+            needs("contacts", "exact-stick"),
             params={"delta": delta},
             start={"x": x, "v": v},
             unit=10.0,
@@ -55,7 +55,7 @@ def contacts() -> tuple[Scene, ...]:
         "stribeck",
         (0.0, 5.0),
         Truth(events, states, checks=resting),
-        needs("contacts"),
+        needs("contacts", "exact-stick"),
         unit=4.0,
         start_is_event=False,
         speed=8.0,
@@ -67,7 +67,7 @@ def contacts() -> tuple[Scene, ...]:
         "blocks",
         (0.0, 12.0),
         Truth(events, states, checks=stops),
-        needs("contacts"),
+        needs("contacts", "exact-stick"),
         unit=5.0,
         start_is_event=False,
     )
@@ -218,7 +218,12 @@ def monitored() -> tuple[Scene, ...]:
     exact = {"tol_t": 1e-9, "tol_x": 1e-9}
     return (
         Scene(
-            "SCI-cubic", "cubic", (-8.0, 4.0), Truth(zeros, values), needs("monitors", "multiple-roots"), **exact
+            "SCI-cubic",
+            "cubic",
+            (-8.0, 4.0),
+            Truth(zeros, values),
+            needs("monitors", "multiple-roots"),
+            **exact,
         ),
         Scene(
             "cubic-modes",
@@ -315,7 +320,7 @@ def monitored() -> tuple[Scene, ...]:
             "TORR",
             "tank",
             (0.0, 3.0),
-            Truth(None, ((1.0, (0.25,)),), status=None, checks=(("", emptied),)),
+            Truth(None, ((1.0, (0.25,)),), status=None, checks=(("adaptive", emptied),)),
             needs("monitors"),
         ),
     )
@@ -454,7 +459,9 @@ def coincidences() -> tuple[Scene, ...]:
             "reset-across-itself",
             "flip",
             (0.0, 6.0),
-            Truth(((1.0, "edge"), (3.0, "edge"), (5.0, "edge")), ((2.0, (0.0,)), (6.0, (0.0,)), (0.5, (0.5,)))),
+            Truth(
+                ((1.0, "edge"), (3.0, "edge"), (5.0, "edge")), ((2.0, (0.0,)), (6.0, (0.0,)), (0.5, (0.5,)))
+            ),
             needs("monitors"),
             tol_t=1e-12,
         ),

@@ -34,6 +34,7 @@ class Truth:
     events : (t, label) of every event, in order; labels as in `judge.label`. None: not compared.
     states : (t, values in the order of the states), right-continuous; END for the time where the run ends,
         None for a value not compared.
+    quantities : (function of the solution, its true value), counted among the states.
     status, end : how and when the run ends; status None: the checks decide.
     checks : functions of the solution that return sentences about what is wrong, each with the capability it is
         about ("" for every integrator).
@@ -41,6 +42,7 @@ class Truth:
 
     events: tuple[tuple[float, str], ...] | None = ()
     states: tuple[tuple[float, tuple[float | None, ...]], ...] = ()
+    quantities: tuple[tuple[Callable[[Any], float], float], ...] = ()
     status: str | None = "finished"
     end: float | None = None
     checks: tuple[tuple[str, Check], ...] = ()
@@ -63,6 +65,7 @@ class Scene:
     end_margin : events this close to the end of the run are not counted (the motion ends on an event).
     speed : a speed that is fast for this motion, for methods with a zero-velocity interval.
     tolerances : rtol from loose to tight.
+    effort : a run that took more steps than this is the last of its study.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Scene:
     end_margin: float = 0.0
     speed: float = 1.0
     tolerances: tuple[float, ...] = TOLERANCES
+    effort: int = 5000
 
     def __post_init__(self) -> None:
         unknown = set(self.needs) - set(VOCABULARY)

@@ -80,7 +80,10 @@ def expand(flow: Flow, t: Any, x: Sequence[Any], longest: Any) -> tuple[list[Ser
         end = [s(step) for s in series]
         rates = flow(Series([t + step]), [Series([value]) for value in end])
         defects = [
-            abs(sum(n * s[n] * step ** (n - 1) for n in range(1, ORDER + 1)) - (r[0] if isinstance(r, Series) else r))
+            abs(
+                sum(n * s[n] * step ** (n - 1) for n in range(1, ORDER + 1))
+                - (r[0] if isinstance(r, Series) else r)
+            )
             for s, r in zip(series, rates, strict=True)
         ]
         if max(defects) <= DEFECT * (1 + max(abs(value) for value in end)):

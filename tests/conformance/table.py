@@ -1,0 +1,93 @@
+"""Runs every scene with every integrator and writes the table of what came out.
+
+    python -m conformance.table [integrator ...]        (in tests/; takes some minutes)
+
+With no name, all integrators are run and docs/reference/conformance.md is written; with names, the tables of
+these go to stdout.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import hybridsim as hs
+from conformance.catalogue import LEFT_OUT, SCENES
+from conformance.facts import CASES
+from conformance.suite import Outcome, outcome
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conformance.md"
+INTRODUCTION = """# What each integrator gets right
+
+Every integrator runs every scene of `tests/conformance` whose answer is known: a closed form, or 32 digits from a
+Taylor series that shares no code with the package. This page is written by `python -m conformance.table` in
+`tests/`.
+
+A scene is *right* when every event is found, in the right mode and order, none is invented, what is held is exact
+bit for bit, and the errors fall with the tolerance (1e-6, 1e-9, 1e-12; a study is cut short where runs get long) or,
+for a fixed-step method, with its step. The two numbers are the largest error of an event time, in units of the
+scene's own time, and of a state, relative to its largest value, at the last setting of the study. A method may
+*lack* a capability that a scene needs: it says so, with the reason below, and refuses such a model where that can be
+seen from the model.
+"""
+
+
+def cell(result: Outcome) -> str:
+    """One field of the table."""
+    if result.verdict == "lacks":
+        return f"lacks {result.reasons[0].split(':')[0]}"
+    if result.verdict == "wrong":
+        return "**wrong**"
+    _, time_error, state_error = result.errors[-1]
+    return f"{time_error:.0e}, {state_error:.0e}"
+
+
+def rows(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    written = [header, ["---"] * len(header), *lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in written)
+
+
+def page(names: Sequence[str]) -> str:
+    """The whole page for some integrators."""
+    results = {(name, scene.name): outcome(name, scene) for scene in SCENES for name in names}
+    table = rows(
+        ("scene", *names),
+        ((scene.name, *(cell(results[name, scene.name]) for name in names)) for scene in SCENES),
+    )
+    lacking = rows(
+        ("integrator", "lacks", "because"),
+        (
+            (one.name, capability, reason)
+            for one in hs.list_integrators()
+            if one.name in names
+            for capability, reason in one.lacks.items()
+        ),
+    )
+    parts = [INTRODUCTION, "## Scenes\n", table, "\n## What is lacking\n", lacking]
+    faults = [
+        (r.integrator, r.scene, reason)
+        for r in results.values()
+        for reason in r.reasons
+        if r.verdict == "wrong"
+    ]
+    if faults:
+        parts += ["\n## What is wrong\n", rows(("integrator", "scene", "what"), faults)]
+    sources = ((case, fact["name"], fact["source"]) for case, fact in CASES.items() if case not in LEFT_OUT)
+    parts += ["\n## Where the scenes come from\n", rows(("case", "what it is", "source"), sources)]
+    parts += ["\n## Cases left to later work\n", rows(("case", "why"), LEFT_OUT.items())]
+    return "\n".join(parts) + "\n"
+
+
+def main(names: Sequence[str]) -> None:
+    warnings.simplefilter("ignore")
+    if names:
+        print(page(names))
+    else:
+        PAGE.write_text(page([one.name for one in hs.list_integrators()]))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,60 @@
+"""Every scene with every registered integrator."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from types import FrameType
+
+import pytest
+
+import hybridsim as hs
+from conformance import judge
+from conformance.catalogue import SCENES
+from conformance.scene import VOCABULARY, Scene
+from conformance.suite import integrator, outcome
+from hybridsim.errors import HybridsimError
+
+INTEGRATORS = [one.name for one in hs.list_integrators()]
+# What a model visibly needs: a run is refused for it. The others show only in how a run goes.
+REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward"}
+LONGEST = 120  # seconds on one scene; each takes one to ten, and work without end is a failure, not a hang
+
+
+@pytest.fixture(autouse=True)
+def bounded() -> Iterator[None]:
+    """Fail a scene that does not come to an end."""
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def give_up(number: int, frame: FrameType | None) -> None:
+        pytest.fail(f"no end after {LONGEST} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(LONGEST)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_scene(scene: Scene, name: str) -> None:
+    """Right, or lacking a capability that the integrator declares."""
+    result = outcome(name, scene)
+    assert result.verdict in ("right", "lacks"), "\n".join(result.reasons)
+    if result.verdict == "lacks":
+        missing = sorted(scene.needs & set(integrator(name).lacks) & REFUSED)
+        if missing:
+            reasons = integrator(name).lacks
+            with pytest.raises(HybridsimError) as refusal:
+                judge.run(scene, name)
+            assert any(reasons[capability] in str(refusal.value) for capability in missing)
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_what_is_lacking_has_a_name_and_a_reason(name: str) -> None:
+    for capability, reason in integrator(name).lacks.items():
+        assert capability in VOCABULARY
+        assert len(reason.split()) > 3
