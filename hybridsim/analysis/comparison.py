@@ -116,12 +116,17 @@ class Comparison:
         return [
             "State errors: the largest of all states, relative to each one's amplitude in the reference.",
             f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
+            *self._steps_note(),
             f"Wall time of a call: median of {self.repeat} after a warm-up, in turns over all rows;",
             f"fewer of a run that takes more than {ENOUGH / self.repeat:.2g} s.",
             f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPU",
             f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
             *(f"warning: {warning}" for warning in self.warnings),
         ]
+
+    def _steps_note(self) -> list[str]:
+        counted = any(row.setting[0] == "steps_per_period" for row in self.rows)
+        return [] if self.period or not counted else ["A tenth of the run counts as one period."]
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line a row; times in the model's unit, wall times in seconds."""
