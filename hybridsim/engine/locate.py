@@ -26,13 +26,18 @@ class Hit:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a step holds: first exit of each guard, all crossings of monitors, near-grazings, signs at its end."""
+    """What a step holds: first exit of each guard, all crossings of monitors, near-grazings, signs at its end.
+
+    guard_gaps, monitor_gaps: (theta, number) from which on a function is not a number.
+    """
 
     exits: tuple[Hit, ...]
     crossings: tuple[Hit, ...]
     grazings: tuple[tuple[int, Grazing], ...]
     guard_ends: np.ndarray
     monitor_ends: np.ndarray
+    guard_gaps: tuple[tuple[float, int], ...]
+    monitor_gaps: tuple[tuple[float, int], ...]
 
 
 def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> float:
@@ -86,7 +91,7 @@ class Locator:
         times = step.s0 + width * POINTS
         times[-1] = step.s1
         states = step.dense(times)
-        exits, crossings, grazings = [], [], []
+        exits, crossings, grazings, guard_gaps, monitor_gaps = [], [], [], [], []
         guard_ends = np.ones_like(self.sides)
         if len(self.numbers):
             values = flow.guards(times, states)
@@ -94,11 +99,12 @@ class Locator:
             for g in self.numbers[~still]:
                 sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
                 order = int(self.orders[g]) if side else 0
-                found, grazed, guard_ends[g] = find_roots(
+                found, grazed, guard_ends[g], gap = find_roots(
                     sample, values[:, g], order, side or 1, -1, self._rounding(step, int(g), False)
                 )
                 grazings += [(int(g), z) for z in grazed]
                 exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
+                guard_gaps += [(gap, int(g))] if gap <= 1.0 else []
         monitor_ends = self.monitor_sides.copy()
         if len(self.monitor_sides):
             values = flow.monitors(times, states)
@@ -106,11 +112,20 @@ class Locator:
             for k in self.monitor_numbers[~still]:
                 sample, side = self._sampler(step, flow.monitors, int(k)), int(self.monitor_sides[k])
                 order = int(self.monitor_orders[k]) if side else 0
-                found, _, monitor_ends[k] = find_roots(
+                found, _, monitor_ends[k], gap = find_roots(
                     sample, values[:, k], order, side, 0, self._rounding(step, int(k), True)
                 )
                 crossings += [Hit(polish(sample, c), int(k), c.direction) for c in found]
-        return Findings(_in_order(exits), _in_order(crossings), tuple(grazings), guard_ends, monitor_ends)
+                monitor_gaps += [(gap, int(k))] if gap <= 1.0 else []
+        return Findings(
+            _in_order(exits),
+            _in_order(crossings),
+            tuple(grazings),
+            guard_ends,
+            monitor_ends,
+            tuple(guard_gaps),
+            tuple(monitor_gaps),
+        )
 
     def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
         """Rounding error of a guard's or monitor's values on the step, worked out when it is asked for."""

@@ -103,6 +103,9 @@ class ModeLoop:
         passed = [(seen.s, self._sighting(seen)) for seen in run.sightings]
         passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in run.grazings]
         record.occurrences += [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
+        for k in sorted(run.undefined):
+            name = self.system.monitor_names[k]
+            record.warn(f"monitor {name} is not a number on a part of the run: no crossing is seen there")
 
     def _sighting(self, seen: Sighting) -> Occurrence:
         name = self.system.monitor_names[seen.number]

@@ -198,7 +198,7 @@ def find_roots(
     side: int,
     stop_at_first: int,
     rounding: Callable[[], float],
-) -> tuple[list[Crossing], list[Grazing], int]:
+) -> tuple[list[Crossing], list[Grazing], int, float]:
     """All changes of side of one guard over a step, theta in (0, 1].
 
     Parameters
@@ -209,12 +209,14 @@ def find_roots(
     rounding : bound of the rounding error of one value; asked for only where halving a piece does not help
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
-    Returns the crossings and grazings in order, and the sign at the end of the step (0 where it is within the bound).
+    Returns the crossings and grazings in order, the sign at the end of the step (0 where it is within the bound), and
+    the first theta at which the function is not a number (infinity: it is one throughout). No change of side is
+    reported across a stretch where it is none.
     """
     crossings: list[Crossing] = []
     grazings: list[Grazing] = []
     last, open_from = side, -1.0  # last certain sign; where the open stretch after it began
-    low, pieces = math.inf, 0
+    low, pieces, undefined = math.inf, 0, math.inf
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
     while waiting:
         a, b, samples, depth = waiting.pop()
@@ -227,8 +229,10 @@ def find_roots(
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)
-        if depth == _DEEPEST and not math.isfinite(error):
-            break  # not a number beyond here: the step's own error control will see it
+        if not math.isfinite(error) and (depth == _DEEPEST or not np.isfinite(samples).any()):
+            undefined = min(undefined, b if np.isfinite(samples[0]) else a)
+            last, open_from, low = 0, -1.0, math.inf
+            continue
         resolved = error <= _ACCEPT * largest or depth == _DEEPEST
         if not resolved and not (depth >= _ROUNDING_DEPTH and error <= _GROWTH * rounding()):
             middle = 0.5 * (a + b)
@@ -252,10 +256,10 @@ def find_roots(
                 crossings.append(Crossing(start, x, int(sign)))
                 last = int(sign)
                 if stop_at_first == sign:
-                    return crossings, grazings, last
-            elif open_from > 0.0:
+                    return crossings, grazings, last, undefined
+            elif open_from > 0.0 or (open_from == 0.0 and order == 0):
                 grazings.append(Grazing(0.5 * (open_from + x), low))
             open_from, low = -1.0, math.inf
         if b == 1.0 and count and rows[count - 1, 2] == 0:
-            return crossings, grazings, 0
-    return crossings, grazings, last
+            return crossings, grazings, 0, undefined
+    return crossings, grazings, last, undefined

@@ -99,6 +99,7 @@ class SegmentRun:
         self.scale = np.abs(x)  # largest size of each state on the segment: what rounding is relative to
         self.sightings: list[Sighting] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
+        self.undefined: set[int] = set()  # monitors that were not a number somewhere
         self.last_step: float | None = None
         self.entries = () if forward else entries(system, z)
 
@@ -158,6 +159,10 @@ class SegmentRun:
                 ended = self._refine(stepper, step, hit, is_monitor=True)
                 self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
         limit = first[0].theta if first else 1.0
+        for theta, g in found.guard_gaps:
+            if first is None or theta < limit:
+                self._refuse_undefined(g, step.s0 + theta * (step.s1 - step.s0))
+        self.undefined |= {k for theta, k in found.monitor_gaps if theta <= limit}
         for g, grazing in found.grazings:
             if grazing.theta < limit:
                 self.grazings.append((g, step.s0 + grazing.theta * (step.s1 - step.s0), grazing.distance))
@@ -170,6 +175,13 @@ class SegmentRun:
                 return ended, Arrival(ended.s1, x, stopping=(hit.number,))
             return ended, Arrival(ended.s1, x, fired=(hit.number,))
         return step, self._at_step_end(step, found)
+
+    def _refuse_undefined(self, guard: int, s: float) -> None:
+        t = float(self.origin.plus(s))
+        raise StepFailure(
+            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t!r} on: "
+            f"write it so that it has a value on both sides of its zero"
+        )
 
     def _wanted(self, monitor: int, direction: int) -> bool:
         want = _DIRECTIONS[self.monitors[monitor].direction]
@@ -257,7 +269,7 @@ class SegmentRun:
         """Backward in time: stop where the present mode may have been entered through a guard of another."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
-            found, _, _ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0)
+            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0)
             if found:
                 s = step.s0 + (step.s1 - step.s0) * polish(sample, found[0])
                 step = Step(step.s0, s, step.x0, step.dense(np.array([s]))[0], step.dense, step.roots)
@@ -278,6 +290,9 @@ class SegmentRun:
 
     def _take_roots(self, step: Step) -> Arrival | None:
         if not step.roots:
+            values = self.flow.guards(np.array([step.s1]), step.x1[None, :])[0]
+            for g in self.watch.guards[np.isnan(values[self.watch.guards])]:
+                self._refuse_undefined(int(g), step.s1)
             return None
         x = self._projected(step)
         fired = tuple(r.number for r in step.roots if not r.is_monitor and r.direction < 0)

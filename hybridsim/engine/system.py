@@ -226,6 +226,12 @@ class System:
             table[c, : len(numbers)] = numbers
         return table
 
+    def guard_title(self, guard: int, z: np.ndarray) -> str:
+        """A guard of the modes z in words."""
+        automaton, mode = self.automata[self.owner[guard]], int(z[self.owner[guard]])
+        name = automaton.guard_names[mode][automaton.guards[mode].index(guard)]
+        return f"guard {name} of {automaton.name} in mode {automaton.modes[mode]}"
+
     def active(self, z: np.ndarray) -> np.ndarray:
         """Mask of the guards that the modes in z have."""
         mask = np.zeros(self.guard_count, dtype=np.bool_)

@@ -148,7 +148,9 @@ class FixedStepRun:
         instant = target if why == BOUND else self.origin.plus(s)
         if why == NOT_FINITE:
             self.record.status = "step-failure"
-            self.record.message = f"after t = {float(instant)!r}: the state is not finite after one step"
+            self.record.message = (
+                f"after t = {float(instant)!r}: the state or a guard is not a number after one step"
+            )
             return True
         if why == FULL:
             self.origin = instant

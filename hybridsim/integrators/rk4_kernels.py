@@ -263,6 +263,9 @@ def run_steps(
         if watched.shape[0] > 0:
             call(addresses[2], s + h, trial, p, z, guards)
             counters[1] += 1
+            for i in range(watched.shape[0]):
+                if watched[i] >= 0 and np.isnan(guards[watched[i]]):
+                    return row, NOT_FINITE
             if _leaves(guards, watched):
                 return row, GUARD
         if monitor_count > 0:
