@@ -11,7 +11,7 @@ from typing import Any
 
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.rows import QUANTITIES, Reading, Row
-from hybridsim.analysis.timing import ENOUGH
+from hybridsim.analysis.table import table
 
 
 @dataclass(frozen=True)
@@ -65,68 +65,7 @@ class Comparison:
 
     def table(self) -> str:
         """The comparison as text, for people."""
-        times = "event time / T" if self.period else "event time"
-        header: tuple[str, ...] = ("integrator", "setting", "state error", "last period", times, "modes")
-        header = (*header, "wall time", "min .. max", "rhs", "guards", "steps")
-        lines = [header, *(self._cells(row) for row in self.rows)]
-        full = [line for line in lines if len(line) == len(header)]
-        widths = [max(len(line[i]) for line in full) for i in range(len(header))]
-        left = (0, 1, 5)
-        text = []
-        for line in lines:
-            cells = zip(range(len(line)), line, widths)
-            shown = [cell.ljust(width) if i in left else cell.rjust(width) for i, cell, width in cells]
-            text.append("  ".join(shown).rstrip())
-        return "\n".join([*self._heading(), "", text[0], "-" * len(text[0]), *text[1:], "", *self._notes()])
-
-    def _cells(self, row: Row) -> tuple[str, ...]:
-        name, value = row.setting
-        short = f"{value:.0e}"
-        setting = f"{name} {short if value < 1 and float(short) == value else f'{value:g}'}"
-        if row.errors is None or row.cost is None:
-            return row.label, setting, f"{row.status}: {row.message}" if row.message else row.status
-        readings = [self.reading(row, quantity) for quantity in QUANTITIES]
-        times = row.cost.wall_times
-        return (
-            row.label,
-            setting,
-            *(str(reading) if reading else "-" for reading in readings),
-            str(row.errors.sequence),
-            milliseconds(row.cost.wall_time),
-            f"{milliseconds(min(times))} .. {milliseconds(max(times))}",
-            str(row.cost.rhs_evaluations),
-            str(row.cost.guard_evaluations),
-            str(row.cost.steps),
-        )
-
-    def _heading(self) -> list[str]:
-        t0, t1 = self.t_span
-        periods = f" ({(t1 - t0) / self.period:g} periods)" if self.period else ""
-        lines = [self.title, f"  time       {t0:g} to {t1:g}{periods}", f"  reference  {self.reference}"]
-        if self.uncertainty is not None:
-            words = zip(QUANTITIES, ("state", "last period", "event time"))
-            known = [f"{name} {self.floor(quantity):.1e}" for quantity, name in words if self.floor(quantity)]
-            lines.append(f"             uncertain by: {', '.join(known) or 'nothing that shows'}")
-        return lines
-
-    def _notes(self) -> list[str]:
-        unit = "periods T" if self.period else "the model's unit of time"
-        facts = self.provenance
-        versions = [f"{name} {facts[name]}" for name in ("hybridsim", "python", "numpy") if name in facts]
-        return [
-            "State errors: the largest of all states, relative to each one's amplitude in the reference.",
-            f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
-            *self._steps_note(),
-            f"Wall time of a call: median of {self.repeat} after a warm-up, in turns over all rows;",
-            f"fewer of a run that takes more than {ENOUGH / self.repeat:.2g} s.",
-            f"{', '.join(versions)}; {facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPU",
-            f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
-            *(f"warning: {warning}" for warning in self.warnings),
-        ]
-
-    def _steps_note(self) -> list[str]:
-        counted = any(row.setting[0] == "steps_per_period" for row in self.rows)
-        return [] if self.period or not counted else ["A tenth of the run counts as one period."]
+        return table(self)
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line a row; times in the model's unit, wall times in seconds."""
@@ -181,8 +120,3 @@ class Comparison:
         for count in ("rhs_evaluations", "guard_evaluations", "steps"):
             record[count] = getattr(cost, count, None)
         return record
-
-
-def milliseconds(seconds: float) -> str:
-    """A wall time for people, three digits."""
-    return f"{seconds * 1e3:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"

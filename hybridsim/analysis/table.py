@@ -1,0 +1,118 @@
+"""A comparison as a text for people: a table that fits a terminal, with what one must know to read it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.rows import QUANTITIES, Row
+from hybridsim.analysis.timing import ENOUGH
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.comparison import Comparison
+
+_VERSIONS = ("numpy", "scipy", "numba", "scikit-sundae")
+
+
+def table(comparison: Comparison) -> str:
+    """Heading, a block of rows for each line of the comparison, and notes."""
+    times = "event time / T" if comparison.period else "event time"
+    header = (
+        "",
+        "state error",
+        "last period",
+        times,
+        "wall time",
+        "min .. max",
+        "rhs",
+        "guards",
+        "steps",
+        "modes",
+    )
+    cells = [_cells(comparison, row) for row in comparison.rows]
+    widths = [max(map(len, column)) for column in zip(header, *(line for line in cells if line))]
+    text = [_aligned(header, widths)]
+    for label, block in itertools.groupby(zip(comparison.rows, cells), key=lambda item: item[0].label):
+        text.append(label)
+        for failure, group in itertools.groupby(block, key=lambda item: "" if item[1] else _failure(item[0])):
+            same = list(group)
+            if failure:
+                text.append(f"  {', '.join(setting(row) for row, _ in same)}: {failure}")
+            else:
+                text += [_aligned(line, widths) for _, line in same]
+    return "\n".join([*_heading(comparison), "", *text, "", *_notes(comparison)])
+
+
+def setting(row: Row) -> str:
+    """What was varied, short: "rtol 1e-06", or "T/1200" for the step."""
+    name, value = row.setting
+    if name == "steps_per_period":
+        return f"T/{value:g}"
+    short = f"{value:.0e}"
+    return f"{name} {short if value < 1 and float(short) == value else f'{value:g}'}"
+
+
+def milliseconds(seconds: float) -> str:
+    """A wall time, three digits."""
+    return f"{seconds * 1e3:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"
+
+
+def _failure(row: Row) -> str:
+    return f"{row.status}: {row.message}" if row.message else row.status
+
+
+def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
+    """What stands in a row; nothing for a failure."""
+    if row.errors is None or row.cost is None:
+        return ()
+    readings = [comparison.reading(row, quantity) for quantity in QUANTITIES]
+    low, high = min(row.cost.wall_times), max(row.cost.wall_times)
+    counts = (row.cost.rhs_evaluations, row.cost.guard_evaluations, row.cost.steps)
+    return (
+        f"  {setting(row)}",
+        *(str(reading) if reading else "-" for reading in readings),
+        milliseconds(row.cost.wall_time),
+        f"{milliseconds(low)} .. {milliseconds(high)}" if high > low else "once",
+        *map(str, counts),
+        str(row.errors.sequence),
+    )
+
+
+def _aligned(cells: tuple[str, ...], widths: list[int]) -> str:
+    first, *numbers, last = cells
+    inner = [cell.rjust(width) for cell, width in zip(numbers, widths[1:])]
+    return "  ".join([first.ljust(widths[0]), *inner, last])
+
+
+def _heading(comparison: Comparison) -> list[str]:
+    (t0, t1), period = comparison.t_span, comparison.period
+    periods = f" ({(t1 - t0) / period:g} periods)" if period else ""
+    lines = [
+        comparison.title,
+        f"  time       {t0:g} to {t1:g}{periods}",
+        f"  reference  {comparison.reference}",
+    ]
+    if comparison.uncertainty is not None:
+        words = zip(QUANTITIES, ("state", "last period", "event time"))
+        floors = [(name, comparison.floor(quantity)) for quantity, name in words]
+        known = [f"{name} {floor:.1e}" for name, floor in floors if floor]
+        lines.append(f"             uncertain by: {', '.join(known) or 'nothing that shows'}")
+    return lines
+
+
+def _notes(comparison: Comparison) -> list[str]:
+    unit = "periods T" if comparison.period else "the model's unit of time"
+    facts = comparison.provenance
+    versions = [f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name)]
+    counted = any(row.setting[0] == "steps_per_period" for row in comparison.rows)
+    return [
+        "State errors: the largest of all states, relative to each one's amplitude in the reference.",
+        f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
+        *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
+        f"Wall time of a call: median of {comparison.repeat} after a warm-up, in turns over all rows; fewer",
+        f"of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
+        f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {', '.join(versions)};",
+        f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs; "
+        f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
+        *(f"warning: {warning}" for warning in comparison.warnings),
+    ]
