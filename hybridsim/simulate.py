@@ -47,7 +47,7 @@ def simulate(
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.
     z0 : initial modes by component; where a surface decides, the engine finds the mode from x0.
-    integrator : a name from `list_integrators`; "auto" takes the default work-horse, ``scipy-dop853``.
+    integrator : a name from `list_integrators`; "auto" takes the default work-horse, ``dop853``.
     rtol, atol : error control. atol is a number, one for each state, or by name; its default is
         rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1.
     max_step, first_step : bounds of the step, in the unit of t.
@@ -83,7 +83,7 @@ def simulate(
     from hybridsim.integrators.registry import make_integrator
 
     announce_compilation()
-    method = make_integrator("scipy-dop853" if integrator == "auto" else integrator, options)
+    method = make_integrator("dop853" if integrator == "auto" else integrator, options)
     began = time.perf_counter()
     system = System(model)
     for name in system.hot_functions():

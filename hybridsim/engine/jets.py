@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.tape import (
     ABS,
@@ -282,6 +280,30 @@ def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: An
                 E[states[i], k + 1] = E[derivatives[i], k] / (k + 1) + (UNIT * abs(value) if k > 0 else 0.0)
 
 
-def new_registers(count: int, order: int = ORDER) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficient and error arrays for `count` registers."""
-    return np.zeros((count, order + 1)), np.zeros((count, order + 1))
+@kernel
+def run_series(
+    rows: Any, places: Any, s: float, s_error: float, x: Any, x_error: Any, p: Any, V: Any, E: Any
+) -> None:
+    """Set the inputs of a tape and run it to the order that V and E have room for.
+
+    places: registers of constants and their values, of parameters and where in p they stand, of phases, of time
+    (-1: none), of states and of their derivatives.
+    """
+    constants, values, parameters, sources, phases, time, states, derivatives = places
+    V[:] = 0.0
+    E[:] = 0.0
+    for i in range(constants.shape[0]):
+        V[constants[i], 0] = values[i]
+    for i in range(parameters.shape[0]):
+        V[parameters[i], 0] = p[sources[i]]
+    for i in range(phases.shape[0]):
+        E[phases[i], 0] = 2.0 * UNIT * abs(V[phases[i], 0])
+    order = V.shape[1] - 1
+    if time >= 0:
+        V[time, 0], E[time, 0] = s, s_error
+        if order > 0:
+            V[time, 1] = 1.0
+    for i in range(states.shape[0]):
+        V[states[i], 0] = x[i]
+        E[states[i], 0] = x_error[i]
+    run_tape(rows, order, states, derivatives, V, E)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.jets import ORDER, UNIT, new_registers, run_tape
+from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.modules import compiled
 from hybridsim.engine.rows import evaluate, evaluate_rows
@@ -40,17 +40,81 @@ class Automaton:
         return self.hold >= 0
 
 
+class _Registers:
+    """Where the tape's inputs and results are, as index arrays."""
+
+    def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
+        def numbers(key: str) -> np.ndarray:
+            return np.array(tape[key], dtype=np.int64)
+
+        self.count: int = tape["registers"]
+        time: int = tape["time"]
+        constants = np.array([r for r, _ in tape["constants"]], dtype=np.int64)
+        values = np.array([v for _, v in tape["constants"]])
+        parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
+        sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
+        is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)
+        phases = parameters[is_phase]
+        self.states = numbers("states")
+        self.inputs = (
+            constants,
+            values,
+            parameters,
+            sources,
+            phases,
+            time,
+            self.states,
+            numbers("derivatives"),
+        )
+        self.guards, self.surfaces, self.monitors = (
+            numbers("guards"),
+            numbers("surfaces"),
+            numbers("monitors"),
+        )
+
+
 @dataclass(frozen=True)
 class Series:
     """Taylor coefficients along a flow, order along the last axis, with rounding error bounds."""
 
-    guards: np.ndarray
-    guard_bounds: np.ndarray
-    surfaces: np.ndarray
-    surface_bounds: np.ndarray
-    monitors: np.ndarray
-    monitor_bounds: np.ndarray
-    states: np.ndarray
+    V: np.ndarray
+    E: np.ndarray
+    place: _Registers
+
+    @property
+    def guards(self) -> np.ndarray:
+        """Of all guards (guards, orders)."""
+        return self.V[self.place.guards]
+
+    @property
+    def guard_bounds(self) -> np.ndarray:
+        """Error bounds of the guards' coefficients."""
+        return self.E[self.place.guards]
+
+    @property
+    def surfaces(self) -> np.ndarray:
+        """Of the surfaces."""
+        return self.V[self.place.surfaces]
+
+    @property
+    def surface_bounds(self) -> np.ndarray:
+        """Error bounds of the surfaces' coefficients."""
+        return self.E[self.place.surfaces]
+
+    @property
+    def monitors(self) -> np.ndarray:
+        """Of the monitors."""
+        return self.V[self.place.monitors]
+
+    @property
+    def monitor_bounds(self) -> np.ndarray:
+        """Error bounds of the monitors' coefficients."""
+        return self.E[self.place.monitors]
+
+    @property
+    def states(self) -> np.ndarray:
+        """Of the states."""
+        return self.V[self.place.states]
 
 
 def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton:
@@ -70,29 +134,6 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         ),
         initial=-1 if component.initial is None else names.index(component.initial),
     )
-
-
-class _Registers:
-    """Where the tape's inputs and results are, as index arrays."""
-
-    def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        def numbers(key: str) -> np.ndarray:
-            return np.array(tape[key], dtype=np.int64)
-
-        self.count: int = tape["registers"]
-        self.time: int = tape["time"]
-        self.constants = np.array([r for r, _ in tape["constants"]], dtype=np.int64)
-        self.values = np.array([v for _, v in tape["constants"]])
-        self.parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
-        self.sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
-        is_phase = (self.sources >= layout.phases_at) & (self.sources < layout.signals_at)
-        self.phases = self.parameters[is_phase]
-        self.states, self.derivatives = numbers("states"), numbers("derivatives")
-        self.guards, self.surfaces, self.monitors = (
-            numbers("guards"),
-            numbers("surfaces"),
-            numbers("monitors"),
-        )
 
 
 class System:
@@ -253,13 +294,6 @@ class System:
     ) -> Series:
         """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
         place = self._registers
-        V, E = new_registers(place.count, ORDER)
-        V[place.constants, 0] = place.values
-        V[place.parameters, 0] = p[place.sources]
-        E[place.phases, 0] = 2.0 * UNIT * np.abs(V[place.phases, 0])
-        if place.time >= 0:
-            V[place.time, 0], E[place.time, 0], V[place.time, 1] = s, s_error, 1.0
-        V[place.states, 0], E[place.states, 0] = x, x_error
-        run_tape(self._tape(z), ORDER, place.states, place.derivatives, V, E)
-        g, f, m = place.guards, place.surfaces, place.monitors
-        return Series(V[g], E[g], V[f], E[f], V[m], E[m], V[place.states])
+        V, E = np.empty((place.count, ORDER + 1)), np.empty((place.count, ORDER + 1))
+        run_series(self._tape(z), place.inputs, s, s_error, x, x_error, p, V, E)
+        return Series(V, E, place)

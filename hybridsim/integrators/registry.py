@@ -15,6 +15,7 @@ from hybridsim.integrators.base import Integrator
 
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
+    "dop853:Dop853",
     "scipy_explicit:ScipyDOP853",
     "scipy_explicit:ScipyRK45",
     "sundials:CvodeAdams",

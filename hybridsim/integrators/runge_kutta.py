@@ -1,13 +1,15 @@
-"""Embedded Runge-Kutta pairs from their tableau: a new method is a tableau and a name."""
+"""Embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.hermite import hermite
+from hybridsim.engine.jit import call, kernel
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
 
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
@@ -17,9 +19,11 @@ _SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
 
 @dataclass(frozen=True)
 class Tableau:
-    """An explicit pair: stages at c, strictly lower triangular a, weights b, and e = b - b_hat for the error.
+    """An explicit method with s stages: nodes c (s,), a (s, s) strictly lower triangular, weights b (s,).
 
-    order is that of b, error_order that of the error estimate (of the lower order method, plus one in h).
+    e (s,) is b minus the weights of the embedded method; the error estimate of a step then falls like
+    h**error_order. e_low, where given, is a second estimate of lower order that keeps the first one honest, as in
+    DOP853: the error used is e**2/sqrt(e**2 + 0.01 e_low**2).
     """
 
     c: np.ndarray
@@ -28,13 +32,62 @@ class Tableau:
     e: np.ndarray
     order: int
     error_order: int
+    e_low: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+@kernel
+def _try(
+    flow: Any,
+    tableau: Any,
+    s: float,
+    h: float,
+    x: Any,
+    dx: Any,
+    p: Any,
+    z: Any,
+    tolerances: Any,
+    k: Any,
+    out: Any,
+) -> float:
+    """One step of length h from (s, x) with slope dx there; its end in `out`, its error in units of the tolerance.
+
+    tableau: c, a, b, e, e_low. tolerances: rtol, atol.
+    """
+    c, a, b, e, e_low = tableau
+    rtol, atol = tolerances
+    stages, n = c.shape[0], x.shape[0]
+    k[0] = dx
+    for i in range(1, stages):
+        for m in range(n):
+            total = 0.0
+            for j in range(i):
+                total += a[i, j] * k[j, m]
+            out[m] = x[m] + h * total
+        call(flow, s + c[i] * h, out, p, z, k[i])
+    square, square_low = 0.0, 0.0
+    for m in range(n):
+        total, error, error_low = 0.0, 0.0, 0.0
+        for j in range(stages):
+            total += b[j] * k[j, m]
+            error += e[j] * k[j, m]
+            if e_low.shape[0] > 0:
+                error_low += e_low[j] * k[j, m]
+        out[m] = x[m] + h * total
+        scale = atol[m] + rtol * max(abs(x[m]), abs(out[m]))
+        if scale > 0.0:
+            square += (error / scale) ** 2
+            square_low += (error_low / scale) ** 2
+    if square == 0.0 or n == 0:
+        return 0.0
+    weighted = square + 0.01 * square_low
+    return abs(h) * square / math.sqrt(weighted * n) if weighted > 0.0 else math.nan
 
 
 class RungeKuttaStepper:
-    """Steps a pair through one segment, with local extrapolation and dense output of degree 7.
+    """Steps a method through one segment, with local extrapolation and dense output of degree 7.
 
-    The dense output is the Hermite polynomial on the Taylor coefficients of the flow at both ends, so it is
-    as good as any pair up to order 7; event times are refined by repeating the step.
+    The dense output is the Hermite polynomial on the Taylor coefficients of the flow at both ends, with an
+    error of h**8 x^(8)/(256 8!); event times are refined by repeating the step.
     """
 
     def __init__(
@@ -47,6 +100,10 @@ class RungeKuttaStepper:
         first_step: float | None,
     ) -> None:
         self.tableau, self.flow, self.bound, self.tolerances = tableau, flow, bound, tolerances
+        self._arrays = (tableau.c, tableau.a, tableau.b, tableau.e, tableau.e_low)
+        self._control = (tolerances.rtol, tolerances.atol)
+        self._address = flow.system.address("flow")
+        self._slopes = np.empty((len(tableau.c), flow.n))
         self.s, self.x, self.dx = 0.0, x0, self._rhs(0.0, x0)
         self.h = first_step or self._first_step()
         self.left = self._series(0.0, x0)
@@ -60,14 +117,14 @@ class RungeKuttaStepper:
             h = abs(self.bound - self.s) if last else h
             if h < _SMALLEST * math.ulp(self.s):
                 raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
-            x, error = self._try(self.s, self.x, self.dx, direction * h)
+            x, error = self._attempt(self.s, self.x, self.dx, direction * h)
             if error <= 1.0:
                 break
             self.flow.counters.rejected += 1
             factor = _SAFETY * error ** (-1.0 / self.tableau.error_order) if math.isfinite(error) else _SHRINK
             self.h = h * max(_SHRINK, min(factor, 1.0))
-        factor = _GROW if error == 0.0 else min(_GROW, _SAFETY * error ** (-1.0 / self.tableau.error_order))
-        self.h = h * max(factor, _SHRINK)
+        factor = _GROW if error == 0.0 else _SAFETY * error ** (-1.0 / self.tableau.error_order)
+        self.h = h * min(_GROW, max(factor, _SHRINK))
         s0, x0, left = self.s, self.x, self.left
         self.s, self.x = self.bound if last else s0 + direction * h, x
         self.dx, self.left = self._rhs(self.s, x), self._series(self.s, x)
@@ -75,11 +132,26 @@ class RungeKuttaStepper:
 
     def restep(self, step: Step, s: float) -> Step:
         """The step up to s in one step of exactly that length."""
-        x, _ = self._try(step.s0, step.x0, self._rhs(step.s0, step.x0), s - step.s0)
-        return Step(step.s0, s, step.x0, x, self._lazy(step.s0, s, step.x0, x))
+        x, _ = self._attempt(step.s0, step.x0, self._rhs(step.s0, step.x0), s - step.s0)
+        return Step(step.s0, s, step.x0, x, self._dense(step.s0, s, step.x0, x))
 
-    def _lazy(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
-        return lambda s: hermite(s0, s1, self._series(s0, x0), self._series(s1, x1))(s)
+    def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
+        made: list[Dense] = []
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            if not made:
+                made.append(hermite(s0, s1, self._series(s0, x0), self._series(s1, x1)))
+            return made[0](s)
+
+        return dense
+
+    def _attempt(self, s: float, x: np.ndarray, dx: np.ndarray, h: float) -> tuple[np.ndarray, float]:
+        flow, out = self.flow, np.empty(self.flow.n)
+        flow.counters.rhs_evaluations += len(self.tableau.c) - 1
+        error = _try(
+            self._address, self._arrays, s, h, x, dx, flow.p, flow.z, self._control, self._slopes, out
+        )
+        return out, error
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1
@@ -89,34 +161,19 @@ class RungeKuttaStepper:
         zero = np.zeros(self.flow.n)
         return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
 
-    def _scale(self, x: np.ndarray) -> np.ndarray:
-        return self.tolerances.atol + self.tolerances.rtol * np.abs(x)
-
-    def _try(self, s: float, x: np.ndarray, dx: np.ndarray, h: float) -> tuple[np.ndarray, float]:
-        """The state after h, and the error estimate in units of the tolerance (root mean square)."""
-        t = self.tableau
-        k = np.empty((len(t.c), len(x)))
-        k[0] = dx
-        for i in range(1, len(t.c)):
-            k[i] = self._rhs(s + t.c[i] * h, x + h * (t.a[i, :i] @ k[:i]))
-        after = x + h * (t.b @ k)
-        scale = np.maximum(self._scale(x), self._scale(after))
-        ratio = h * (t.e @ k) / np.where(scale > 0.0, scale, 1.0)
-        return after, float(np.sqrt(np.mean(ratio**2)))
-
     def _first_step(self) -> float:
         """Starting step of Hairer, Norsett and Wanner 1993, section II.4."""
-        scale = np.where(self._scale(self.x) > 0.0, self._scale(self.x), 1.0)
-        d0 = float(np.sqrt(np.mean((self.x / scale) ** 2)))
-        d1 = float(np.sqrt(np.mean((self.dx / scale) ** 2)))
-        h0 = 1e-6 * abs(self.bound) if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+        scale = self.tolerances.atol + self.tolerances.rtol * np.abs(self.x)
+        scale = np.where(scale > 0.0, scale, 1.0)
+
+        def size(x: np.ndarray) -> float:
+            return float(np.sqrt(np.mean((x / scale) ** 2)))
+
+        d0, d1 = size(self.x), size(self.dx)
+        h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+        h0 = min(h0, abs(self.bound))
         direction = math.copysign(1.0, self.bound)
         ahead = self._rhs(direction * h0, self.x + direction * h0 * self.dx)
-        d2 = float(np.sqrt(np.mean(((ahead - self.dx) / scale) ** 2))) / h0
-        largest = max(d1, d2)
-        h1 = (
-            max(1e-6 * abs(self.bound), 1e-3 * h0)
-            if largest <= 1e-15
-            else (0.01 / largest) ** (1.0 / self.tableau.order)
-        )
+        steepest = max(d1, size(ahead - self.dx) / h0)
+        h1 = (0.01 / steepest) ** (1.0 / self.tableau.order) if steepest > 1e-15 else max(1e-6, 1e-3 * h0)
         return min(100.0 * h0, h1, abs(self.bound))
