@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hybridsim.errors import UsageError
-from hybridsim.integrators import integrator_class, list_integrators
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 STEPS_PER_PERIOD = (300, 600, 1200, 2400, 4800)
@@ -76,6 +75,8 @@ def choose_series(
     line = functools.partial(_line, rtols=rtols, steps=steps, untimed_span=untimed_span)
     chosen: list[Series] = []
     if wanted is None:
+        from hybridsim.integrators import list_integrators
+
         for integrator in list_integrators():
             chosen += [
                 line(integrator.name, options, label) for options, label in _shown_unasked(integrator.name)
@@ -105,6 +106,8 @@ def _line(
     steps: Sequence[int] | None,
     untimed_span: float | None,
 ) -> Series:
+    from hybridsim.integrators import integrator_class
+
     if "adaptive" not in integrator_class(name).lacks:
         return Series(name, "rtol", tuple(RTOLS if rtols is None else rtols), options, label)
     counts = tuple(STEPS_PER_PERIOD if steps is None else steps)
@@ -117,6 +120,8 @@ def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
     """Options and label of each line of an integrator; more than one where a choice decides what it is worth."""
     if name != "rk4-dichotomy":
         return [({}, "")]
+    from hybridsim.integrators import integrator_class
+
     published: Any = integrator_class(name)
 
     def eps_v(steps: float) -> float:
