@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormatter
 
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Comparison
 
 _SIZE = 6.5
+_MOST_TICKS = 5  # across a panel
+_NOTHING = {
+    "state": "no run to show",
+    "state_last_period": "the model has no period",
+    "event_time": "no events to compare",
+}
 _ZERO = 1e-17  # where an error of exactly zero is drawn: below any rounding
 
 
@@ -36,7 +42,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     axes : three axes to draw in; a new figure if not given.
     """
     if axes is None:
-        figure = style.figure(13.0, 5.2)
+        figure = style.figure(13.0, 5.4)
         figure.suptitle(_headline(comparison), fontsize=10, x=0.01, ha="left")
         panels = tuple(figure.subplots(1, 3))
     else:
@@ -59,7 +65,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
 def _headline(comparison: Comparison) -> str:
     t0, t1 = comparison.t_span
     long = f"{(t1 - t0) / comparison.period:.4g} periods" if comparison.period else f"t = {t0:g} to {t1:g}"
-    return style.literal(f"{comparison.title}, {long}. Reference: {comparison.reference}")
+    return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
 
 
 def _panel(panel: Axes, comparison: Comparison, quantity: str) -> None:
@@ -84,11 +90,14 @@ def _panel(panel: Axes, comparison: Comparison, quantity: str) -> None:
             panel.plot(
                 time, error, marker, color=colour, markerfacecolor=fill, markersize=_SIZE, markeredgewidth=1.3
             )
-    panel.set_xscale("log")
-    panel.set_yscale("log")
     style.dress(panel)
     if not panel.lines:
-        panel.text(0.5, 0.5, "none", transform=panel.transAxes, ha="center", color=style.FAINT)
+        panel.text(0.5, 0.5, _NOTHING[quantity], transform=panel.transAxes, ha="center", color=style.FAINT)
+        panel.set_xticks([])
+        panel.set_yticks([])
+        return
+    panel.set_xscale("log")
+    panel.set_yscale("log")
     floor = comparison.floor(quantity)
     if floor > 0:
         low, high = panel.get_ylim()
@@ -107,14 +116,21 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[tuple[float
 
 
 def _look(i: int) -> tuple[str, str]:
-    return style.PALETTE[i % len(style.PALETTE)], style.MARKERS[i % len(style.MARKERS)]
+    colours = (*style.PALETTE, style.INK)
+    return colours[i % len(colours)], style.MARKERS[i % len(style.MARKERS)]
 
 
 def _ticks(panel: Axes) -> None:
-    """Decades as "10 ms"; where the times span few of them, 2 and 5 between them too."""
+    """Wall times as "20 ms", as many as can be read; decades of the error."""
     low, high = panel.get_xlim()
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1, 2, 3, 4, 6, 8), (1, 2, 5), (1, 3), (1,)):
+        times = [step * 10.0**decade for decade in decades for step in steps]
+        times = [time for time in times if low <= time <= high]
+        if len(times) <= _MOST_TICKS:
+            break
+    panel.xaxis.set_major_locator(FixedLocator(times[:: math.ceil(len(times) / _MOST_TICKS) or 1]))
     panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
-    panel.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > 30 else (1.0, 2.0, 5.0)))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_major_locator(LogLocator(numticks=9))
     panel.yaxis.set_minor_formatter(NullFormatter())

@@ -49,7 +49,8 @@ def test_without_period_and_events_the_panels_say_so() -> None:
     )
     whole, last, events = work_precision(replace(result, rows=rows, period=None, uncertainty=None))
     assert len(points(whole)) == 35 and not points(last) and not points(events)
-    assert [text.get_text() for text in last.texts] == ["none"]
+    assert [text.get_text() for text in last.texts] == ["the model has no period"]
+    assert [text.get_text() for text in events.texts] == ["no events to compare"]
     assert events.get_title(loc="left") == "Largest event-time error"
 
 
@@ -67,3 +68,17 @@ def test_axes_of_the_caller_are_used(tmp_path) -> None:
     with pytest.raises(UsageError, match="2 axes for three panels"):
         work_precision(comparison(), axes[:2])
     assert save(work_precision(comparison()), tmp_path / "chart.png").exists()
+
+
+@pytest.mark.parametrize("low, high", [(1e-3, 1.1e-3), (21e-3, 83e-3), (9e-3, 0.4), (1e-3, 20), (1e-5, 1e3)])
+def test_times_are_labelled_sparsely(low: float, high: float) -> None:
+    result = comparison()
+    rows = [
+        replace(row, cost=replace(row.cost, wall_times=(time,)))
+        for row, time in zip(result.rows, (low, high))
+    ]
+    panel = work_precision(replace(result, rows=tuple(rows)))[0]
+    least, most = panel.get_xlim()
+    labels = [label.get_text() for label in panel.get_xticklabels()]
+    assert 1 <= len(labels) <= 6
+    assert all(least <= tick <= most for tick in panel.get_xticks())
