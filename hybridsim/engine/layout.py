@@ -22,6 +22,11 @@ class Layout:
         return self.parameters
 
     @property
+    def discrete_slice(self) -> slice:
+        """Where the discrete states stand."""
+        return slice(self.discrete_at, self.discrete_at + self.discrete)
+
+    @property
     def origin_at(self) -> int:
         """The origin that local time is counted from, as a double (for expressions in plain t)."""
         return self.parameters + self.discrete

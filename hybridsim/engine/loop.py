@@ -30,9 +30,10 @@ class ModeLoop:
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
-        self.timetable = Timetable(system)
         self.record = Trajectory()
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.timetable = Timetable(system, self.end)
+        self.adopted: Instant | None = None  # the last instant at which an event was settled
         self.short = 0  # transitions in a row that followed at once
         self.progress: Callable[[Instant], None] | None = None
         if progress is not None:
@@ -51,6 +52,10 @@ class ModeLoop:
         except KeyboardInterrupt:
             self.record.status = "interrupted"
             self.record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
+        if self.adopted == self.origin:
+            self.record.finish(
+                self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
+            )
         return self.record
 
     def _run(self) -> None:
@@ -63,8 +68,6 @@ class ModeLoop:
         step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             appointment = self.timetable.next(self.origin, self.forward)
-            if appointment and abs(appointment.instant.minus(self.origin)) > abs(self.end.minus(self.origin)):
-                appointment = None
             target = appointment.instant if appointment else self.end
             segment = self._segment_run()
             bound = target.minus(self.origin)
@@ -221,7 +224,8 @@ class ModeLoop:
     ) -> bool:
         """Make the state after an event the start of the next segment and record the event; True to stop."""
         system, record = self.system, self.record
-        self.origin, self.outcome = instant, outcome
+        self.origin = self.adopted = instant
+        self.outcome = outcome
         self.p = system.vector(instant, system.discrete(outcome.p), self.forward)
         for warning in outcome.warnings:
             record.warn(warning)

@@ -298,14 +298,17 @@ class SegmentRun:
         fired = tuple(r.number for r in step.roots if not r.is_monitor and r.direction < 0)
         stopping = []
         for root in step.roots:
-            if root.is_monitor:
-                self.locator.monitor_sides[root.number] = root.direction
-                if not self._wanted(root.number, root.direction):
-                    continue
-                if self.monitors[root.number].action == "record":
-                    self.sightings.append(Sighting(step.s1, x, root.number, root.direction))
-                else:
-                    stopping.append(root.number)
+            if not root.is_monitor:
+                continue
+            wanted = self._wanted(root.number, root.direction)
+            if wanted and self.monitors[root.number].action != "record":
+                stopping.append(
+                    root.number
+                )  # its side before the event decides the direction that is recorded
+                continue
+            self.locator.monitor_sides[root.number] = root.direction
+            if wanted:
+                self.sightings.append(Sighting(step.s1, x, root.number, root.direction))
         if fired or stopping:
             return Arrival(step.s1, x, fired, tuple(stopping))
         return None

@@ -182,7 +182,7 @@ class System:
         """The run-time vector p of a segment whose local time starts at `origin`."""
         p = self._base.copy()
         at = self.layout
-        p[at.discrete_at : at.discrete_at + at.discrete] = discrete
+        p[at.discrete_slice] = discrete
         p[at.origin_at] = float(origin)
         for k, rate in enumerate(self.rates):
             p[at.phases_at + k] = phase(origin, float(rate), 0.0)
@@ -193,7 +193,7 @@ class System:
 
     def discrete(self, p: np.ndarray) -> np.ndarray:
         """Discrete states in p."""
-        return p[self.layout.discrete_at : self.layout.discrete_at + self.layout.discrete]
+        return p[self.layout.discrete_slice]
 
     def mode_names(self, z: np.ndarray) -> dict[str, str]:
         """Mode of every component by name."""

@@ -22,9 +22,10 @@ class Appointment:
 
 
 class Timetable:
-    """The scheduled times of one run."""
+    """The scheduled times of one run that ends at a given instant."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, end: Instant) -> None:
+        self._end = end
         values = system.model.parameter_values()
         self._signals = system.signals
         self._schedules = []
@@ -44,7 +45,11 @@ class Timetable:
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
-        """The nearest appointment strictly after an instant; what coincides within rounding comes together."""
+        """The nearest appointment strictly after an instant; what coincides within rounding comes together.
+
+        Two clocks whose periods are rounded to doubles differ by up to two ulps where they should meet. The last one
+        meets the end of the run in the same way; None where nothing is left before it.
+        """
         found: list[tuple[Instant, int]] = []
         for k in range(len(self._schedules)):
             time = self._next(k, after, forward)
@@ -57,11 +62,17 @@ class Timetable:
         if not found:
             return None
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
-        slack = math.ulp(nearest.high)
+        slack = 2.0 * math.ulp(
+            max(abs(nearest.high), *(abs(start) for _, start, _, _ in self._schedules), 0.0)
+        )
         together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
         latest = max(
             (t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after))
         )
+        if abs(self._end.minus(nearest)) <= slack:
+            latest = self._end
+        elif (self._end.minus(nearest) < 0.0) == forward:
+            return None
         return Appointment(latest, tuple(sorted(k for k in together if k >= 0)))
 
     def _first(self, k: int) -> Instant | None:
@@ -77,7 +88,7 @@ class Timetable:
         else:
             last = math.inf if count is None else count - 1
             near = 0 if period == 0.0 else math.floor((float(after) - start) / period)
-            ticks = range(max(near - 1, 0), int(min(max(near, 0) + 3, last)) + 1)
+            ticks = range(int(max(min(near - 1, last), 0)), int(min(max(near, 0) + 3, last)) + 1)
             candidates = [multiple(start, i, period) for i in ticks]
         ahead = [c for c in candidates if (c.minus(after) > 0.0 if forward else c.minus(after) < 0.0)]
         return None if not ahead else (ahead[0] if forward else ahead[-1])

@@ -69,6 +69,11 @@ class Occurrence:
     x_plus: np.ndarray
 
 
+def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
+    """A segment of no length: the state after an event with which a run ends."""
+    return Segment(origin, z, p, np.zeros(1), x[None, :].copy(), lambda s: np.tile(x, (len(s), 1)))
+
+
 @dataclass
 class Trajectory:
     """The record of a run."""
@@ -79,6 +84,15 @@ class Trajectory:
     status: str = "finished"
     message: str = ""
     warnings: dict[str, int] = field(default_factory=dict)  # message -> how often
+
+    def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
+        """Keep the state after an event at the very end of the run, which no segment begins with."""
+        if self.segments:
+            last = self.segments[-1]
+            same = (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all()
+            if same or float(last.end) != float(instant):
+                return
+        self.segments.append(end_point(instant, z.copy(), p, x))
 
     def warn(self, message: str) -> None:
         """Count a warning; each message is kept once."""

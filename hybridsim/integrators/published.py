@@ -63,8 +63,8 @@ class FixedStepRun:
     ) -> None:
         self.system, self.task, self.settings, self.progress = system, task, settings, progress
         self.record = Trajectory()
-        self.timetable = Timetable(system)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
         self.table = np.array(
@@ -86,6 +86,7 @@ class FixedStepRun:
         record = self.record
         try:
             self._run()
+            record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
         except KeyboardInterrupt:
             record.status = "interrupted"
             record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
@@ -101,8 +102,6 @@ class FixedStepRun:
             return
         while self.origin != self.end:
             appointment = self.timetable.next(self.origin, forward=True)
-            if appointment and appointment.instant.minus(self.end) > 0.0:
-                appointment = None
             if self._stretch(appointment, appointment.instant if appointment else self.end):
                 return
             if self.progress:
