@@ -156,6 +156,7 @@ def modes() -> tuple[Scene, ...]:
             unit=1.83,
             tol_t=1e-9,
             speed=0.5,
+            effort=10_000,
         ),
         Scene(
             "NOS-cross",
@@ -359,7 +360,7 @@ def scheduled() -> tuple[Scene, ...]:
             "FMI-stair",
             "stair",
             (0.0, 10.0),
-            Truth(ticks, (), "terminated", 9.0, counts),
+            Truth(ticks, status="terminated", end=9.0, checks=counts),
             needs("scheduled", "monitors"),
             count_scheduled=True,
             tol_t=0.0,

@@ -9,7 +9,7 @@ scene's own tolerance. A fixed-step method is judged in the same way over steps 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -127,8 +127,8 @@ def outcome(name: str, scene: Scene) -> Outcome:
             allowed = CUT_SHORT * setting.options["rtol"]
             tolerances = (max(tolerances[0], allowed), max(tolerances[1], allowed))
             break
-        if last and setting.options["rtol"] != LAST_RESORT and not within(measured, tolerances):
-            settings.append(adaptive(LAST_RESORT, scene))
+        if last and not wrong and setting.options["rtol"] != LAST_RESORT and not within(measured, tolerances):
+            settings.append(replace(adaptive(LAST_RESORT, scene), fall=1.0))
     if not wrong:
         wrong = judge_errors(done, tolerances)
     rows = tuple((setting.text, measured.time_error, measured.state_error) for setting, measured in done)
