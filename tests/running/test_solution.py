@@ -1,0 +1,115 @@
+"""The solution: both sides of an event, outputs, modes, tables."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim import UsageError
+
+G, RESTITUTION = 9.81, 0.7
+
+
+@pytest.fixture(scope="module")
+def ball() -> hs.Solution:
+    return hs.simulate("bouncing-ball", (0, 3), rtol=1e-12)
+
+
+def first_impact(ball: hs.Solution) -> float:
+    values = ball.model.parameter_values()
+    return math.sqrt(2 * ball.model.start_values()["h"] / values["g"])
+
+
+def test_an_event_has_two_sides(ball: hs.Solution) -> None:
+    event = ball.events[0]
+    values = ball.model.parameter_values()
+    speed = values["g"] * first_impact(ball)
+    assert event.t == pytest.approx(first_impact(ball), abs=1e-11)
+    assert event.x_minus[1] == pytest.approx(-speed, abs=1e-10)
+    assert event.x_plus[1] == pytest.approx(values["e"] * speed, abs=1e-10)
+    assert event.x_plus[0] == 0.0
+    assert (ball(event.t) == event.x_plus).all()
+    assert ball(event.t, side="-") == pytest.approx(event.x_minus, abs=1e-12)
+
+
+def test_event_times_stand_twice_in_t(ball: hs.Solution) -> None:
+    for event in ball.events:
+        assert (ball.t == event.t).sum() == 2
+    assert ball.y.shape == (2, len(ball.t))
+    assert (np.diff(ball.t) >= 0).all()
+
+
+def test_dense_output_is_the_parabola(ball: hs.Solution) -> None:
+    t = np.linspace(0, first_impact(ball) * 0.999, 50)
+    values = ball.model.parameter_values()
+    assert ball(t)[0] == pytest.approx(ball.model.start_values()["h"] - 0.5 * values["g"] * t**2, abs=1e-12)
+
+
+def test_modes_cover_the_run_without_gaps(ball: hs.Solution) -> None:
+    intervals = ball.modes["mode"]
+    assert intervals[0].t0 == 0.0 and intervals[-1].t1 == 3.0
+    assert [a.t1 for a in intervals[:-1]] == [b.t0 for b in intervals[1:]]
+    assert [i.mode for i in intervals] == ["flight", "rest"]
+
+
+def test_outside_of_the_run_is_refused(ball: hs.Solution) -> None:
+    with pytest.raises(UsageError, match="outside"):
+        ball(3.1)
+    with pytest.raises(UsageError, match="side"):
+        ball(1.0, side="left")
+
+
+def test_outputs_by_name() -> None:
+    sol = hs.simulate("dfcs", (0, 0.1))
+    values = sol.model.parameter_values()
+    for interval in sol.modes["f"]:
+        middle = 0.5 * (interval.t0 + interval.t1)
+        force = sol.output("f", middle)
+        x, v = sol(middle)
+        load = values["F0"] * math.sin(values["omega"] * middle) - values["c"] * v - values["k"] * x
+        expected = {"slip+": 20.0, "slip-": -20.0, "stick": load}[interval.mode]
+        assert force == pytest.approx(expected, abs=1e-9)
+    assert sol.output("x", 0.05) == sol(0.05)[0]
+    assert len(sol.output("f")) == len(sol.t)
+    with pytest.raises(UsageError, match="'ff'"):
+        sol.output("ff")
+
+
+def test_csv_holds_what_the_solution_holds(tmp_path: Path) -> None:
+    sol = hs.simulate("dfcs", (0, 0.03))
+    path = tmp_path / "run.csv"
+    sol.to_csv(path)
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(r["t"]) for r in rows] == sol.t.tolist()
+    assert [float(r["v"]) for r in rows] == sol.y[1].tolist()
+    assert {r["mode(f)"] for r in rows} == {"stick", "slip+", "slip-"}
+    sol.to_csv(path, points=11)
+    with open(path, newline="") as file:
+        assert len(list(csv.DictReader(file))) == 11
+
+
+def test_names_of_scipy() -> None:
+    model = hs.Model(
+        "cannon",
+        states=(hs.State("y", 0, "w"), hs.State("w", 10, "-9.81")),
+        monitors=(hs.Monitor("apex", "w", "down"), hs.Monitor("ground", "y", "down", "terminate")),
+    )
+    sol = hs.simulate(model, (0, 100), rtol=1e-12)
+    assert sol.success and sol.nfev > 0
+    apex, ground = sol.t_events
+    assert apex == pytest.approx([10 / 9.81], abs=1e-11)
+    assert ground == pytest.approx([20 / 9.81], abs=1e-11)
+    assert sol.y_events[1][0] == pytest.approx([0, -10], abs=1e-9)
+    assert (sol.sol(1.0) == sol(1.0)).all()
+
+
+def test_repr_says_how_it_went(ball: hs.Solution) -> None:
+    text = repr(ball)
+    for word in ("bouncing-ball", "finished", "transition", "steps"):
+        assert word in text
