@@ -119,7 +119,10 @@ def _span(t_span: tuple[float, float] | None, period: float | None) -> tuple[flo
 def _simulate(model: Model, span: tuple[float, float], integrator: str, **options: Any) -> Solution:
     from hybridsim.simulate import simulate
 
-    return simulate(model, span, integrator=integrator, **options)
+    solution = simulate(model, span, integrator=integrator, **options)
+    if solution.status == "interrupted":  # Ctrl-C means the whole comparison, not the one run that took it
+        raise KeyboardInterrupt
+    return solution
 
 
 def _first_run(

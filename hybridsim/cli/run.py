@@ -89,7 +89,8 @@ def execute(args: argparse.Namespace, written: Written) -> int:
         _write(solution, args, written)
     if solution.success:
         return 0
-    complain(f"{solution.status}: {solution.message}")
+    begins = solution.message.startswith(solution.status)
+    complain(solution.message if begins else f"{solution.status}: {solution.message}")
     return INTERRUPTED if solution.status == "interrupted" else SimulationError.exit_code
 
 

@@ -1,0 +1,66 @@
+"""Ctrl-C in a process of its own: exit code 130, no traceback, and what was computed is kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT between processes")
+
+# The program says on stderr when the simulation has begun; then it is interrupted from outside.
+_PROGRAM = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from hybridsim.cli.progress import Progress
+called = []
+def tell(self, *_):
+    if not called:
+        called.append(print("begun", file=sys.stderr, flush=True))
+Progress.__call__ = tell
+from hybridsim.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def interrupted(tmp_path: Path, *argv: str) -> tuple[int, str]:
+    """Exit code and messages of a command that gets SIGINT half a second after its work has begun."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", _PROGRAM, *argv],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    seen = []
+    for line in process.stderr:
+        seen.append(line)
+        if line == "begun\n":
+            break
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    seen.append(process.communicate(timeout=300)[1])
+    return process.returncode, "".join(seen)
+
+
+def test_run_keeps_what_was_computed(tmp_path: Path) -> None:
+    argv = ("run", "dfcs", "--t-end", "10000T", "--integrator", "scipy-dop853", "--csv", "out.csv")
+    code, messages = interrupted(tmp_path, *argv)
+    assert code == 130, messages
+    assert "interrupted after t = " in messages and "wrote out.csv" in messages
+    assert "Traceback" not in messages
+    assert len((tmp_path / "out.csv").read_text().splitlines()) > 10
+
+
+def test_compare_stops_altogether(tmp_path: Path) -> None:
+    argv = ("compare", "dfcs", "--t-end", "10000T", "--integrators", "scipy-rk45", "--rtol", "1e-4,1e-12")
+    code, messages = interrupted(tmp_path, *argv)
+    assert code == 130, messages
+    assert "interrupted; nothing was written" in messages
+    assert "Traceback" not in messages
