@@ -146,30 +146,56 @@ class ModeLoop:
         if not (arrival.fired or arrival.stopping or appointment):
             self.origin = instant
             return True
-        at = self._situation(arrival, segment)
         if not self.forward:
             refused = self._refuse_backward(arrival, schedules)
             if refused:
                 self.origin = instant
                 self.record.status, self.record.message = "backward-nonunique", refused
                 return True
+        sides = segment.locator.monitor_sides
+        x_minus = arrival.x
+        if arrival.fired or arrival.stopping:
+            outcome = self._settle_located(self._situation(arrival, segment), arrival)
+            if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
+                return True
+            sides, x_minus = outcome.monitor_sides, outcome.x
+        if appointment:
+            # what is located at the same instant comes first: it belongs to the signals as they were before it
+            outcome = self._settle_appointment(instant, x_minus, schedules, segment)
+            return self._adopt(instant, outcome, x_minus, schedules, (), sides)
+        return self._accumulated(instant, arrival)
+
+    def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
+        """Settle the guards and stopping monitors that were located."""
         fired = self._coincident(at, arrival.fired)
         if fired and not self.forward:
-            outcome = cross_backward(self.system, at, fired)
-        else:
-            resets = [("schedule", k) for k in schedules] + [("monitor", k) for k in arrival.stopping]
-            outcome = Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
-        sides = segment.locator.monitor_sides
-        stop = self._adopt(instant, outcome, arrival.x, schedules, arrival.stopping, sides)
+            return cross_backward(self.system, at, fired)
+        resets = [("monitor", k) for k in arrival.stopping]
+        return Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
+
+    def _settle_appointment(
+        self, instant: Instant, x_minus: np.ndarray, schedules: tuple[int, ...], segment: SegmentRun
+    ) -> Outcome:
+        """Settle a scheduled instant, inputs as they are from then on."""
+        system, z = self.system, self.outcome.z
+        p = system.vector(instant, system.discrete(self.p), self.forward)
+        error = 4.0 * UNIT * segment.scale
+        error[[system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and z[c] == a.hold]] = (
+            0.0
+        )
+        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
+        resets = [("schedule", k) for k in schedules]
+        return Settling(system, at, z.copy(), self.forward).run((), resets)
+
+    def _accumulated(self, instant: Instant, arrival: Arrival) -> bool:
+        """Whether events follow each other closer than any clock resolves; then the run ends, saying so."""
         near = abs(arrival.s) <= _ACCUMULATION_ULPS * math.ulp(float(instant))
-        self.short = self.short + 1 if near and outcome.changes else 0
-        if not stop and self.short >= _ACCUMULATION_COUNT:
-            self.record.status = "accumulation"
-            self.record.message = (
-                f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
-            )
-            return True
-        return stop
+        self.short = self.short + 1 if near else 0
+        if self.short < _ACCUMULATION_COUNT:
+            return False
+        self.record.status = "accumulation"
+        self.record.message = f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
+        return True
 
     def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
         """The state before an event with bounds of its rounding: of the states, the instant, the residual."""

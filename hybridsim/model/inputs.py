@@ -33,8 +33,8 @@ class Input(Declared):
     wave   offset + amplitude*s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
            square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1
            at 1/4, -1 at 3/4; sawtooth: from -1 rising to 1, where it jumps back.
-    chirp  amplitude*sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; frequency
-           rises from f0 to f1 and then stays. ``phase`` is an angle.
+    chirp  amplitude*sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; the
+           frequency goes from f0 to f1, and is f0 before and f1 after. ``phase`` is an angle.
 
     Parameters
     ----------
