@@ -108,3 +108,19 @@ def test_what_does_not_fit_is_refused_by_name(arguments: dict[str, object], word
         hs.simulate(decay(), **given)  # type: ignore[arg-type]
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf"])
+def test_a_jump_of_the_load_frees_a_body_at_rest(integrator: str) -> None:
+    """m = 1, limit 3; the load is 1 up to t = 1 and -5 after: v = -(5 - 3)(t - 1)."""
+    load = hs.Input("F", "table", times=(0, 1, 1, 3), values=(1, 1, -5, -5))
+    model = hs.Model(
+        "pushed",
+        states=(State("x", 0, "v"), State("v", 0, "F - f")),
+        inputs=(load,),
+        contacts=(hs.Contact("f", velocity="v", normal="6", law="coulomb", arguments={"mu": 0.5}),),
+    )
+    sol = hs.simulate(model, (0, 2), integrator=integrator)
+    assert [(e.t, e.source, e.target) for e in sol.events if e.kind == "transition"] == [(1.0, "stick", "slip-")]
+    assert (sol(np.linspace(0, 1, 20)) == 0.0).all()
+    assert sol(2.0) == pytest.approx([-1.0, -2.0], abs=1e-7)
