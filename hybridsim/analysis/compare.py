@@ -22,7 +22,7 @@ from hybridsim.model import Model, load
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-PERIODS = 100
+PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
 TIME = 10.0  # of a model without a period: a few swings of a mechanism of about 1 Hz
 
 Progress = Callable[[int, int, str], None]
@@ -49,7 +49,7 @@ def compare(
     Parameters
     ----------
     model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
-    t_span : (t0, t1), t1 > t0; (0, 100 T) if not given, (0, 10) where the model has no forcing period T.
+    t_span : (t0, t1), t1 > t0; (0, 20 T) if not given, (0, 10) where the model has no forcing period T.
     integrators : names, (name, options) or `Series`; all registered ones if not given.
     rtols : tolerances of the integrators that adapt their step.
     steps : steps a period of those that do not; without a period, a tenth of the run counts as one.

@@ -23,7 +23,7 @@ def add_to(commands: Any) -> None:
         epilog="The folder gets chart.png, table.csv and comparison.json.",
     )
     values.add_model_arguments(parser)
-    values.add_span_argument(parser)
+    values.add_span_argument(parser, values.COMPARED_PERIODS)
     parser.add_argument(
         "--integrators", metavar="A,B", type=values.names, help="compare these only (default: all that can)"
     )
@@ -56,7 +56,7 @@ def execute(args: argparse.Namespace, written: Written) -> int:
     if folder is not None:
         require_folder(folder, "--out")
     model = values.changed_model(args)
-    span = (0.0, values.end_time(model, args.t_end))
+    span = (0.0, values.end_time(model, args.t_end, values.COMPARED_PERIODS))
     folder = folder or Path(f"compare-{model.name}")
     require_folder(folder, "--out")
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 DEFAULT_PERIODS = 100
+COMPARED_PERIODS = 20  # a comparison runs dozens of times: a minute, not five
 DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
 
 _PERIODS = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*T\s*")
@@ -89,13 +90,13 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_span_argument(parser: argparse.ArgumentParser) -> None:
+def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PERIODS) -> None:
     """The argument that says how long to run."""
     parser.add_argument(
         "--t-end",
         metavar="TIME",
         help="end of the run: a time, an expression of the parameters, or '100T' for 100 periods of forcing "
-        f"(default: {DEFAULT_PERIODS}T, or {DEFAULT_SECONDS:g} where there is no period)",
+        f"(default: {periods}T, or {DEFAULT_SECONDS:g} where there is no period)",
     )
 
 
@@ -132,7 +133,7 @@ def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Exp
     return found
 
 
-def end_time(model: Model, text: str | None) -> float:
+def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERIODS) -> float:
     """The end of the run in the model's unit of time.
 
     Raises `UsageError` where the text is no time, the time is not above zero, or periods are asked for and
@@ -142,7 +143,7 @@ def end_time(model: Model, text: str | None) -> float:
 
     if text is None:
         period = forcing_period(model)
-        return DEFAULT_PERIODS * period if period is not None else DEFAULT_SECONDS
+        return default_periods * period if period is not None else DEFAULT_SECONDS
     periods = _PERIODS.fullmatch(text)
     if periods:
         period = forcing_period(model)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pprint import pformat
 from typing import Any
@@ -47,6 +48,9 @@ def _printer() -> Any:
             if e.exp in (Rational(1, 2), 0.5):
                 return f"sqrt({self._print(e.base)})"
             return f"pow({self._print(e.base)}, {self._print(e.exp)})"
+
+        def _print_Exp1(self, e: Any) -> str:
+            return repr(math.e)
 
         def _print_sign(self, e: Any) -> str:
             a = self._print(e.args[0])

@@ -65,7 +65,16 @@ class Lowering:
 
     def convert(self, expression: Expression) -> Any:
         """A declared expression in SymPy, angles that grow in time written in local time."""
-        return self._local_angles(to_sympy(expression, self.symbols))
+        sp = self.sp
+        value = to_sympy(expression, self.symbols)
+        if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
+            raise expression.error(
+                f"'{expression.text}' is not a real number, whatever its names stand for: it is {value}".replace(
+                    "v_", ""
+                ),
+                remedy="look for a root or a logarithm of something negative, or a division by zero.",
+            )
+        return self._local_angles(value)
 
     def _local_angles(self, e: Any) -> Any:
         sp = self.sp

@@ -15,7 +15,8 @@ SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, 
 # how INTEGRAL finds its own leading coefficient from the argument c
 LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
-_MAX_INTEGER_POWER = 64  # beyond it a power costs more as products than as exp(n log u)
+# Twelve squarings; exp(n log u), which has no value for u < 0, only beyond
+_MAX_INTEGER_POWER = 4096
 
 
 class TapeBuilder:
@@ -103,24 +104,28 @@ class TapeBuilder:
     def _emit_power(
         self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
-        import sympy as sp
+        """Whole and half powers as products of the base or its root, so that they have a value at 0 and below."""
+        source = self._emit(base, known, rows)
+        twice = 2.0 * float(exponent) if exponent.is_number else 0.5
+        if twice.is_integer() and abs(twice) <= 2 * _MAX_INTEGER_POWER:
+            n, odd = divmod(int(twice), 2)
+            if odd:
+                n, source = int(twice), self._op(rows, SQRT, source)
+            power = self._products(source, abs(n), known, rows)
+            return power if n > 0 else self._op(rows, DIV, self._constant(1.0), power)
+        logarithm = self._op(rows, INTEGRAL, source, source, LOG)
+        return self._op(rows, EXP, self._op(rows, MUL, self._emit(exponent, known, rows), logarithm))
 
-        if exponent.is_Integer and abs(int(exponent)) <= _MAX_INTEGER_POWER:
-            n = int(exponent)
-            if n < 0:
-                return self._op(rows, DIV, self._constant(1.0), self._emit(base ** (-n), known, rows))
-            half = self._emit(base ** (n // 2), known, rows) if n > 3 else self._emit(base, known, rows)
-            if n > 3:
-                square = self._op(rows, MUL, half, half)
-                return self._op(rows, MUL, square, self._emit(base, known, rows)) if n % 2 else square
+    def _products(self, source: int, n: int, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        """A register to the power n >= 1 by squaring."""
+        if n == 1:
+            return source
+        key = ("power", source, n)
+        if key not in known:
+            half = self._products(source, n // 2, known, rows)
             out = self._op(rows, MUL, half, half)
-            return self._op(rows, MUL, out, half) if n == 3 else out
-        if exponent == sp.Rational(1, 2) or exponent == 0.5:
-            return self._op(rows, SQRT, self._emit(base, known, rows))
-        if exponent == sp.Rational(-1, 2) or exponent == -0.5:
-            root = self._op(rows, SQRT, self._emit(base, known, rows))
-            return self._op(rows, DIV, self._constant(1.0), root)
-        return self._emit(sp.exp(exponent * sp.log(base), evaluate=False), known, rows)
+            known[key] = self._op(rows, MUL, out, source) if n % 2 else out
+        return known[key]
 
     def _emit_piecewise(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         out = self._emit(e.args[-1].expr, known, rows)
@@ -161,6 +166,10 @@ class TapeBuilder:
             return self._op(rows, op, a[1] if swap else a[0], a[0] if swap else a[1])
         if kind is sp.Eq:
             return self._op(rows, EQUAL, a[0], a[1])
+        if kind is sp.ITE:
+            return self._op(rows, SELECT, a[0], a[1], a[2])
+        if kind is sp.cot:  # SymPy makes it of tan(u + pi/2)
+            return self._op(rows, DIV, one, self._op(rows, TANGENT, a[0]))
         if kind is sp.Ne:
             return self._op(rows, NOT, self._op(rows, EQUAL, a[0], a[1]))
         if kind in (sp.sin, sp.cos):
