@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import pytest
 from expr.strategies import NAMES, expressions
-from hypothesis import assume, given
+from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from hybridsim.errors import ExpressionError, Place
-from hybridsim.expr import evaluate, parse, substitute
+from hybridsim.expr import Expression, evaluate, parse, substitute
 from hybridsim.expr.write import write
 
 values = st.fixed_dictionaries({name: st.floats(-3, 3).map(lambda v: round(v, 3)) for name in NAMES})
 
 
-def value_or_none(text: object, at: dict[str, float]) -> float | None:
+def value_or_none(text: Expression, at: dict[str, float]) -> float | None:
     try:
-        return evaluate(text, at)  # type: ignore[arg-type]
+        return evaluate(text, at)
     except ExpressionError:
         return None
 
 
-def parsed(text: str):  # type: ignore[no-untyped-def]
+def parsed(text: str) -> Expression:
     try:
         return parse(text)
     except ExpressionError:  # a constant part without a value, such as 1/0
-        assume(False)
+        reject()
 
 
 @given(expressions, expressions, values)

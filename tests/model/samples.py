@@ -100,4 +100,4 @@ def block(**changes: object) -> hs.Model:
         "parameters": {"m": 1.0, "k": "4*m", "mu": 0.3, "N": 2.0},
         "contacts": [hs.Contact("f", "v", "N", "coulomb", {"mu": "mu"})],
     }
-    return hs.Model("block", **{**parts, **changes})  # type: ignore[arg-type]
+    return hs.Model("block", **{**parts, **changes})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import pickle
+from collections.abc import Callable
 
 import pytest
 from model.samples import block, everything
@@ -53,7 +54,7 @@ def test_changed_copies() -> None:
         (lambda model: model.with_start(f=1), "known states: v, x."),
     ],
 )
-def test_changing_what_is_not_there(change, near: str) -> None:  # type: ignore[no-untyped-def]
+def test_changing_what_is_not_there(change: Callable[[hs.Model], hs.Model], near: str) -> None:
     with pytest.raises(hs.UsageError) as caught:
         change(block())
     assert near in str(caught.value)
@@ -70,7 +71,7 @@ def test_bad_values_are_refused_at_once_or_by_validation() -> None:
 
 
 @pytest.mark.parametrize("make", [block, everything])
-def test_equal_by_content_hashed_and_carried(make) -> None:  # type: ignore[no-untyped-def]
+def test_equal_by_content_hashed_and_carried(make: Callable[[], hs.Model]) -> None:
     model, other = make(), make()
     assert model == other and hash(model) == hash(other)
     assert pickle.loads(pickle.dumps(model)) == model
@@ -82,9 +83,9 @@ def test_equal_by_content_hashed_and_carried(make) -> None:  # type: ignore[no-u
 def test_nothing_can_be_changed_in_place() -> None:
     model = block()
     with pytest.raises(dataclasses.FrozenInstanceError):
-        model.name = "y"  # type: ignore[misc]
+        model.name = "y"
     with pytest.raises(TypeError):
-        model.all_components()[0].modes[0].set["f"] = 0  # type: ignore[index]
+        model.all_components()[0].modes[0].set["f"] = 0
     given = {"f": "1"}
     mode = hs.Mode("a", set=given)
     given["f"] = "2"

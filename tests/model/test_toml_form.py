@@ -48,7 +48,7 @@ numbers = st.one_of(
     title=texts,
     times=st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=6, unique=True),
 )
-def test_random_models_come_back_equal(parameters, states, title, times) -> None:  # type: ignore[no-untyped-def]
+def test_random_models_come_back_equal(parameters, states, title, times) -> None:
     known = [name for name in parameters if name not in {state[0] for state in states}]
     model = hs.Model(
         "random",
