@@ -111,7 +111,7 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
     """Order 0 of the operations whose higher orders follow from a differential equation."""
     u, du = V[a, 0], E[a, 0]
     if op == EXP:
-        y = math.exp(u) if u < 709.0 else math.inf
+        y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises where it overflows
         _put(V, E, out, 0, y, abs(y) * (du + 2.0 * UNIT))
     elif op == SINCOS:
         s, co = math.sin(u), math.cos(u)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -68,11 +69,15 @@ class Lowering:
         sp = self.sp
         value = to_sympy(expression, self.symbols)
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
+            simplified = re.sub(rf"\b{user('')}", "", str(value))
             raise expression.error(
-                f"'{expression.text}' is not a real number, whatever its names stand for: it is {value}".replace(
-                    "v_", ""
-                ),
+                f"'{expression.text}' is no finite real number: it simplifies to {simplified}",
                 remedy="look for a root or a logarithm of something negative, or a division by zero.",
+            )
+        if value.has(sp.re, sp.im, sp.arg, sp.conjugate):
+            raise expression.error(
+                f"'{expression.text}' takes the absolute value of what may be complex: a root or a logarithm",
+                remedy="write abs(u) as max(u, -u).",
             )
         return self._local_angles(value)
 
