@@ -8,9 +8,13 @@ scene's own tolerance. A fixed-step method is judged in the same way over steps 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import signal
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
+from types import FrameType
 from typing import Any
 
 import hybridsim as hs
@@ -36,6 +40,15 @@ LAST_RESORT = 1e-13  # for a method of low order whose error at 1e-12 is still a
 CUT_SHORT = 1000.0
 # A method with this option has the capability when it is set so.
 LIFTED = {"stick_velocity": ("zero", "exact-stick")}
+
+
+LONGEST = (
+    60  # seconds for one run of a scene: the longest takes ten on a slow machine, the first ever compiles
+)
+
+
+class Endless(Exception):
+    """A run that does not come to an end."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +127,14 @@ def outcome(name: str, scene: Scene) -> Outcome:
         tolerances = (max(scene.tol_t, FIXED_STEP_TOLERANCE), max(scene.tol_x, FIXED_STEP_TOLERANCE))
     for number, setting in enumerate(settings):
         try:
-            measured = judge.measure(scene, judge.run(scene, name, **setting.options), lacks)
+            with bounded_work():
+                measured = judge.measure(scene, judge.run(scene, name, **setting.options), lacks)
         except HybridsimError as error:
             wrong.append(f"{setting.text}: refused: {error}")
-            continue
+            break
+        except Exception as error:  # whatever it is, it is what a user would see
+            wrong.append(f"{setting.text}: raised {type(error).__name__}: {error}")
+            break
         wrong += [f"{setting.text}: {sentence}" for sentence in measured.wrong]
         done.append((setting, measured))
         last = number == len(settings) - 1
@@ -133,6 +150,25 @@ def outcome(name: str, scene: Scene) -> Outcome:
         wrong = judge_errors(done, tolerances)
     rows = tuple((setting.text, measured.time_error, measured.state_error) for setting, measured in done)
     return Outcome(name, scene.name, "wrong" if wrong else "right", tuple(wrong), rows)
+
+
+@contextmanager
+def bounded_work() -> Iterator[None]:
+    """Turn work without end into an Endless error (where the platform has alarms, in the main thread)."""
+    if not hasattr(signal, "SIGALRM") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def give_up(number: int, frame: FrameType | None) -> None:
+        raise Endless(f"no end after {LONGEST} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(LONGEST)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def within(measured: judge.Measured, tolerances: tuple[float, float]) -> bool:

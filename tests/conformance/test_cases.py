@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from types import FrameType
-
 import pytest
 
 import hybridsim as hs
@@ -18,24 +14,6 @@ from hybridsim.errors import HybridsimError
 INTEGRATORS = [one.name for one in hs.list_integrators()]
 # What a model visibly needs: a run is refused for it. The others show only in how a run goes.
 REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward"}
-LONGEST = 120  # seconds on one scene; each takes one to ten, and work without end is a failure, not a hang
-
-
-@pytest.fixture(autouse=True)
-def bounded() -> Iterator[None]:
-    """Fail a scene that does not come to an end."""
-    if not hasattr(signal, "SIGALRM"):
-        yield
-        return
-
-    def give_up(number: int, frame: FrameType | None) -> None:
-        pytest.fail(f"no end after {LONGEST} s")
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.alarm(LONGEST)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
