@@ -63,6 +63,25 @@ class Lowering:
         self.parameters = {self.symbols[p.name] for p in model.parameters}
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
+        self.angles = self._defined_angles()
+
+    def _defined_angles(self) -> dict[Any, Any]:
+        """Definitions that grow linearly in time, such as theta = omega*t, written out for their sine and cosine."""
+        waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
+        found: dict[Any, Any] = {}
+        while True:
+            written_out = {name: e.subs(found) for name, e in waiting.items() if name not in found}
+            grow = {name: e for name, e in written_out.items() if self._rate(e) is not None}
+            if not grow:
+                return found
+            found |= grow
+
+    def _rate(self, e: Any) -> Any:
+        """de/dt where it is a parameter's worth and not zero, else None."""
+        if self.t not in e.free_symbols:
+            return None
+        rate = self.sp.diff(e, self.t)
+        return None if rate == 0 or rate.free_symbols - self.parameters else rate
 
     def convert(self, expression: Expression) -> Any:
         """A declared expression in SymPy, angles that grow in time written in local time."""
@@ -83,14 +102,16 @@ class Lowering:
 
     def _local_angles(self, e: Any) -> Any:
         sp = self.sp
-        if self.t not in e.free_symbols:
+        if not e.free_symbols & {self.t, *self.angles}:
             return e
 
         def rewrite(argument: Any, kind: Any) -> Any:
             argument = self._local_angles(argument) if argument.has(sp.sin, sp.cos, sp.tan) else argument
-            rate = sp.diff(argument, self.t)
-            if self.t not in argument.free_symbols or rate.free_symbols - self.parameters:
+            written_out = argument.subs(self.angles)
+            rate = self._rate(written_out)
+            if rate is None:
                 return kind(argument)
+            argument = written_out
             if rate not in self.rates:
                 self.rates.append(rate)
             phase = sp.Symbol(f"phase_{self.rates.index(rate)}", real=True)
