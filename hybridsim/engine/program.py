@@ -57,7 +57,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
             pending[name] = pending.get(name, 0) + 1
     result: list[Item] = []
     while waiting:
-        ready = [i for i in waiting if not any(pending.get(n, 0) for n in used(i) - assigned(i))]
+        ready = [i for i in waiting if not any(pending.get(n, 0) for n in used(i))]
         if not ready:
             loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
             raise ModelError(

@@ -1,0 +1,102 @@
+"""A declared model evaluated by hand: every expression in mpmath, the unknowns of holding modes by a linear solve.
+
+Nothing of the engine is used: names are looked up in the declaration, and what a holding mode solves for is found
+from d(surface)/dt = 0, differentiated numerically along the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import mpmath
+from engine.multiple_precision import evaluate
+
+from hybridsim.model import Model
+
+
+class ByHand:
+    """A model at one instant in one combination of modes."""
+
+    def __init__(
+        self,
+        model: Model,
+        modes: Mapping[str, str],
+        t: Any,
+        x: Mapping[str, float],
+        discrete: Mapping[str, float] | None = None,
+        inputs: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.model, self.t = model, mpmath.mpf(t)
+        self.x = {n: mpmath.mpf(v) for n, v in x.items()}
+        self.known = {n: mpmath.mpf(v) for n, v in model.parameter_values().items()}
+        self.known |= {n: mpmath.mpf(v) for n, v in (discrete or {}).items()}
+        self.known |= dict(inputs or {})
+        self.formulas = {n: e.text for n, e in model.definitions}
+        self.der = {s.name: s.der.text for s in model.states}
+        self.guards: dict[str, list[str]] = {}
+        self.holding: dict[str, str] = {}  # unknown -> surface
+        for component in model.all_components():
+            mode = next(m for m in component.modes if m.name == modes[component.name])
+            self.formulas |= {n: e.text for n, e in mode.set.items()}
+            self.der |= {n: e.text for n, e in mode.der.items()}
+            self.guards[component.name] = [g.expr.text for g in mode.guards]
+            if component.surface and mode.name == component.surface.hold:
+                self.holding[component.surface.unknown] = component.surface.function.text
+        self.unknown: dict[str, Any] = {}
+        self.unknown = self.solve()
+
+    def value(self, text: str, t: Any = None, x: Mapping[str, Any] | None = None) -> Any:
+        """Value of an expression, here or at another time and state."""
+        t, x = (self.t, self.x) if x is None else (t, x)
+        return evaluate(text, Names(self, t, x))
+
+    def slope(self) -> dict[str, Any]:
+        """dx/dt."""
+        return {n: self.value(e) for n, e in self.der.items()}
+
+    def rate(self, surface: str) -> Any:
+        """d(surface)/dt along the motion."""
+        slope = self.slope()
+        return mpmath.diff(
+            lambda h: self.value(surface, self.t + h, {n: v + h * slope[n] for n, v in self.x.items()}), 0
+        )
+
+    def solve(self) -> dict[str, Any]:
+        """The forces that keep every held surface where it is: they enter the rates linearly."""
+        names = list(self.holding)
+        if not names:
+            return {}
+
+        def rates(values: list[Any]) -> Any:
+            self.unknown = dict(zip(names, values, strict=True))
+            return mpmath.matrix([self.rate(s) for s in self.holding.values()])
+
+        n = len(names)
+        at_rest = rates([mpmath.mpf(0)] * n)
+        effect = mpmath.matrix(n, n)
+        for j in range(n):
+            column = rates([mpmath.mpf(int(i == j)) for i in range(n)]) - at_rest
+            for i in range(n):
+                effect[i, j] = column[i]
+        solution = mpmath.lu_solve(effect, -at_rest)
+        return {name: solution[i] for i, name in enumerate(names)}
+
+
+class Names(Mapping[str, Any]):
+    """Every name of a model, worked out when it is asked for."""
+
+    def __init__(self, by_hand: ByHand, t: Any, x: Mapping[str, Any]) -> None:
+        self.by_hand = by_hand
+        self.given = {"t": t, **by_hand.known, **x, **by_hand.unknown}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.given:
+            self.given[name] = evaluate(self.by_hand.formulas[name], self)
+        return self.given[name]
+
+    def __iter__(self) -> Any:
+        return iter({**self.given, **self.by_hand.formulas})
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
