@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from hybridsim.cli.output import Written, complain
+from hybridsim.cli.output import complain
+from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
@@ -24,7 +25,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """Do what `action` says."""
     from hybridsim.engine.cache import cache_root, clear
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.automaton import lines_of
-from hybridsim.cli.output import Written, print_json
+from hybridsim.cli.output import print_json
+from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
     from hybridsim.engine.report import Report
@@ -29,7 +30,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """Print the expanded automaton; a bad model has already been refused on loading."""
     from hybridsim.engine.report import describe
 

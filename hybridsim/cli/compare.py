@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
-from hybridsim.cli.output import Written, require_folder
+from hybridsim.cli.output import require_folder
 from hybridsim.cli.progress import Progress
+from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Comparison
@@ -50,7 +51,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """Compare, print the table and fill the folder."""
     folder: Path | None = args.out
     if folder is not None:
@@ -62,7 +63,7 @@ def execute(args: argparse.Namespace, written: Written) -> int:
 
     import hybridsim
 
-    with Progress() as progress:
+    with Progress(session) as progress:
         comparison = hybridsim.compare(
             model,
             t_span=span,
@@ -76,17 +77,17 @@ def execute(args: argparse.Namespace, written: Written) -> int:
         print(comparison.to_json())
     else:
         print(comparison.table())
-    _write(comparison, folder, written)
+    _write(comparison, folder, session)
     return 0
 
 
-def _write(comparison: Comparison, folder: Path, written: Written) -> None:
+def _write(comparison: Comparison, folder: Path, session: Session) -> None:
     from hybridsim.plot import save, work_precision
 
     folder.mkdir(parents=True, exist_ok=True)
     comparison.to_csv(folder / "table.csv")
-    written.add(folder / "table.csv")
+    session.wrote(folder / "table.csv")
     comparison.to_json(folder / "comparison.json")
-    written.add(folder / "comparison.json")
+    session.wrote(folder / "comparison.json")
     save(work_precision(comparison), folder / "chart.png")
-    written.add(folder / "chart.png")
+    session.wrote(folder / "chart.png")

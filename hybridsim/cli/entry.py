@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, TextIO
 
 from hybridsim import __version__
 from hybridsim.cli import cache, check, compare, integrators, models, run
-from hybridsim.cli.output import INTERRUPTED, Written, complain
+from hybridsim.cli.output import INTERRUPTED, complain
 from hybridsim.cli.parser import Parser
+from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError
 
 if TYPE_CHECKING:
@@ -48,18 +49,17 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(
                 errors="backslashreplace"
             )  # a title with an accent must not stop an ASCII terminal
-    written = Written()
-    with warnings.catch_warnings():
+    session = Session()
+    with warnings.catch_warnings(), session.listening():
         warnings.showwarning = _show_warning
         try:
             args = build_parser().parse_args(argv)
-            code: int = args.execute(args, written)
+            code: int = args.execute(args, session)
             sys.stdout.flush()
         except SystemExit as done:  # argparse after --help and --version
             return done.code if isinstance(done.code, int) else 0
         except KeyboardInterrupt:
-            complain(f"interrupted; {written.summary()}")
-            return INTERRUPTED
+            return _interrupted(session)
         except BrokenPipeError:
             # Python flushes stdout once more at exit; give it somewhere to go.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -72,6 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             complain("out of memory; try a shorter --t-end or a looser --rtol")
             return HybridsimError.exit_code
         except Exception as bug:  # the last line of defence: whatever arrives here is a bug of ours
+            if session.interrupted:  # unless Ctrl-C hit compiled code, which has errors of its own for it
+                return _interrupted(session)
             if not _show_traceback_if_wanted():
                 complain(
                     f"internal error, please report it: {type(bug).__name__}: {bug}\n"
@@ -79,6 +81,11 @@ def main(argv: Sequence[str] | None = None) -> int:
                 )
             return HybridsimError.exit_code
     return code
+
+
+def _interrupted(session: Session) -> int:
+    complain(f"interrupted; {session.kept()}")
+    return INTERRUPTED
 
 
 def _show_traceback_if_wanted() -> bool:

@@ -6,7 +6,8 @@ import argparse
 import textwrap
 from typing import Any
 
-from hybridsim.cli.output import Written, print_json, print_table
+from hybridsim.cli.output import print_json, print_table
+from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
@@ -20,7 +21,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """List every integrator: its own and those that other packages registered."""
     import hybridsim
     from hybridsim.integrators.base import CAPABILITIES

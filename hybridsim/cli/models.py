@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from hybridsim.cli.output import Written, print_json, print_table
+from hybridsim.cli.output import print_json, print_table
+from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
@@ -19,7 +20,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """List name and title of every model."""
     import hybridsim
 

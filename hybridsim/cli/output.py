@@ -1,4 +1,4 @@
-"""What leaves the program: messages to stderr, data to stdout, and a record of the files written."""
+"""What leaves the program: messages to stderr, data to stdout, files where they can be written."""
 
 from __future__ import annotations
 
@@ -45,22 +45,6 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
     for line in lines:
         print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
-
-
-class Written:
-    """The files that a command has written so far, for the message after an interruption."""
-
-    def __init__(self) -> None:
-        self.paths: list[Path] = []
-
-    def add(self, path: Path) -> None:
-        """Record a finished file and say so."""
-        self.paths.append(path)
-        complain(f"wrote {path}")
-
-    def summary(self) -> str:
-        """What was kept, in words."""
-        return "kept " + ", ".join(map(str, self.paths)) if self.paths else "nothing was written"
 
 
 def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:

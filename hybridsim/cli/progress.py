@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import Self
 
+from hybridsim.cli.session import Session
+
 _WAIT = 1.0  # seconds; what is done sooner needs no progress
 _WIDTH = 79  # a line that wraps cannot be taken back
 _PAUSE = 0.1  # seconds between updates, so that showing costs nothing
@@ -15,11 +17,13 @@ _PAUSE = 0.1  # seconds between updates, so that showing costs nothing
 class Progress:
     """Callable with the finished fraction and what comes next; silent where stderr is no terminal."""
 
-    def __init__(self) -> None:
+    def __init__(self, session: Session) -> None:
+        self._session = session
         self._shown = 0
         self._next = time.monotonic() + _WAIT
 
     def __call__(self, fraction: float, what: str = "") -> None:
+        self._session.stop_if_asked()
         if time.monotonic() >= self._next and sys.stderr.isatty():
             line = f"{100 * fraction:5.1f} %  {what}"[:_WIDTH].rstrip()
             print("\r" + line.ljust(self._shown), end="", file=sys.stderr, flush=True)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
-from hybridsim.cli.output import INTERRUPTED, Written, complain, print_json, require_writable
+from hybridsim.cli.output import INTERRUPTED, complain, print_json, require_writable
 from hybridsim.cli.progress import Progress
+from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def add_to(commands: Any) -> None:
     parser.set_defaults(execute=execute)
 
 
-def execute(args: argparse.Namespace, written: Written) -> int:
+def execute(args: argparse.Namespace, session: Session) -> int:
     """Simulate, print the summary, write the files; 1 where the simulation did not succeed."""
     if args.plot:
         require_writable(args.plot, "--plot", PICTURES)
@@ -75,7 +76,7 @@ def execute(args: argparse.Namespace, written: Written) -> int:
 
     import hybridsim
 
-    with Progress() as progress:
+    with Progress(session) as progress, session.stopping_gently():
         solution = hybridsim.simulate(
             model, (0.0, t_end), integrator=args.integrator, progress=progress, **settings
         )
@@ -86,7 +87,7 @@ def execute(args: argparse.Namespace, written: Written) -> int:
     for warning in solution.warnings:
         complain(f"warning: {warning}")
     if solution.t.size:  # else it stopped before the first step, and there is nothing to write
-        _write(solution, args, written)
+        _write(solution, args, session)
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)
@@ -94,15 +95,15 @@ def execute(args: argparse.Namespace, written: Written) -> int:
     return INTERRUPTED if solution.status == "interrupted" else SimulationError.exit_code
 
 
-def _write(solution: Solution, args: argparse.Namespace, written: Written) -> None:
+def _write(solution: Solution, args: argparse.Namespace, session: Session) -> None:
     if args.csv:
         solution.to_csv(args.csv)
-        written.add(args.csv)
+        session.wrote(args.csv)
     if args.plot:
         from hybridsim.plot import save, time_history
 
         save(time_history(solution), args.plot)
-        written.add(args.plot)
+        session.wrote(args.plot)
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -29,6 +30,8 @@ def hybridsim(
     def call(*argv: object) -> Outcome:
         capsys.readouterr()
         code = main([str(word) for word in argv])
-        return Outcome(code, *capsys.readouterr())
+        out, err = capsys.readouterr()
+        # whichever test is the first to compile says so
+        return Outcome(code, out, re.sub(r"hybridsim: compiling the engine.*\n", "", err))
 
     return call

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
+from hybridsim.cli import values
 
 PNG = b"\x89PNG"
 
@@ -206,3 +208,8 @@ def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: 
     assert code == 0
     assert "freed" in err
     assert not made.exists() and kept.exists()
+
+
+def test_default_spans_are_those_of_the_library() -> None:
+    library = importlib.import_module("hybridsim.analysis.compare")
+    assert (values.COMPARED_PERIODS, values.DEFAULT_SECONDS) == (library.PERIODS, library.TIME)

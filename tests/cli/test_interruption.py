@@ -19,9 +19,11 @@ import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from hybridsim.cli.progress import Progress
 called = []
-def tell(self, *_):
+progress = Progress.__call__
+def tell(self, *arguments):
     if not called:
         called.append(print("begun", file=sys.stderr, flush=True))
+    progress(self, *arguments)
 Progress.__call__ = tell
 from hybridsim.cli import main
 sys.exit(main(sys.argv[1:]))
@@ -53,9 +55,10 @@ def test_run_keeps_what_was_computed(tmp_path: Path) -> None:
     argv = ("run", "dfcs", "--t-end", "10000T", "--integrator", "scipy-dop853", "--csv", "out.csv")
     code, messages = interrupted(tmp_path, *argv)
     assert code == 130, messages
+    assert "stopping at the next step" in messages
     assert "interrupted after t = " in messages and "wrote out.csv" in messages
     assert "Traceback" not in messages
-    assert len((tmp_path / "out.csv").read_text().splitlines()) > 10
+    assert len((tmp_path / "out.csv").read_text().splitlines()) > 1
 
 
 def test_compare_stops_altogether(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import warnings
@@ -76,6 +77,24 @@ def test_interruption(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> N
     code, out, err = hybridsim("run", "dfcs", "--csv", "out.csv")
     assert (code, out) == (130, "")
     assert "interrupted" in err and "nothing was written" in err
+
+
+def test_interruption_that_comes_out_as_another_error(
+    hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*_: object, **__: object) -> None:
+        signal.raise_signal(signal.SIGINT)  # waits, as it is the first one
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as interrupt:
+            raise SystemError("returned a result with an exception set") from interrupt
+
+    monkeypatch.setattr(hs, "simulate", simulate)
+    code, out, err = hybridsim("run", "dfcs")
+    assert (code, out) == (130, "")
+    assert "stopping at the next step" in err
+    assert "interrupted; nothing was written" in err and "internal error" not in err
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_warnings_go_to_stderr_in_one_line(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> None:

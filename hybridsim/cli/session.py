@@ -1,0 +1,70 @@
+"""One run of the program: which files it has written, and whether it has been asked to stop."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+from hybridsim.cli.output import complain
+
+
+class Session:
+    """What a command has to know about the program that runs it."""
+
+    def __init__(self) -> None:
+        self.written: list[Path] = []
+        self.interrupted = False
+        self._gently = False
+
+    def wrote(self, path: Path) -> None:
+        """Record a finished file and say so."""
+        self.written.append(path)
+        complain(f"wrote {path}")
+
+    def kept(self) -> str:
+        """What there is after an interruption, in words."""
+        return "kept " + ", ".join(map(str, self.written)) if self.written else "nothing was written"
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Take notice of Ctrl-C, unless whoever started the program had it ignored, as a shell does for `&`."""
+        ours = (
+            threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        )
+        if ours:
+            signal.signal(signal.SIGINT, self._interrupt)
+        try:
+            yield
+        finally:
+            if ours:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    @contextmanager
+    def stopping_gently(self) -> Iterator[None]:
+        """Where Ctrl-C waits for `stop_if_asked`, so that it hits no compiled code and no result is lost.
+
+        An exception that is raised in the middle of a compiled call or of the compiler comes out as an error of
+        these. A second Ctrl-C does not wait.
+        """
+        self._gently = True
+        try:
+            yield
+        finally:
+            self._gently = False
+
+    def stop_if_asked(self) -> None:
+        """Raise KeyboardInterrupt if Ctrl-C is waiting, or was taken by somebody for an error of another kind."""
+        if self.interrupted:
+            raise KeyboardInterrupt
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        first, self.interrupted = not self.interrupted, True
+        if first and self._gently:
+            complain("stopping at the next step; Ctrl-C once more stops at once")
+        else:
+            raise KeyboardInterrupt
