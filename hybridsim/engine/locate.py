@@ -127,6 +127,11 @@ class Locator:
             tuple(monitor_gaps),
         )
 
+    def exit(self, step: Step, guard: int) -> Hit:
+        """The zero of a guard that is positive where a step begins and negative where it ends."""
+        sample = self._sampler(step, self.flow.guards, guard)
+        return Hit(polish(sample, Crossing(0.0, 1.0, -1)), guard, -1)
+
     def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
         """Rounding error of a guard's or monitor's values on the step, worked out when it is asked for."""
         known: list[float] = []

@@ -174,7 +174,7 @@ class SegmentRun:
             if is_monitor:
                 return ended, Arrival(ended.s1, x, stopping=(hit.number,))
             return ended, Arrival(ended.s1, x, fired=(hit.number,))
-        return step, self._at_step_end(step, found)
+        return self._at_step_end(stepper, step, found)
 
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))
@@ -202,8 +202,11 @@ class SegmentRun:
             if hit.theta < theta:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
-    def _at_step_end(self, step: Step, found: Findings) -> Arrival | None:
-        """Sides for the next step; a zero at the end of this one belongs to it."""
+    def _at_step_end(self, stepper: Stepper, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
+        """Sides for the next step; a zero at the end of this one belongs to it.
+
+        A guard that the search left open and that is negative beyond rounding at the end was zero before it.
+        """
         locator = self.locator
         open_guards = [int(g) for g in self.watch.guards if found.guard_ends[g] == 0]
         open_monitors = [k for k in range(len(self.monitors)) if found.monitor_ends[k] == 0]
@@ -213,17 +216,23 @@ class SegmentRun:
             before[hit.number] = hit.direction
         locator.monitor_sides, locator.monitor_orders = found.monitor_ends.copy(), np.zeros_like(before)
         if not open_guards and not open_monitors:
-            return None
+            return step, None
         x = self._projected(step)
         errors = 4.0 * UNIT * self.scale
         series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, math.ulp(step.s1))
         side_of = side_after if self.flow.forward else side_before
-        fired, stopping = [], []
+        fired: list[int] = []
+        passed: list[int] = []
+        stopping: list[int] = []
         for g in open_guards:
             locator.sides[g], order = side_of(series.guards[g], series.guard_bounds[g], 0)
             locator.orders[g] = order if order <= ORDER else 0
             if locator.sides[g] < 0:
-                fired.append(g)
+                (passed if order == 0 else fired).append(g)
+        if passed:
+            hit = min((locator.exit(step, g) for g in passed), key=lambda hit: hit.theta)
+            ended = self._refine(stepper, step, hit, is_monitor=False)
+            return ended, Arrival(ended.s1, self._projected(ended), fired=(hit.number,))
         for k in open_monitors:
             side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
             locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
@@ -235,8 +244,8 @@ class SegmentRun:
                 else:
                     stopping.append(k)
         if fired or stopping:
-            return Arrival(step.s1, x, tuple(fired), tuple(stopping))
-        return None
+            return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
+        return step, None
 
     def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> Step:
         """The step up to the event, with the method's own accuracy there.
