@@ -28,12 +28,8 @@ class StepDense:
         theta = (s - self.s[index])[:, None] / h
         x0, x1, d0, d1 = self.x[index], self.x[index + 1], left[place] * h, right[place] * h
         rest = 1.0 - theta
-        return (
-            x0 * rest**2 * (1.0 + 2.0 * theta)
-            + d0 * rest**2 * theta
-            + x1 * theta**2 * (3.0 - 2.0 * theta)
-            - d1 * theta**2 * rest
-        )
+        # written from x0 on, so that what does not move stays where it is to the last bit
+        return x0 + (x1 - x0) * theta**2 * (3.0 - 2.0 * theta) + d0 * rest**2 * theta - d1 * theta**2 * rest
 
     def _slopes(self, rows: np.ndarray) -> np.ndarray:
         states = np.ascontiguousarray(self.x[rows])

@@ -82,6 +82,7 @@ class Locator:
         self.flow = flow
         self.numbers = watch.guards
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
+        self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
 
@@ -95,12 +96,18 @@ class Locator:
         guard_ends = np.ones_like(self.sides)
         if len(self.numbers):
             values = flow.guards(times, states)
-            still = quiet(values, self.numbers, self.sides, self.orders)
+            still = quiet(values, self.numbers, self.sides, self.orders, self.floors)
             for g in self.numbers[~still]:
                 sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
                 order = int(self.orders[g]) if side else 0
                 found, grazed, guard_ends[g], gap = find_roots(
-                    sample, values[:, g], order, side or 1, -1, self._rounding(step, int(g), False)
+                    sample,
+                    values[:, g],
+                    order,
+                    side or 1,
+                    -1,
+                    self._rounding(step, int(g), False),
+                    self.floors[g],
                 )
                 grazings += [(int(g), z) for z in grazed]
                 exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
@@ -108,12 +115,20 @@ class Locator:
         monitor_ends = self.monitor_sides.copy()
         if len(self.monitor_sides):
             values = flow.monitors(times, states)
-            still = quiet(values, self.monitor_numbers, self.monitor_sides, self.monitor_orders)
+            still = quiet(
+                values, self.monitor_numbers, self.monitor_sides, self.monitor_orders, self.monitor_floors
+            )
             for k in self.monitor_numbers[~still]:
                 sample, side = self._sampler(step, flow.monitors, int(k)), int(self.monitor_sides[k])
                 order = int(self.monitor_orders[k]) if side else 0
                 found, _, monitor_ends[k], gap = find_roots(
-                    sample, values[:, k], order, side, 0, self._rounding(step, int(k), True)
+                    sample,
+                    values[:, k],
+                    order,
+                    side,
+                    0,
+                    self._rounding(step, int(k), True),
+                    self.monitor_floors[k],
                 )
                 crossings += [Hit(polish(sample, c), int(k), c.direction) for c in found]
                 monitor_gaps += [(gap, int(k))] if gap <= 1.0 else []

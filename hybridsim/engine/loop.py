@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
@@ -17,9 +18,6 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Occurrence, Task, Trajectory
-
-# Transitions closer than this many ulps of the time, so many in a row, are an accumulation: no clock resolves more.
-_ACCUMULATION_ULPS, _ACCUMULATION_COUNT = 16.0, 12
 
 
 class ModeLoop:
@@ -34,7 +32,7 @@ class ModeLoop:
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.adopted: Instant | None = None  # the last instant at which an event was settled
-        self.short = 0  # transitions in a row that followed at once
+        self.accumulation = Accumulation(1e-3 * task.tolerances.rtol * abs(task.t1 - task.t0))
         self.progress: Callable[[Instant], None] | None = None
         if progress is not None:
             span = task.t1 - task.t0
@@ -83,7 +81,16 @@ class ModeLoop:
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
         numbers = np.flatnonzero(system.active(outcome.z))
-        watch = Watch(numbers, outcome.sides, outcome.orders, outcome.monitor_sides, outcome.monitor_orders)
+        watch = Watch(
+            numbers,
+            outcome.sides,
+            outcome.orders,
+            outcome.monitor_sides,
+            outcome.monitor_orders,
+            outcome.x_error,
+            outcome.guard_floors,
+            outcome.monitor_floors,
+        )
         return SegmentRun(
             system,
             self.method,
@@ -163,7 +170,7 @@ class ModeLoop:
             # what is located at the same instant comes first: it belongs to the signals as they were before it
             outcome = self._settle_appointment(instant, x_minus, schedules, segment)
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
-        return self._accumulated(instant, arrival)
+        return self._accumulated(instant)
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
@@ -179,7 +186,7 @@ class ModeLoop:
         """Settle a scheduled instant, inputs as they are from then on."""
         system, z = self.system, self.outcome.z
         p = system.vector(instant, system.discrete(self.p), self.forward)
-        error = 4.0 * UNIT * segment.scale
+        error = segment.rounding()
         error[[system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and z[c] == a.hold]] = (
             0.0
         )
@@ -187,14 +194,13 @@ class ModeLoop:
         resets = [("schedule", k) for k in schedules]
         return Settling(system, at, z.copy(), self.forward).run((), resets)
 
-    def _accumulated(self, instant: Instant, arrival: Arrival) -> bool:
-        """Whether events follow each other closer than any clock resolves; then the run ends, saying so."""
-        near = abs(arrival.s) <= _ACCUMULATION_ULPS * math.ulp(float(instant))
-        self.short = self.short + 1 if near else 0
-        if self.short < _ACCUMULATION_COUNT:
+    def _accumulated(self, instant: Instant) -> bool:
+        """Whether events follow each other ever faster; then the run ends, saying where that leads."""
+        limit = self.accumulation.limit(instant)
+        if limit is None:
             return False
         self.record.status = "accumulation"
-        self.record.message = f"events accumulate at t = {float(instant)!r}: declare the mode they lead to"
+        self.record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
         return True
 
     def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
@@ -202,13 +208,13 @@ class ModeLoop:
         system, flow = self.system, segment.flow
         s_error = 2.0 * math.ulp(arrival.s)
         zero = np.zeros(system.n)
-        for g in arrival.fired:
-            series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-            value, slope = series.guards[g, 0], series.guards[g, 1]
+        series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
+        located = [series.guards[g] for g in arrival.fired] + [series.monitors[k] for k in arrival.stopping]
+        for value, slope, *_ in located:
             if slope != 0.0 and math.isfinite(value / slope):
                 s_error = max(s_error, abs(value / slope))
         slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
-        x_error = 4.0 * UNIT * segment.scale + s_error * slopes
+        x_error = segment.rounding() + s_error * slopes
         holding = [
             system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold
         ]
@@ -221,10 +227,11 @@ class ModeLoop:
         if not fired:
             return ()
         series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
-        together = dict.fromkeys(fired, 0.0)
+        together: dict[int, float] = {}
         for g in np.flatnonzero(system.active(at.z)):
             value, bound = series.guards[g], series.guard_bounds[g]
-            if g not in together and abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0:
+            leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
+            if g in fired or leaves:
                 together[int(g)] = -value[0] / value[1] if value[1] != 0.0 else 0.0
         return tuple(sorted(together, key=lambda g: together[g]))
 

@@ -171,7 +171,9 @@ def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: in
 
 
 @kernel
-def quiet(values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray) -> np.ndarray:
+def quiet(
+    values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray, floors: np.ndarray
+) -> np.ndarray:
     """Which of the functions certainly keep their side over a whole step, from their samples (17, functions)."""
     result = np.zeros(numbers.shape[0], dtype=np.bool_)
     coefficients, bounds = np.empty(DEGREE + 1), np.empty(DEGREE + 1)
@@ -185,7 +187,7 @@ def quiet(values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np
         error, largest = _represent(samples, coefficients)
         if not error <= _ACCEPT * largest:
             continue
-        bounds[:] = error
+        bounds[:] = max(error, floors[g])
         n = _deflated(coefficients, bounds, orders[g], sides[g])
         result[k] = _sign(coefficients[:n], bounds[:n]) == sides[g]
     return result
@@ -198,6 +200,7 @@ def find_roots(
     side: int,
     stop_at_first: int,
     rounding: Callable[[], float],
+    floor: float = 0.0,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
     """All changes of side of one guard over a step, theta in (0, 1].
 
@@ -207,6 +210,7 @@ def find_roots(
     first : values at `POINTS` over the whole step
     order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
     rounding : bound of the rounding error of one value; asked for only where halving a piece does not help
+    floor : what the location of the last event leaves uncertain, where the function starts from zero
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
     Returns the crossings and grazings in order, the sign at the end of the step (0 where it is within the bound), and
@@ -238,7 +242,7 @@ def find_roots(
             middle = 0.5 * (a + b)
             waiting += [(middle, b, None, depth + 1), (a, middle, None, depth + 1)]
             continue
-        bounds = np.full(DEGREE + 1, error)
+        bounds = np.full(DEGREE + 1, max(error, floor))
         n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
         rows, count = sign_pattern(coefficients[:n], bounds[:n])
         for left, right, sign in rows[:count]:

@@ -130,6 +130,10 @@ class SegmentRun:
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
 
+    def rounding(self) -> np.ndarray:
+        """How well the states are known on the segment: its own rounding and what the last event left over."""
+        return 4.0 * UNIT * self.scale + self.watch.x_error
+
     def segment(self) -> Segment:
         """The finished piece of trajectory."""
         knots, flow = np.array(self.knots), self.flow
@@ -211,6 +215,7 @@ class SegmentRun:
         open_guards = [int(g) for g in self.watch.guards if found.guard_ends[g] == 0]
         open_monitors = [k for k in range(len(self.monitors)) if found.monitor_ends[k] == 0]
         locator.sides, locator.orders = found.guard_ends.copy(), np.zeros_like(locator.orders)
+        locator.floors, locator.monitor_floors = np.zeros(len(locator.sides)), np.zeros(len(self.monitors))
         before = locator.monitor_sides.copy()
         for hit in found.crossings:
             before[hit.number] = hit.direction
@@ -218,7 +223,7 @@ class SegmentRun:
         if not open_guards and not open_monitors:
             return step, None
         x = self._projected(step)
-        errors = 4.0 * UNIT * self.scale
+        errors = self.rounding()
         series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, math.ulp(step.s1))
         side_of = side_after if self.flow.forward else side_before
         fired: list[int] = []
@@ -227,6 +232,7 @@ class SegmentRun:
         for g in open_guards:
             locator.sides[g], order = side_of(series.guards[g], series.guard_bounds[g], 0)
             locator.orders[g] = order if order <= ORDER else 0
+            locator.floors[g] = series.guard_bounds[g, 0] if order > 0 else 0.0
             if locator.sides[g] < 0:
                 (passed if order == 0 else fired).append(g)
         if passed:
@@ -236,6 +242,7 @@ class SegmentRun:
         for k in open_monitors:
             side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
             locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
+            locator.monitor_floors[k] = series.monitor_bounds[k, 0] if order > 0 else 0.0
             if side == 0:
                 locator.monitor_sides[k] = before[k]
             elif before[k] != 0 and side != before[k] and self._wanted(k, side):
@@ -278,7 +285,7 @@ class SegmentRun:
         """Backward in time: stop where the present mode may have been entered through a guard of another."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
-            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0)
+            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, 0.0)
             if found:
                 s = step.s0 + (step.s1 - step.s0) * polish(sample, found[0])
                 step = Step(step.s0, s, step.x0, step.dense(np.array([s]))[0], step.dense, step.roots)

@@ -63,6 +63,9 @@ class Outcome:
     orders: np.ndarray
     monitor_sides: np.ndarray
     monitor_orders: np.ndarray
+    x_error: np.ndarray  # how well the states are known: what locating the event left over
+    guard_floors: np.ndarray  # the same for the guards and monitors that start from zero
+    monitor_floors: np.ndarray
     changes: list[Change] = field(default_factory=list)
     continuous: bool = False  # the flow went on without a jump: the step size may be kept
     status: str = ""
@@ -92,6 +95,8 @@ class Settling:
         self.changes: list[Change] = []
         self.warnings: list[str] = []
         self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        # components in the order in which their guards came to zero
+        self.rank: dict[int, int] = {}
         self.released_by = [-1] * len(system.automata)
         self.sides = np.ones(system.guard_count, dtype=np.int64)
         self.orders = np.zeros(system.guard_count, dtype=np.int64)
@@ -100,7 +105,9 @@ class Settling:
 
     def run(self, fired: Iterable[int], resets: Iterable[tuple[object, ...]]) -> Outcome:
         """Settle: `fired` guards located at zero, and keys of the resets that are due."""
+        fired = list(fired)
         located = set(fired)
+        self.rank = {int(self.system.owner[g]): place for place, g in reversed(list(enumerate(fired)))}
         self.fired[list(located)] = True
         self.released_by = self._release_guards(located)
         surfaces = self._surface_components()
@@ -141,7 +148,7 @@ class Settling:
         )
         return self._stop(
             "cascade",
-            f"transitions did not come to rest after {limit} rounds ({names}); guards that fire: {guards}",
+            f"transitions follow each other over and over, {limit} rounds without rest ({names}); guards that fire: {guards}",
         )
 
     def _take_sides(self) -> set[int]:
@@ -229,7 +236,7 @@ class Settling:
         x_error = at.x_error.copy()
         writer: dict[str, tuple[str, float]] = {}
         taken: list[tuple[int, str, int, int]] = []
-        for c in sorted(components):
+        for c in sorted(components, key=lambda c: (self.rank.get(c, len(self.rank)), c)):
             automaton, mode = system.automata[c], int(at.z[c])
             leaving = [j for j, g in enumerate(automaton.guards[mode]) if self.fired[g] or self.sides[g] < 0]
             for j in leaving[:1]:
@@ -415,30 +422,27 @@ class Settling:
 
     # -- results --------------------------------------------------------------------------------------------
 
-    def _monitors(self) -> tuple[np.ndarray, np.ndarray]:
-        series = self._series(np.maximum(self.at.z, 0), self.at.x)
-        found = [side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)]
-        sides = np.array([f[0] for f in found], dtype=np.int64)
-        orders = np.array([f[1] for f in found], dtype=np.int64)
-        if not self.forward:
-            sides = np.where(orders % 2 == 1, -sides, sides)
-        return sides, orders
-
     def _done(self) -> Outcome:
         at = self.at
-        monitor_sides, monitor_orders = self._monitors()
-        continuous = not self.jumped and self._continuous(at.z, range(len(self.system.automata)))
-        orders = np.where(self.orders > ORDER, 0, self.orders)
+        series = self._series(np.maximum(at.z, 0), at.x)
+        found = [side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)]
+        monitor_sides = np.array([f[0] for f in found], dtype=np.int64)
+        monitor_orders = np.array([f[1] for f in found], dtype=np.int64)
+        if not self.forward:
+            monitor_sides = np.where(monitor_orders % 2 == 1, -monitor_sides, monitor_sides)
         return Outcome(
             at.x,
             at.p,
             at.z,
             self.sides,
-            orders,
+            np.where(self.orders > ORDER, 0, self.orders),
             monitor_sides,
             np.where(monitor_orders > ORDER, 0, monitor_orders),
+            at.x_error,
+            np.where(self.orders > 0, series.guard_bounds[:, 0], 0.0),
+            np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
             self.changes,
-            continuous,
+            not self.jumped and self._continuous(at.z, range(len(self.system.automata))),
             "",
             "",
             self.warnings,
@@ -446,15 +450,18 @@ class Settling:
 
     def _stop(self, status: str, message: str) -> Outcome:
         at = self.at
-        empty = np.zeros(len(self.system.monitor_names), dtype=np.int64)
+        none = np.zeros(len(self.system.monitor_names), dtype=np.int64)
         return Outcome(
             at.x,
             at.p,
             at.z,
             self.sides,
             self.orders,
-            empty,
-            empty,
+            none,
+            none,
+            at.x_error,
+            np.zeros(self.system.guard_count),
+            np.zeros(len(none)),
             self.changes,
             False,
             status,

@@ -68,7 +68,8 @@ class Step:
 class Watch:
     """What to look for in one segment: active guards and all monitors, with side and leading order at its start.
 
-    guards are the numbers of the active guards; the other arrays are over all guards, and over all monitors.
+    guards are the numbers of the active guards; the other arrays are over all guards, and over all monitors. x_error
+    is how well the states are known at the start, the floors what that makes of the guards that start from zero.
     """
 
     guards: np.ndarray
@@ -76,6 +77,9 @@ class Watch:
     orders: np.ndarray
     monitor_sides: np.ndarray
     monitor_orders: np.ndarray
+    x_error: np.ndarray
+    guard_floors: np.ndarray
+    monitor_floors: np.ndarray
 
 
 @dataclass

@@ -9,7 +9,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.fixed_dense import StepDense
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.period import system_period
 from hybridsim.engine.settle import Settling, Situation
 from hybridsim.engine.system import System
@@ -78,6 +80,7 @@ class FixedStepRun:
         names = ("flow", "surfaces", "guards", "monitors", "project")
         self.addresses = tuple(system.address(n) for n in names)
         self.counts = np.zeros(3, dtype=np.int64)
+        self.accumulation = Accumulation(settings.step * 2.0**-settings.halvings)
         self.law = (settings.rule, settings.every_stage, settings.eps)
         self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
 
@@ -157,7 +160,8 @@ class FixedStepRun:
         if why == BOUND:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
-            return bool(schedules) and self._settle(instant, (), schedules, x)
+            at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
+            return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
         return self._declared_event(s, p, why)
 
     # -- events of guards and monitors beside the surfaces --------------------------------------------------
@@ -166,9 +170,7 @@ class FixedStepRun:
         """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
         system, set_ = self.system, self.settings
         x, z = self.x, self.z
-        watched = (
-            [int(g) for g in system.guards_of(z)[self.declared].ravel() if g >= 0] if self.declared else []
-        )
+        watched = self._watched()
         before = self._monitors(s, x, p)
         low, high, best = 0.0, set_.step, x
         for _ in range(set_.halvings):
@@ -178,9 +180,7 @@ class FixedStepRun:
                 after = self._monitors(s + tau, trial, p)
                 beyond = bool(((before != 0.0) & ((before > 0.0) != (after > 0.0))).any())
             else:
-                guards = system.rows("guards", system.guard_count, np.array([s + tau]), trial[None, :], p, z)[
-                    0
-                ]
+                guards = self._guards(s + tau, trial, p)
                 beyond = bool((guards[watched] < 0.0).any())
             if beyond:
                 high = tau
@@ -190,13 +190,24 @@ class FixedStepRun:
         best = self._trial(s, tau, p)
         self._keep(p, np.array([s, s + tau]), np.array([x, best]), np.array([z, z]), z)
         instant = self.origin.plus(s + tau)
-        self.x, self.origin = best, instant
         if why == MONITOR:
+            self.x, self.origin = best, instant
             after = self._monitors(s + tau, best, p)
             crossed = np.flatnonzero((before != 0.0) & ((before > 0.0) != (after > 0.0)))
             return self._monitor_events(instant, crossed, np.where(after > 0.0, 1, -1), best)
-        guards = system.rows("guards", system.guard_count, np.array([s + tau]), best[None, :], p, z)[0]
-        return self._settle(instant, tuple(g for g in watched if guards[g] < 0.0), (), best)
+        first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
+        self.x = best
+        fired = sorted((g for g in watched if last[g] < 0.0), key=lambda g: first[g] / (first[g] - last[g]))
+        return self._settle(instant, tuple(fired), (), best)
+
+    def _watched(self) -> list[int]:
+        """Guards of the components without a surface, in their present modes."""
+        if not self.declared:
+            return []
+        return [int(g) for g in self.system.guards_of(self.z)[self.declared].ravel() if g >= 0]
+
+    def _guards(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return self.system.rows("guards", self.system.guard_count, np.array([s]), x[None, :], p, self.z)[0]
 
     def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
         out = np.empty(self.system.n)
@@ -241,7 +252,11 @@ class FixedStepRun:
         self.origin = instant
         p = self._vector()
         before = np.where(starting, self.task.z0, self.z)
-        at = Situation(0.0, self.x.copy(), p, self.z.copy(), np.abs(self.x) * 2.0**-52, 0.0)
+        sides = np.sign(self._monitors(0.0, self.x, p))
+        # what was located lies within the last halving of a step
+        s_error = self.settings.step * 2.0**-self.settings.halvings if fired or monitors else 0.0
+        x_error = 4.0 * UNIT * np.abs(self.x) + s_error * np.abs(system.flow(0.0, self.x, p, self.z))
+        at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
         outcome = Settling(system, at, before, forward=True, scope=self.declared).run(fired, resets)
@@ -273,16 +288,31 @@ class FixedStepRun:
                     "terminated",
                     f"ended by {schedule.name} at t = {float(instant)!r}",
                 )
+        self._crossed_in_jump(instant, sides, np.sign(self._monitors(0.0, self.x, self._vector())), monitors)
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+        limit = self.accumulation.limit(instant) if outcome.changes else None
+        if limit is not None:
+            record.status = "accumulation"
+            record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
         return record.status != "finished"
+
+    def _crossed_in_jump(
+        self, instant: Instant, before: np.ndarray, after: np.ndarray, handled: tuple[int, ...]
+    ) -> None:
+        """Record the monitors that a reset carried to their other side."""
+        crossed = [k for k in np.flatnonzero(before * after < 0.0) if k not in handled]
+        crossed = [k for k in crossed if self.system.model.monitors[k].action != "reset"]
+        self._monitor_events(instant, np.array(crossed, dtype=np.int64), after.astype(np.int64), self.x)
 
     # -- the record -----------------------------------------------------------------------------------------
 
     def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
         """Segments of constant modes out of the rows of one stretch, and the mode changes between them."""
-        record, automata = self.record, self.system.automata
+        record = self.record
         record.counters.steps += len(s) - 1
+        if self.settings.rule == SIGN:
+            self._side_of_zeros(z)
         changed = np.flatnonzero((z[1:] != z[:-1]).any(axis=1)) + 1
         if len(record.segments) and (z[0] != before).any():
             self._changes(s[0], before, z[0], x[0])
@@ -293,7 +323,14 @@ class FixedStepRun:
                 record.segments.append(Segment(self.origin, dense.z, p, dense.s, dense.x, dense))
         for k in changed:
             self._changes(s[k], z[k - 1], z[k], x[k])
-        assert len(automata) == z.shape[1]
+
+    def _side_of_zeros(self, z: np.ndarray) -> None:
+        """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
+        for c, _, _, hold, *_ in self.table:
+            for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
+                z[k, c] = z[k + 1, c]
+            if z[-1, c] == hold and len(z) > 1:
+                z[-1, c] = z[-2, c]
 
     def _changes(self, s: float, source: np.ndarray, target: np.ndarray, x: np.ndarray) -> None:
         for c in np.flatnonzero(source != target):

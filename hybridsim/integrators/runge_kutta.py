@@ -115,7 +115,7 @@ class RungeKuttaStepper:
             h = min(self.h, self.tolerances.max_step)
             last = h >= abs(self.bound - self.s)
             h = abs(self.bound - self.s) if last else h
-            if h < _SMALLEST * math.ulp(self.s):
+            if not h >= _SMALLEST * math.ulp(self.s):
                 raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
             x, error = self._attempt(self.s, self.x, self.dx, direction * h)
             if error <= 1.0:
@@ -176,4 +176,6 @@ class RungeKuttaStepper:
         ahead = self._rhs(direction * h0, self.x + direction * h0 * self.dx)
         steepest = max(d1, size(ahead - self.dx) / h0)
         h1 = (0.01 / steepest) ** (1.0 / self.tableau.order) if steepest > 1e-15 else max(1e-6, 1e-3 * h0)
-        return min(100.0 * h0, h1, abs(self.bound))
+        # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
+        smallest = 1e-9 * abs(self.bound)
+        return max(min(100.0 * h0, h1, abs(self.bound)), smallest) if math.isfinite(h1) else smallest

@@ -31,7 +31,7 @@ class SolverStepper:
         self.solver = self._solver(0.0, x0, bound, first_step)
 
     def _solver(self, s0: float, x0: np.ndarray, bound: float, first_step: float | None) -> Any:
-        return self.solver_class(
+        solver = self.solver_class(
             self._rhs,
             s0,
             x0,
@@ -41,6 +41,10 @@ class SolverStepper:
             rtol=self.tolerances.rtol,
             atol=self.tolerances.atol,
         )
+        if not np.isfinite(solver.h_abs):
+            # SciPy's guess of a first step met a value that is no number; it would halve that guess for ever
+            solver.h_abs = 1e-9 * abs(bound - s0)
+        return solver
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1

@@ -1,0 +1,42 @@
+"""Accumulation: events that follow each other ever faster, like the terms of a geometric series."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from hybridsim.engine.timepair import Instant
+
+# So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
+_TERMS = 10
+# How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
+_SAME_FACTOR = 1e-3
+# Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
+_ULPS = 16.0
+
+
+class Accumulation:
+    """Watches the intervals between events of one run."""
+
+    def __init__(self, resolution: float) -> None:
+        self.resolution = resolution  # a rest of the series shorter than this is the end of it
+        self.last: Instant | None = None
+        self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
+
+    def limit(self, instant: Instant) -> float | None:
+        """Note an event; the limit time once the rest of the series is below the resolution, else None."""
+        if self.last is not None:
+            self.intervals.append(abs(instant.minus(self.last)))
+        self.last = instant
+        gaps = list(self.intervals)
+        if len(gaps) <= _TERMS:
+            return None
+        if max(gaps) <= _ULPS * math.ulp(float(instant)):
+            return float(instant)
+        if min(gaps) <= 0.0:
+            return None
+        factors = [b / a for a, b in zip(gaps, gaps[1:], strict=False)]
+        factor = factors[-1]
+        steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
+        rest = gaps[-1] * factor / (1.0 - factor) if factor < 1.0 else math.inf
+        return float(instant) + rest if steady and rest <= self.resolution else None
