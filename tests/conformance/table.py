@@ -68,9 +68,8 @@ def page(names: Sequence[str]) -> str:
     )
     parts = [INTRODUCTION, "## Scenes\n", table, "\n## What is lacking\n", lacking]
     faults = [
-        (r.integrator, r.scene, reason)
+        (r.integrator, r.scene, " ".join(r.reasons[0].split()).replace("|", "/"))
         for r in results.values()
-        for reason in r.reasons
         if r.verdict == "wrong"
     ]
     if faults:
