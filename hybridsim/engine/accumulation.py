@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import pairwise
 
 from hybridsim.engine.timepair import Instant
 
@@ -18,8 +19,9 @@ _ULPS = 16.0
 class Accumulation:
     """Watches the intervals between events of one run."""
 
-    def __init__(self, resolution: float) -> None:
+    def __init__(self, resolution: float, shortest: float = 0.0) -> None:
         self.resolution = resolution  # a rest of the series shorter than this is the end of it
+        self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
         self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
 
@@ -31,11 +33,11 @@ class Accumulation:
         gaps = list(self.intervals)
         if len(gaps) <= _TERMS:
             return None
-        if max(gaps) <= _ULPS * math.ulp(float(instant)):
+        if max(gaps) <= max(self.shortest, _ULPS * math.ulp(float(instant))):
             return float(instant)
         if min(gaps) <= 0.0:
             return None
-        factors = [b / a for a, b in zip(gaps, gaps[1:], strict=False)]
+        factors = [b / a for a, b in pairwise(gaps)]
         factor = factors[-1]
         steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
         rest = gaps[-1] * factor / (1.0 - factor) if factor < 1.0 else math.inf

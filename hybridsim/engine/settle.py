@@ -148,7 +148,8 @@ class Settling:
         )
         return self._stop(
             "cascade",
-            f"transitions follow each other over and over, {limit} rounds without rest ({names}); guards that fire: {guards}",
+            f"transitions follow each other over and over, {limit} rounds without rest ({names}); "
+            f"guards that fire: {guards}",
         )
 
     def _take_sides(self) -> set[int]:

@@ -80,7 +80,9 @@ class FixedStepRun:
         names = ("flow", "surfaces", "guards", "monitors", "project")
         self.addresses = tuple(system.address(n) for n in names)
         self.counts = np.zeros(3, dtype=np.int64)
-        self.accumulation = Accumulation(settings.step * 2.0**-settings.halvings)
+        located = settings.step * 2.0**-settings.halvings  # how well an event is located
+        self.accumulation = Accumulation(located, 4.0 * located)
+        self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.law = (settings.rule, settings.every_stage, settings.eps)
         self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
 
@@ -137,13 +139,14 @@ class FixedStepRun:
             p,
             self.x,
             self.z,
-            len(system.monitor_names),
+            self.fresh,
             times,
             states,
             modes,
             self.work,
             self.counts,
         )
+        self.fresh[:] = False
         self._keep(p, times[:count], states[:count], modes[:count], start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
@@ -168,8 +171,7 @@ class FixedStepRun:
 
     def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
         """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
-        system, set_ = self.system, self.settings
-        x, z = self.x, self.z
+        set_, x, z = self.settings, self.x, self.z
         watched = self._watched()
         before = self._monitors(s, x, p)
         low, high, best = 0.0, set_.step, x
@@ -194,6 +196,7 @@ class FixedStepRun:
             self.x, self.origin = best, instant
             after = self._monitors(s + tau, best, p)
             crossed = np.flatnonzero((before != 0.0) & ((before > 0.0) != (after > 0.0)))
+            self.fresh[crossed] = True
             return self._monitor_events(instant, crossed, np.where(after > 0.0, 1, -1), best)
         first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
         self.x = best

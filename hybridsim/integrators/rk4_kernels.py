@@ -216,7 +216,7 @@ def run_steps(
     p: Any,
     x: Any,
     z: Any,
-    monitor_count: int,
+    fresh: Any,
     times: Any,
     states: Any,
     modes: Any,
@@ -227,12 +227,14 @@ def run_steps(
 
     addresses: flow, surfaces, guards, monitors, project. settings: step, halvings. law, work: as for `rk4_step`.
     flags: dichotomy, zeroed, located release, rest of step. counters: rhs, guards, halvings.
+    fresh: monitors that have just fired; what is left of their zero is no new one on the first step.
     Row k of times, states, modes holds the start of step k and the modes it was taken in; the last row the end.
     Returns (number of rows, why it ended).
     """
     step, halvings = settings
     rule, _, eps = law
     dichotomy, zeroed, located, rest = flags
+    monitor_count = fresh.shape[0]
     n, s, direction = x.shape[0], 0.0, 1.0 if bound >= 0.0 else -1.0
     surfaces, after, guards = work[3].copy(), work[3].copy(), work[4].copy()
     monitors, monitors_after = np.zeros(max(monitor_count, 1)), np.zeros(max(monitor_count, 1))
@@ -273,6 +275,8 @@ def run_steps(
             call(addresses[3], s + h, trial, p, z, monitors_after)
             for k in range(monitor_count):
                 changed = (monitors[k] > 0.0) != (monitors_after[k] > 0.0)
+                if row == 1 and fresh[k]:
+                    continue
                 if monitors[k] != 0.0 and changed and monitors[k] * monitors_after[k] <= 0.0:
                     return row, MONITOR
         if dichotomy:

@@ -31,7 +31,15 @@ class SolverStepper:
         self.solver = self._solver(0.0, x0, bound, first_step)
 
     def _solver(self, s0: float, x0: np.ndarray, bound: float, first_step: float | None) -> Any:
-        solver = self.solver_class(
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            solver = self._made(s0, x0, bound, first_step)
+        if not np.isfinite(solver.h_abs):
+            # SciPy's guess of a first step met a value that is no number; it would halve that guess for ever
+            solver.h_abs = 1e-9 * abs(bound - s0)
+        return solver
+
+    def _made(self, s0: float, x0: np.ndarray, bound: float, first_step: float | None) -> Any:
+        return self.solver_class(
             self._rhs,
             s0,
             x0,
@@ -41,10 +49,6 @@ class SolverStepper:
             rtol=self.tolerances.rtol,
             atol=self.tolerances.atol,
         )
-        if not np.isfinite(solver.h_abs):
-            # SciPy's guess of a first step met a value that is no number; it would halve that guess for ever
-            solver.h_abs = 1e-9 * abs(bound - s0)
-        return solver
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1
@@ -65,7 +69,8 @@ class SolverStepper:
     def _advance(self, solver: Any) -> Step:
         before = solver.nfev
         s0, x0 = solver.t, solver.y
-        message = solver.step()
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            message = solver.step()  # a trial that is no number is rejected, not worth a warning
         if solver.status == "failed":
             raise StepFailure(f"{solver.__class__.__name__}: {message}")
         stages = getattr(solver, "n_stages", 0)

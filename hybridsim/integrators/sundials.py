@@ -89,21 +89,23 @@ class CvodeStepper:
         return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
 
     def _events(self, x0: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], None]:
-        """The functions to watch; what is zero at the start by decree is divided by the power of s it begins with.
+        """The functions to watch; what is zero at the start by decree is taken out, the rest divided by its power of s.
 
         So no function starts at zero and none can fire again from the zero that ended the last segment.
         """
         flow, watch = self.flow, self.watch
         zero = np.zeros(flow.n)
         at_start = flow.system.series(0.0, x0, flow.p, flow.z, zero, 0.0)
-        leading, orders = [], []
-        for number, is_monitor in self.kinds:
+        count = len(self.kinds)
+        orders, start = np.zeros(count, dtype=np.int64), np.zeros(count)
+        decreed = np.zeros((count, at_start.guards.shape[1]))  # Taylor coefficients that are zero by decree
+        for k, (number, is_monitor) in enumerate(self.kinds):
             side = (watch.monitor_sides if is_monitor else watch.sides)[number]
             order = int((watch.monitor_orders if is_monitor else watch.orders)[number]) if side else 0
             series = (at_start.monitors if is_monitor else at_start.guards)[number]
-            orders.append(order)
-            leading.append(side * abs(series[order]) if order else 0.0)
-        power, start = np.array(orders), np.array(leading)
+            orders[k], start[k] = order, side * abs(series[order])
+            decreed[k, :order] = series[:order]
+        powers = np.arange(decreed.shape[1])
 
         def events(s: float, x: np.ndarray, out: np.ndarray) -> None:
             time, state = np.array([s]), np.array(x[: flow.n], dtype=float)[None, :]
@@ -111,10 +113,9 @@ class CvodeStepper:
             if len(watch.monitor_sides):
                 values = np.concatenate([values, flow.monitors(time, state)[0]])
             if s == 0.0:
-                values = np.where(power > 0, start, values)
+                out[:] = np.where(orders > 0, start, values)
             else:
-                values = values / abs(s) ** power
-            out[:] = values
+                out[:] = (values - decreed @ s**powers) / abs(s) ** orders
 
         events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]
         return events
