@@ -41,4 +41,4 @@ class Accumulation:
         factor = factors[-1]
         steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
         rest = gaps[-1] * factor / (1.0 - factor) if factor < 1.0 else math.inf
-        return float(instant) + rest if steady and rest <= self.resolution else None
+        return float(float(instant) + rest) if steady and rest <= self.resolution else None

@@ -95,7 +95,7 @@ class Settling:
         self.changes: list[Change] = []
         self.warnings: list[str] = []
         self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
-        # components in the order in which their guards came to zero
+        # guards in the order in which they came to zero
         self.rank: dict[int, int] = {}
         self.released_by = [-1] * len(system.automata)
         self.sides = np.ones(system.guard_count, dtype=np.int64)
@@ -107,7 +107,7 @@ class Settling:
         """Settle: `fired` guards located at zero, and keys of the resets that are due."""
         fired = list(fired)
         located = set(fired)
-        self.rank = {int(self.system.owner[g]): place for place, g in reversed(list(enumerate(fired)))}
+        self.rank = {int(g): place for place, g in enumerate(fired)}
         self.fired[list(located)] = True
         self.released_by = self._release_guards(located)
         surfaces = self._surface_components()
@@ -237,9 +237,11 @@ class Settling:
         x_error = at.x_error.copy()
         writer: dict[str, tuple[str, float]] = {}
         taken: list[tuple[int, str, int, int]] = []
-        for c in sorted(components, key=lambda c: (self.rank.get(c, len(self.rank)), c)):
+        for c in sorted(components, key=lambda c: (self._place(c), c)):
             automaton, mode = system.automata[c], int(at.z[c])
-            leaving = [j for j, g in enumerate(automaton.guards[mode]) if self.fired[g] or self.sides[g] < 0]
+            guards = automaton.guards[mode]
+            leaving = [j for j, g in enumerate(guards) if self.fired[g] or self.sides[g] < 0]
+            leaving.sort(key=lambda j: (self.rank.get(guards[j], len(self.rank)), j))
             for j in leaving[:1]:
                 if automaton.fatal[mode][j]:
                     return "inconsistent", str(automaton.fatal[mode][j])
@@ -266,6 +268,11 @@ class Settling:
         self.jumped = self.jumped or bool(taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
         return None
+
+    def _place(self, component: int) -> int:
+        """When the first of a component's guards came to zero, as a place in the order of all."""
+        numbers = self.system.automata[component].guards[self.at.z[component]]
+        return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
 
     def _merge(
         self,
