@@ -26,9 +26,9 @@ from hybridsim.errors import HybridsimError
 # Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
 STEPS = (300, 1200, 4800)
 INTERVALS = (1e-5, 1e-7, 1e-9)
-FIXED_STEP_TOLERANCE = (
-    1e-5  # a fourth-order method with 4800 steps stays below this unless an event is misplaced
-)
+# A fourth-order method that locates its events stays below this with the finest step; one that takes events where
+# its steps find them is off by a step.
+LOCATED, NOT_LOCATED = 1e-5, 2 / STEPS[-1]
 FIXED_STEP_FLOOR = 1e-7  # sixteen halvings, the published number, of a step of unit/300 leave 5e-8 units
 FALL = (
     10.0  # least fall of an error for a tolerance a thousand times tighter; any method of order 2 does better
@@ -124,7 +124,8 @@ def outcome(name: str, scene: Scene) -> Outcome:
     settings = list(study(one, scene))
     tolerances = (scene.tol_t, scene.tol_x)
     if "adaptive" in lacks:
-        tolerances = (max(scene.tol_t, FIXED_STEP_TOLERANCE), max(scene.tol_x, FIXED_STEP_TOLERANCE))
+        fixed_step = LOCATED if "release" in option_names(one) else NOT_LOCATED
+        tolerances = (max(scene.tol_t, fixed_step), max(scene.tol_x, fixed_step))
     for number, setting in enumerate(settings):
         try:
             with bounded_work():
