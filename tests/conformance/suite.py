@@ -30,10 +30,9 @@ INTERVALS = (1e-5, 1e-7, 1e-9)
 # its steps find them is off by a step.
 LOCATED, NOT_LOCATED = 1e-5, 2 / STEPS[-1]
 FIXED_STEP_FLOOR = 1e-7  # sixteen halvings, the published number, of a step of unit/300 leave 5e-8 units
-FALL = (
-    10.0  # least fall of an error for a tolerance a thousand times tighter; any method of order 2 does better
-)
-FIXED_STEP_FALL = 2.0  # least fall for a step a fourth as long; first order gives 4
+# Least fall of an error for a tolerance a thousand times tighter (a method of order 2 does better), and for a step
+# a fourth as long (first order gives 4).
+FALL, FIXED_STEP_FALL = 10.0, 2.0
 LAST_RESORT = 1e-13  # for a method of low order whose error at 1e-12 is still above the scene's tolerance
 # Error in units of rtol that a study cut short may show: a low-order method makes ten to a hundred times its
 # tolerance in a period, and a lightly damped motion remembers tens of periods.
@@ -42,9 +41,8 @@ CUT_SHORT = 1000.0
 LIFTED = {"stick_velocity": ("zero", "exact-stick")}
 
 
-LONGEST = (
-    60  # seconds for one run of a scene: the longest takes ten on a slow machine, the first ever compiles
-)
+# Seconds for one run of a scene: the longest takes ten on a slow machine, the first ever compiles.
+LONGEST = 60
 
 
 class Endless(Exception):
