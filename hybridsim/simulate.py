@@ -139,7 +139,7 @@ def _run(
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
-    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid)
+    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span)
 
 
 def _start(model: Model, x0: Mapping[str, float] | Sequence[float] | None) -> tuple[dict[str, float], Model]:

@@ -78,12 +78,14 @@ class Solution:
         wall_time: float,
         compile_time: float,
         grid: np.ndarray | None,
+        t_span: tuple[float, float],
     ) -> None:
         self.model = model
         self.integrator = integrator
         self._system = system
         self._trajectory = trajectory
         self._grid = grid
+        self._span = t_span
         self._cost = (wall_time, compile_time)
 
     # -- trajectory -----------------------------------------------------------------------------------------
@@ -102,6 +104,8 @@ class Solution:
             low, high = sorted((self.t_start, self.t_end))
             return self._grid[(self._grid >= low) & (self._grid <= high)]
         parts = [segment.origin.high + (segment.s + segment.origin.low) for segment in self._segments]
+        if parts:
+            parts[-1][-1] = self.t_end  # asked for; the local time of the end is rounded
         return np.concatenate(parts) if parts else np.zeros(0)
 
     @cached_property
@@ -119,12 +123,12 @@ class Solution:
     @property
     def t_start(self) -> float:
         """First time of the run."""
-        return float(self._segments[0].start)
+        return self._span[0]
 
     @property
     def t_end(self) -> float:
         """Last time that the run reached."""
-        return float(self._segments[-1].end)
+        return self._span[1] if self.status == "finished" else float(self._segments[-1].end)
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
         """States at time t: (n,) for a number, (n, k) for k times.

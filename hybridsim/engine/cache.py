@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import getpass
 import hashlib
 import os
 import shutil
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -17,14 +19,29 @@ def cache_root() -> Path:
     """Folder of everything hybridsim keeps between runs: ``$HYBRIDSIM_CACHE``, else the user's cache folder."""
     chosen = os.environ.get("HYBRIDSIM_CACHE")
     if chosen:
-        return Path(chosen)
+        return _usable(Path(chosen))
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
     elif sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return base / "hybridsim"
+    return _usable(base / "hybridsim")
+
+
+@cache
+def _usable(folder: Path) -> Path:
+    """The folder if it can be made and written to, else one among the temporary files."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    temporary = Path(tempfile.gettempdir()) / f"hybridsim-{getpass.getuser()}"
+    temporary.mkdir(parents=True, exist_ok=True, mode=0o700)
+    print(f"hybridsim: {folder} cannot be written to, the cache is {temporary}", file=sys.stderr)
+    return temporary
 
 
 @cache

@@ -31,6 +31,9 @@ class ModeLoop:
         self.record = Trajectory()
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
+        self.crossed_by_reset: dict[
+            int, int
+        ] = {}  # monitors whose resets an event set off, and their direction
         self.adopted: Instant | None = None  # the last instant at which an event was settled
         self.accumulation = Accumulation(1e-3 * task.tolerances.rtol * abs(task.t1 - task.t0))
         self.progress: Callable[[Instant], None] | None = None
@@ -60,6 +63,7 @@ class ModeLoop:
         task, system = self.task, self.system
         p = system.vector(self.origin, task.discrete, self.forward)
         due = self.timetable.due_at_start(self.origin) if self.forward else ()
+        self.timetable.kept(self.origin)
         at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
         outcome = Settling(system, at, task.z0.copy(), self.forward).run((), [("schedule", k) for k in due])
         stop = self._adopt(self.origin, outcome, task.x0, due, ())
@@ -163,12 +167,15 @@ class ModeLoop:
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
             outcome = self._settle_located(self._situation(arrival, segment), arrival)
+            outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
             if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
                 return True
             sides, x_minus = outcome.monitor_sides, outcome.x
         if appointment:
+            self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
             outcome = self._settle_appointment(instant, x_minus, schedules, segment)
+            outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
         return self._accumulated(instant)
 
@@ -176,9 +183,44 @@ class ModeLoop:
         """Settle the guards and stopping monitors that were located."""
         fired = self._coincident(at, arrival.fired)
         if fired and not self.forward:
-            return cross_backward(self.system, at, fired)
+            return cross_backward(self.system, at, tuple(fired))
         resets = [("monitor", k) for k in arrival.stopping]
         return Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
+
+    def _apply_crossed(self, outcome: Outcome, s: float, sides: np.ndarray, done: tuple[int, ...]) -> Outcome:
+        """Apply the resets of the monitors that an event carried to their other side, each once."""
+        applied = set(done)
+        first_changes = list(outcome.changes)
+        while not outcome.status and self.forward:
+            due = [
+                k
+                for k, m in enumerate(self.system.model.monitors)
+                if m.action == "reset" and k not in applied and self._crossed(k, int(sides[k]), outcome)
+            ]
+            if not due:
+                break
+            applied |= set(due)
+            at = Situation(s, outcome.x.copy(), outcome.p, outcome.z.copy(), outcome.x_error, math.ulp(s))
+            crossed_sides = outcome.monitor_sides
+            resets = [("monitor", k) for k in due]
+            outcome = Settling(self.system, at, at.z.copy(), self.forward).run((), resets)
+            first_changes += outcome.changes
+            # what is recorded is the side to which the event carried a monitor, not that after its reset
+            outcome.monitor_sides[due] = np.where(
+                outcome.monitor_sides[due] == 0, crossed_sides[due], outcome.monitor_sides[due]
+            )
+            self.crossed_by_reset.update({k: int(crossed_sides[k]) for k in due})
+            outcome.continuous = False
+        outcome.changes = first_changes
+        return outcome
+
+    def _crossed(self, monitor: int, before: int, outcome: Outcome) -> int:
+        """Direction in which an event carried a monitor across, as far as it asks for it; else 0."""
+        after = int(outcome.monitor_sides[monitor])
+        if before == 0 or after in (0, before):
+            return 0
+        wanted = {"up": 1, "down": -1, "both": after}[self.system.model.monitors[monitor].direction]
+        return after if wanted == after else 0
 
     def _settle_appointment(
         self, instant: Instant, x_minus: np.ndarray, schedules: tuple[int, ...], segment: SegmentRun
@@ -221,19 +263,27 @@ class ModeLoop:
         x_error[holding] = UNIT * np.abs(arrival.x[holding])
         return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 
-    def _coincident(self, at: Situation, fired: tuple[int, ...]) -> tuple[int, ...]:
-        """The located guards and those that are zero with them within rounding and leave, nearest first."""
+    def _coincident(self, at: Situation, fired: tuple[int, ...]) -> dict[int, int]:
+        """The located guards and those that are zero with them and leave, with the order of their times."""
         system = self.system
         if not fired:
-            return ()
+            return {}
         series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
         together: dict[int, float] = {}
-        for g in np.flatnonzero(system.active(at.z)):
+        for g in map(int, np.flatnonzero(system.active(at.z))):
             value, bound = series.guards[g], series.guard_bounds[g]
             leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
             if g in fired or leaves:
-                together[int(g)] = -value[0] / value[1] if value[1] != 0.0 else 0.0
-        return tuple(sorted(together, key=lambda g: together[g]))
+                together[g] = -value[0] / value[1] if value[1] != 0.0 else 0.0
+        # guards within one ulp of the time are at one place of the order
+        ulp = math.ulp(max(abs(float(self.origin.plus(at.s))), math.ulp(1.0)))
+        order: dict[int, int] = {}
+        place, last = -1, -math.inf
+        for g in sorted(together, key=lambda g: together[g]):
+            if together[g] - last > ulp:
+                place, last = place + 1, together[g]
+            order[g] = place
+        return order
 
     def _refuse_backward(self, arrival: Arrival, schedules: tuple[int, ...]) -> str:
         resets = [
@@ -309,6 +359,10 @@ class ModeLoop:
         ended = []
         for k, monitor in enumerate(self.system.model.monitors):
             before = 0 if monitor_sides is None else int(monitor_sides[k])
+            if k in self.crossed_by_reset:
+                direction = self.crossed_by_reset.pop(k)
+                self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
+                continue
             after = int(outcome.monitor_sides[k])
             if k not in stopping and (before == 0 or after in (0, before)):
                 continue

@@ -78,13 +78,27 @@ def _load(model: Model, name: str) -> Compiled:
         start = time.perf_counter()
         _write(path, emit(model))
         seconds = time.perf_counter() - start
+    try:
+        return Compiled(_import(name, path), seconds)
+    except (
+        Exception
+    ):  # a damaged file may raise anything; written anew, it tells whether the fault is its own
+        from hybridsim.engine.emit import emit
+
+        _write(path, emit(model))
+        return Compiled(_import(name, path), seconds)
+
+
+def _import(name: str, path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:  # pragma: no cover - a .py path always has a loader
         raise ImportError(f"cannot import {path}")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # numba looks a cached function's module up by name
     spec.loader.exec_module(module)
-    return Compiled(module, seconds)
+    if not hasattr(module, "DATA"):
+        raise ImportError(f"{path} is not whole")
+    return module
 
 
 def _write(path: Path, text: str) -> None:

@@ -30,7 +30,7 @@ _ACCEPT = 2.0**-30
 # a piece narrower than 2**-23. A few halvings later a piece is accepted with whatever bound it has.
 _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
-_MOST_PIECES = 1_000_000  # a guard that needs more oscillates a hundred thousand times within one step
+_MOST_PIECES = 200_000  # a guard that needs more oscillates some 20 000 times within one step
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 
 # Chebyshev points of the second kind on [0, 1]

@@ -28,6 +28,7 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Pieces, Segment
 
+_NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
 _CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
@@ -264,7 +265,11 @@ class SegmentRun:
         if self.method.dense_is_accurate or s == step.s0:
             x = step.dense(np.array([s]))[0]
             return Step(step.s0, s, step.x0, x, step.dense)
-        low, high = min(step.s0, step.s1), max(step.s0, step.s1)
+        on_dense = s
+        # the dense output errs by a small part of a step: what Newton's method finds further off is another zero
+        window = _NEIGHBOURHOOD * abs(step.s1 - step.s0)
+        low = max(min(step.s0, step.s1), s - window)
+        high = min(max(step.s0, step.s1), s + window)
         ended = stepper.restep(step, s)
         for _ in range(_CORRECTIONS):
             x = self._projected(ended)
@@ -279,7 +284,19 @@ class SegmentRun:
                 break
             s = corrected
             ended = stepper.restep(step, s)
-        return ended
+        if self._is_zero(ended, hit.number, is_monitor):
+            return ended
+        # the dense output crosses zero and the repeated step does not reach it: go by the dense output
+        return Step(step.s0, on_dense, step.x0, step.dense(np.array([on_dense]))[0], step.dense)
+
+    def _is_zero(self, step: Step, number: int, is_monitor: bool) -> bool:
+        """Whether a guard or monitor is zero at the end of a step, within the rounding of state and time."""
+        x = self._projected(step)
+        errors = 2.0 * self.rounding() + np.abs(self.flow.rhs(step.s1, x)) * 8.0 * math.ulp(step.s1)
+        series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, 8.0 * math.ulp(step.s1))
+        values = series.monitors if is_monitor else series.guards
+        bounds = series.monitor_bounds if is_monitor else series.guard_bounds
+        return bool(abs(values[number, 0]) <= bounds[number, 0])
 
     def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
         """Backward in time: stop where the present mode may have been entered through a guard of another."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hybridsim.engine.decide import (
-    FINE,
     LEAVES,
     NONE,
     NONUNIQUE,
@@ -103,11 +102,10 @@ class Settling:
 
     # -- the rounds -----------------------------------------------------------------------------------------
 
-    def run(self, fired: Iterable[int], resets: Iterable[tuple[object, ...]]) -> Outcome:
-        """Settle: `fired` guards located at zero, and keys of the resets that are due."""
-        fired = list(fired)
-        located = set(fired)
-        self.rank = {int(g): place for place, g in enumerate(fired)}
+    def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
+        """Settle `fired` guards, located at zero (with the order of their times), and resets that are due, by key."""
+        located = {int(g) for g in fired}
+        self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
         self.fired[list(located)] = True
         self.released_by = self._release_guards(located)
         surfaces = self._surface_components()
@@ -242,6 +240,9 @@ class Settling:
             guards = automaton.guards[mode]
             leaving = [j for j, g in enumerate(guards) if self.fired[g] or self.sides[g] < 0]
             leaving.sort(key=lambda j: (self.rank.get(guards[j], len(self.rank)), j))
+            apart = self._apart(c, mode, leaving)
+            if apart:
+                return "nonunique", apart
             for j in leaving[:1]:
                 if automaton.fatal[mode][j]:
                     return "inconsistent", str(automaton.fatal[mode][j])
@@ -268,6 +269,25 @@ class Settling:
         self.jumped = self.jumped or bool(taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
         return None
+
+    def _apart(self, component: int, mode: int, leaving: list[int]) -> str:
+        """Two guards of one mode that come to zero at once and lead to different things; empty if none do."""
+        at, system = self.at, self.system
+        automaton = system.automata[component]
+        guards = automaton.guards[mode]
+        place = self.rank.get(guards[leaving[0]]) if leaving else None
+        first = [j for j in leaving if self.fired[guards[j]] and self.rank.get(guards[j]) == place]
+        declared = system.model.all_components()[component].modes[mode].guards
+        ways = {}
+        for j in first:
+            number = system.choose(component, mode, j, at.s, at.x, at.p, at.z)
+            if number >= 0:
+                choice = declared[j].then[number]
+                ways[(choice.to, tuple((n, e.text) for n, e in choice.reset.items()))] = declared[j].name
+        if len(ways) < 2:
+            return ""
+        names = " and ".join(ways.values())
+        return f"guards {names} of mode {automaton.modes[mode]} come to zero at once and lead apart"
 
     def _place(self, component: int) -> int:
         """When the first of a component's guards came to zero, as a place in the order of all."""
@@ -336,7 +356,7 @@ class Settling:
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
             return "nonunique", self._say(
-                taking_part, candidates[verdicts == FINE], "several motions are admissible"
+                taking_part, candidates[verdicts != LEAVES], "several motions are admissible"
             )
         if number == NONE:
             return "inconsistent", self._say(taking_part, candidates, "no motion is admissible")

@@ -26,6 +26,7 @@ class Timetable:
 
     def __init__(self, system: System, end: Instant) -> None:
         self._end = end
+        self._settled: Instant | None = None  # the last appointment that was kept, or the start of the run
         values = system.model.parameter_values()
         self._signals = system.signals
         self._schedules = []
@@ -36,12 +37,16 @@ class Timetable:
             count = 1 if schedule.start is not None and schedule.period is None else schedule.count
             self._schedules.append((times, start, period, count))
 
+    def kept(self, instant: Instant) -> None:
+        """Note that an instant is settled: what lies within rounding of it is not due once more."""
+        self._settled = instant
+
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
         """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
         return tuple(
             k
             for k in range(len(self._schedules))
-            if (first := self._first(k)) is not None and first.minus(start) == 0
+            if (first := self._first(k)) is not None and abs(first.minus(start)) <= self._slack(start)
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
@@ -62,9 +67,7 @@ class Timetable:
         if not found:
             return None
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
-        slack = 2.0 * math.ulp(
-            max(abs(nearest.high), *(abs(start) for _, start, _, _ in self._schedules), 0.0)
-        )
+        slack = self._slack(nearest)
         together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
         latest = max(
             (t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after))
@@ -74,6 +77,10 @@ class Timetable:
         elif (self._end.minus(nearest) < 0.0) == forward:
             return None
         return Appointment(latest, tuple(sorted(k for k in together if k >= 0)))
+
+    def _slack(self, near: Instant) -> float:
+        """What rounding of periods and offsets amounts to at an instant."""
+        return 2.0 * math.ulp(max(abs(near.high), *(abs(start) for _, start, _, _ in self._schedules), 0.0))
 
     def _first(self, k: int) -> Instant | None:
         times, start, _period, _ = self._schedules[k]
@@ -91,4 +98,7 @@ class Timetable:
             ticks = range(int(max(min(near - 1, last), 0)), int(min(max(near, 0) + 3, last)) + 1)
             candidates = [multiple(start, i, period) for i in ticks]
         ahead = [c for c in candidates if (c.minus(after) > 0.0 if forward else c.minus(after) < 0.0)]
+        if self._settled is not None:
+            settled, slack = self._settled, self._slack(self._settled)
+            ahead = [c for c in ahead if abs(c.minus(settled)) > slack]
         return None if not ahead else (ahead[0] if forward else ahead[-1])

@@ -103,6 +103,7 @@ class FixedStepRun:
 
     def _run(self) -> None:
         due = self.timetable.due_at_start(self.origin)
+        self.timetable.kept(self.origin)
         if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
             return
         while self.origin != self.end:
@@ -163,6 +164,7 @@ class FixedStepRun:
         if why == BOUND:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
+            self.timetable.kept(instant)
             at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
             return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
         return self._declared_event(s, p, why)
@@ -305,7 +307,6 @@ class FixedStepRun:
     ) -> None:
         """Record the monitors that a reset carried to their other side."""
         crossed = [k for k in np.flatnonzero(before * after < 0.0) if k not in handled]
-        crossed = [k for k in crossed if self.system.model.monitors[k].action != "reset"]
         self._monitor_events(instant, np.array(crossed, dtype=np.int64), after.astype(np.int64), self.x)
 
     # -- the record -----------------------------------------------------------------------------------------

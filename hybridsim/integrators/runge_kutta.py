@@ -105,6 +105,9 @@ class RungeKuttaStepper:
         self._address = flow.system.address("flow")
         self._slopes = np.empty((len(tableau.c), flow.n))
         self.s, self.x, self.dx = 0.0, x0, self._rhs(0.0, x0)
+        if not np.isfinite(self.dx).all():
+            names = [n for n, d in zip(flow.system.names, self.dx, strict=True) if not np.isfinite(d)]
+            raise StepFailure(f"the derivative of {', '.join(names)} is not a finite number")
         self.h = first_step or self._first_step()
         self.left = self._series(0.0, x0)
 

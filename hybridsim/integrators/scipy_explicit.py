@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.trajectory import Pieces
 from hybridsim.integrators.base import Integrator
 
 
@@ -61,10 +62,14 @@ class SolverStepper:
     def restep(self, step: Step, s: float) -> Step:
         """From the start of a step to s in one step of exactly that length (more only if it is rejected)."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
-        ended = self._advance(solver)
+        parts = [self._advance(solver)]
         while solver.status == "running":
-            ended = self._advance(solver)
-        return Step(step.s0, s, step.x0, ended.x1, ended.dense)
+            parts.append(self._advance(solver))
+        dense = parts[0].dense
+        if len(parts) > 1:
+            knots = np.array([step.s0, *(part.s1 for part in parts)])
+            dense = Pieces(knots, tuple(part.dense for part in parts))
+        return Step(step.s0, s, step.x0, parts[-1].x1, dense)
 
     def _advance(self, solver: Any) -> Step:
         before = solver.nfev
