@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.model import Model, load
 
 if TYPE_CHECKING:
@@ -136,6 +136,7 @@ def _run(
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
     grid = None if t_eval is None else _grid(t_eval, span)
+    _refuse_driving(system, span[0], start, discrete, z0)
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
@@ -249,6 +250,24 @@ def _grid(t_eval: Sequence[float], span: tuple[float, float]) -> np.ndarray:
     ):
         raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
     return grid
+
+
+def _refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
+    """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
+    from hybridsim.engine.timepair import Instant
+
+    try:
+        effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return  # not a number at the start: the run itself says where
+    for c, effect in effects.items():
+        if effect >= 0.0:
+            name = system.automata[c].name
+            raise ModelError(
+                f"contact {name}: the force {name} acts along its relative velocity, not against it "
+                f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
+                remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
+            )
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

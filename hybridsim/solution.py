@@ -316,7 +316,8 @@ class Solution:
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
         """Write time, states, outputs and modes as CSV; at `points` equal steps, else at ``sol.t``."""
-        outputs = [q for q in self._system.quantities if " in " not in q]
+        outputs = [d.name for d in self.model.discrete]
+        outputs += [q for q in self._system.quantities if " in " not in q]
         components = [a.name for a in self._system.automata]
         header = ["t", *self.names, *outputs, *(f"mode({c})" for c in components)]
         with open(path, "w", newline="", encoding="utf-8") as file:

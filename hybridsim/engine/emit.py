@@ -115,6 +115,7 @@ class Emitter:
             self._function("monitors", [(f"out[{k}]", f"monitor_{k}") for k in range(len(model.monitors))]),
             self._function("quantities", self._quantities()),
             self._function("jumps", self._jumps()),
+            self._function("effects", [(f"out[{k}]", e) for k, e in enumerate(self.lowering.effects)]),
             self._function("rates", [(f"out[{k}]", r) for k, r in enumerate(program.rates)]),
             self._choose(),
             self._reset(),

@@ -63,6 +63,7 @@ class Lowering:
         self.parameters = {self.symbols[p.name] for p in model.parameters}
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
+        self.effects: list[Any] = []  # of each unknown on the rate of its own surface
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
@@ -296,6 +297,7 @@ class Lowering:
                         remedy="let the force enter the derivative of the velocity linearly",
                     )
             rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
+            self.effects.append(effect[c, c])
             if effect[c, c] == 0:
                 raise ModelError(
                     f"{unknown[c].name.removeprefix('v_')} does not act on its own relative velocity "

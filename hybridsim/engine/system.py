@@ -246,6 +246,12 @@ class System:
         self.code.module.jumps(s, x, p, z, out)
         return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
 
+    def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
+        """Effect of each unknown on the rate of its own surface, by component; negative for one that opposes it."""
+        out = np.zeros(len(self.surface_of))
+        self.code.module.effects(s, x, p, z, out)
+        return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
+
     def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
         """Number of the first choice of a guard whose condition holds; -1 if none."""
         return self.code.module.choose(component, mode, guard, s, x, p, z)

@@ -71,8 +71,10 @@ def unit_of(solution: Solution, name: str) -> str:
 
 
 def units_of(model: Model) -> dict[str, str]:
-    """Names of the states and the outputs, in that order, with their units."""
-    return {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
+    """Names of states, outputs, contact forces and discrete states, in that order, with their units."""
+    units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
+    rest = {contact.name: "" for contact in model.contacts} | {d.name: d.unit for d in model.discrete}
+    return units | {name: unit for name, unit in rest.items() if name not in units}
 
 
 def time_unit(model: Model) -> str:
