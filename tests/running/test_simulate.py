@@ -121,6 +121,8 @@ def test_a_jump_of_the_load_frees_a_body_at_rest(integrator: str) -> None:
         contacts=(hs.Contact("f", velocity="v", normal="6", law="coulomb", arguments={"mu": 0.5}),),
     )
     sol = hs.simulate(model, (0, 2), integrator=integrator)
-    assert [(e.t, e.source, e.target) for e in sol.events if e.kind == "transition"] == [(1.0, "stick", "slip-")]
+    assert [(e.t, e.source, e.target) for e in sol.events if e.kind == "transition"] == [
+        (1.0, "stick", "slip-")
+    ]
     assert (sol(np.linspace(0, 1, 20)) == 0.0).all()
     assert sol(2.0) == pytest.approx([-1.0, -2.0], abs=1e-7)
