@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import os
+import random
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -14,6 +15,9 @@ import mpmath
 import numpy as np
 import pytest
 from engine.model_truth import ByHand
+from engine.multiple_precision import evaluate
+from engine.random_expressions import random_expression
+from engine.tapes import STATES, Point
 
 import hybridsim as hs
 from hybridsim.engine.lower import Lowering
@@ -195,6 +199,30 @@ def test_an_angle_keeps_its_digits_over_a_million_turns(form: str) -> None:
             t = mpmath.mpf(origin.high) + mpmath.mpf(origin.low) + mpmath.mpf(1e-3)
             true = ByHand(model, {}, t, {"x": 0.5}).slope()["x"]
             assert abs(mpmath.mpf(found[0]) - true) <= 4e-15
+
+
+def test_random_expressions_keep_their_values_in_the_generated_code() -> None:
+    """Sixty at once, as monitors of one model; the tape's values have tests of their own."""
+    pick = random.Random(11)
+    texts = [random_expression(pick, 4) for _ in range(60)]
+    point = Point(t=0.0)
+    model = Model(
+        "random",
+        states=tuple(State(n, getattr(point, n), "1") for n in STATES),
+        parameters={n: getattr(point, n) for n in ("a", "b", "c")},
+        monitors=tuple(Monitor(f"m{k}", text, direction="both") for k, text in enumerate(texts)),
+    )
+    system = System(model)
+    for _ in range(20):
+        point = Point(*(pick.uniform(-1, 1) for _ in range(4)), pick.uniform(0, 1))
+        x = np.array([[getattr(point, n) for n in STATES]])
+        p, z = system.vector(Instant(0.0), np.zeros(0)), np.zeros(0, dtype=np.int64)
+        found = system.rows("monitors", len(texts), np.array([point.t]), x, p, z)[0]
+        with mpmath.workdps(40):
+            names = point.motion(mpmath.mpf(0))
+            for text, value in zip(texts, found, strict=True):
+                true = evaluate(text, names)
+                assert abs(mpmath.mpf(float(value)) - true) <= 1e-12 * (1 + abs(true)), text
 
 
 # -- sticking forces --------------------------------------------------------------------------------------------

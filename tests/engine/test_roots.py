@@ -30,14 +30,20 @@ class Search:
     """One search, with its cost."""
 
     def __init__(
-        self, f: Function, order: int = 0, side: int = 0, stop: int = 0, rounding: float = ROUNDING
+        self,
+        f: Function,
+        order: int = 0,
+        side: int = 0,
+        stop: int = 0,
+        rounding: float = ROUNDING,
+        floor: float = 0.0,
     ) -> None:
         self.f, self.samples = f, 0
         first = self.sample(POINTS)
         self.crossings: list[Crossing]
         self.grazings: list[Grazing]
         self.crossings, self.grazings, self.end, self.undefined = find_roots(
-            self.sample, first, order, side, stop, lambda: rounding
+            self.sample, first, order, side, stop, lambda: rounding, floor
         )
 
     def sample(self, theta: np.ndarray) -> np.ndarray:
@@ -119,22 +125,35 @@ def test_the_search_may_end_at_the_first_way_out(roots: list[float]) -> None:
     assert search.roots[-1] == pytest.approx(falls[0], abs=1e-15)
 
 
+def is_quiet(f: Function, side: int, order: int = 0, floor: float = 0.0) -> bool:
+    values, one = f(POINTS)[:, None], np.array([0])
+    return bool(quiet(values, one, np.array([side]), np.array([order]), np.array([floor]))[0])
+
+
 @given(separated(most=4), st.integers(1, 3))
 def test_polynomials_on_pieces_far_from_their_roots_are_quiet(roots: list[float], order: int) -> None:
-    f = product([*(1.0 + 4 * r for r in roots), *[0.0] * order], lambda theta: 1.0 + 0 * theta)
-    values = f(POINTS)[:, None]
+    f = product([*(1.0 + 4 * r for r in roots), *[0.0] * order])
     side = int(np.sign(f(np.array([1e-3]))[0]))
-    numbers = np.array([0])
-    assert quiet(values, numbers, np.array([side]), np.array([order]))[0]
-    assert not quiet(values, numbers, np.array([-side]), np.array([order]))[0]
-    assert not quiet(values, numbers, np.array([0]), np.array([order]))[0]
+    assert is_quiet(f, side, order)
+    assert not is_quiet(f, -side, order)
+    assert not is_quiet(f, 0, order)
 
 
 @given(separated(most=6))
 def test_no_function_with_a_root_is_quiet(roots: list[float]) -> None:
-    values = product(roots)(POINTS)[:, None]
-    for side in (1, -1):
-        assert not quiet(values, np.array([0]), np.array([side]), np.array([0]))[0]
+    assert not any(is_quiet(product(roots), side) for side in (1, -1))
+
+
+@given(st.floats(1e-12, 1e-3), st.floats(0.05, 0.95))
+def test_within_the_floor_of_the_last_event_nothing_is_a_crossing(floor: float, root: float) -> None:
+    """A function that starts from a zero known to `floor` only: what stays within it is open, what leaves it counts."""
+    within = product([root], lambda theta: 0.5 * floor + 0 * theta)
+    assert not is_quiet(within, -1, floor=floor)
+    search = Search(within, side=-1, floor=floor)
+    assert (search.crossings, search.end) == ([], 0)
+    beyond = Search(product([root]), side=-1, floor=min(floor, 0.01 * root, 0.01 * (1 - root)))
+    assert [c.direction for c in beyond.crossings] == [1]
+    assert beyond.roots[0] == pytest.approx(root, rel=1e-14)
 
 
 # -- double and clustered roots ---------------------------------------------------------------------------------
