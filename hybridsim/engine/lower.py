@@ -94,11 +94,6 @@ class Lowering:
                 f"'{expression.text}' is no finite real number: it simplifies to {simplified}",
                 remedy="look for a root or a logarithm of something negative, or a division by zero.",
             )
-        if value.has(sp.re, sp.im, sp.arg, sp.conjugate):
-            raise expression.error(
-                f"'{expression.text}' takes the absolute value of what may be complex: a root or a logarithm",
-                remedy="write abs(u) as max(u, -u).",
-            )
         return self._local_angles(value)
 
     def _local_angles(self, e: Any) -> Any:

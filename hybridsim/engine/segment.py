@@ -328,7 +328,18 @@ class SegmentRun:
                 self._refuse_undefined(int(g), step.s1)
             return None
         x = self._projected(step)
-        fired = tuple(r.number for r in step.roots if not r.is_monitor and r.direction < 0)
+        series = self.system.series(
+            step.s1, x, self.flow.p, self.flow.z, self.rounding(), 2.0 * math.ulp(step.s1)
+        )
+        direction = 1.0 if self.flow.forward else -1.0
+        # a zero that the method reports where the guard rises leaves no domain
+        fired = tuple(
+            r.number
+            for r in step.roots
+            if not r.is_monitor
+            and r.direction < 0
+            and series.guards[r.number, 1] * direction <= series.guard_bounds[r.number, 1]
+        )
         stopping = []
         for root in step.roots:
             if not root.is_monitor:

@@ -82,6 +82,7 @@ class FixedStepRun:
         self.counts = np.zeros(3, dtype=np.int64)
         located = settings.step * 2.0**-settings.halvings  # how well an event is located
         self.accumulation = Accumulation(located, 4.0 * located)
+        self.scale = np.abs(self.x)  # largest size of each state lately: what rounding is relative to
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.law = (settings.rule, settings.every_stage, settings.eps)
         self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
@@ -148,6 +149,7 @@ class FixedStepRun:
             self.counts,
         )
         self.fresh[:] = False
+        self.scale = np.abs(states[:count]).max(axis=0)
         self._keep(p, times[:count], states[:count], modes[:count], start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
@@ -260,7 +262,9 @@ class FixedStepRun:
         sides = np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
         s_error = self.settings.step * 2.0**-self.settings.halvings if fired or monitors else 0.0
-        x_error = 4.0 * UNIT * np.abs(self.x) + s_error * np.abs(system.flow(0.0, self.x, p, self.z))
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale) + s_error * np.abs(
+            system.flow(0.0, self.x, p, self.z)
+        )
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
