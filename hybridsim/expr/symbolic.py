@@ -10,6 +10,12 @@ import sympy
 
 from hybridsim.expr.parse import Expression, require_names
 
+
+def _absolute(u: Any) -> Any:
+    """|u|; SymPy would split what may be complex to it, a root or a logarithm, into real and imaginary parts."""
+    return sympy.Abs(u) if u.is_extended_real else sympy.Max(u, -u)
+
+
 _FUNCTIONS: dict[str, Any] = {
     "sin": sympy.sin,
     "cos": sympy.cos,
@@ -24,7 +30,7 @@ _FUNCTIONS: dict[str, Any] = {
     "exp": sympy.exp,
     "log": sympy.log,
     "sqrt": sympy.sqrt,
-    "abs": sympy.Abs,
+    "abs": _absolute,
     "sign": sympy.sign,
     "min": sympy.Min,
     "max": sympy.Max,

@@ -52,7 +52,8 @@ PLAIN = [
     "x**2", "x**3", "x**7", "(-x)**2", "-x**2", "v**3", "v**5", "v**-3", "x**64", "v**63*v**62", "(x + y)**-2",
     "x**0.5", "x**-0.5", "x**1.5", "x**-2.5", "(1 + y)**3.5", "x**a", "(2 + v)**b", "abs(v)**a", "2**x", "x**(a*t + y)",
     "exp(1)*x", "sin(1)*y", "pi*x", "tan(x + pi/2)", "tan(pi/2 - u)", "exp(x)**2.5", "(x*x)**0.5", "sin(acos(u))",
-    "atan2(0, v)", "atan2(x, x)", "sin(t)*cos(3*t)", "t**2*exp(-t)", "sin(a*t + cos(b*t))", "x*t**2",
+    "atan2(0, v)", "atan2(x, x)", "sin(t)*cos(3*t)", "t**2*exp(-t)",
+    "abs(log(x))", "abs(sqrt(x)*v)", "abs(exp(sin(log(2 + sin(v)))))", "sin(a*t + cos(b*t))", "x*t**2",
 ]  # fmt: skip
 
 

@@ -452,7 +452,7 @@ def test_one_rate_changed_by_two_components_is_refused() -> None:
     assert "one and two" in message
 
 
-@pytest.mark.parametrize("text", ["sqrt(-v**2)", "1/(v - v)", "log(x - x)", "abs(exp(sin(log(2 + sin(v)))))"])
+@pytest.mark.parametrize("text", ["sqrt(-v**2)", "1/(v - v)", "log(x - x)"])
 def test_what_is_not_real_is_refused_with_its_text(text: str) -> None:
     assert text in refusal(states=(State("x", 0, "v"), State("v", 0, text)))
 
