@@ -332,14 +332,13 @@ class SegmentRun:
             step.s1, x, self.flow.p, self.flow.z, self.rounding(), 2.0 * math.ulp(step.s1)
         )
         direction = 1.0 if self.flow.forward else -1.0
-        # a zero that the method reports where the guard rises leaves no domain
-        fired = tuple(
-            r.number
-            for r in step.roots
-            if not r.is_monitor
-            and r.direction < 0
-            and series.guards[r.number, 1] * direction <= series.guard_bounds[r.number, 1]
-        )
+        fired = tuple(r.number for r in step.roots if not r.is_monitor and r.direction < 0)
+        for g in fired:
+            if series.guards[g, 1] * direction > series.guard_bounds[g, 1]:
+                raise StepFailure(
+                    f"{self.system.guard_title(g, self.flow.z)} is reported to fall where it rises: events "
+                    f"follow each other more closely than the method's tolerances tell apart"
+                )
         stopping = []
         for root in step.roots:
             if not root.is_monitor:

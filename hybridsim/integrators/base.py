@@ -20,6 +20,7 @@ CAPABILITIES = {
     "monitors": "events that change no mode",
     "scheduled": "events and inputs at times known beforehand",
     "multiple-roots": "several zeros of a guard within one step",
+    "accumulation": "events that follow each other ever faster, down to rounding",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
     "stiff": "rates that differ by many decades",

@@ -16,6 +16,7 @@ _MISSES = (
     "CVODE compares the signs of a guard at both ends of a step and so misses two zeros within one step "
     "(SUNDIALS, CVODE user guide, section on rootfinding)"
 )
+_NOISE = "hops shorter than its tolerances are noise to its root finding; the run then stops saying so"
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
 
@@ -158,7 +159,7 @@ class CvodeBDF(Integrator):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = {"multiple-roots": _MISSES}
+    lacks: ClassVar[dict[str, str]] = {"multiple-roots": _MISSES, "accumulation": _NOISE}
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
@@ -188,6 +189,7 @@ class CvodeAdams(Integrator):
     when: ClassVar[str] = "long smooth stretches, not stiff"
     lacks: ClassVar[dict[str, str]] = {
         "multiple-roots": _MISSES,
+        "accumulation": _NOISE,
         "stiff": "functional order drops with the step: use cvode-bdf",
     }
     dense_is_accurate: ClassVar[bool] = True

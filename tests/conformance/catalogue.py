@@ -101,7 +101,7 @@ def ball() -> tuple[Scene, ...]:
         "ball",
         (0.0, 3.0),
         Truth(None, ((0.2, states[0][1]),), status="accumulation", end=fall * (1 + e) / (1 - e)),
-        needs("transitions"),
+        needs("transitions", "accumulation"),
         params={"v_min": 0.0},
         speed=4.0,
     )

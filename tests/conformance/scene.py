@@ -13,6 +13,7 @@ VOCABULARY = (
     "monitors",
     "scheduled",
     "multiple-roots",
+    "accumulation",
     "exact-stick",
     "backward",
     "stiff",
