@@ -179,11 +179,11 @@ def test_without_stick_the_velocity_chatters_where_the_body_should_stick() -> No
     """Changes of sign inside the exact stick phases of P2: the finer the step, the more of them."""
     at, counts = point("P2"), []
     for steps in (300, 1200, 4800):
-        sol = at.run("rk4-sign", steps_per_period=steps)
+        sol = at.run("rk4-sign", periods=20, steps_per_period=steps)
         v = sol.y[1]
         inside = np.array([at.motion.state(t)[2] == 0 for t in sol.t[1:]])
         counts.append(int(np.sum((v[1:] * v[:-1] < 0) & inside)))
-    assert counts[0] > 400
+    assert counts[0] > 80
     assert counts[2] > 3 * counts[1] > 9 * counts[0]
 
 
