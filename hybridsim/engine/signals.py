@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -31,7 +32,7 @@ class Signal:
         self.shape = declared.shape
         self._number = {name: evaluate(e, values) for name, e in declared.expressions.items()}
         if self.kind == "table":
-            self._times, self._coefficients = _table(declared)
+            self._knots, self._coefficients = _table(declared)
         elif self.kind == "wave" and self.shape != "sine":
             duty = self._number.get("duty", 0.5)
             square = ((0.0, 1.0, 0.0), (duty, -1.0, 0.0))
@@ -53,10 +54,9 @@ class Signal:
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
         """The first knot strictly after an instant (before it, backward in time)."""
         if self.kind == "table":
-            ahead = [
-                k for k in self._times if (Instant(k).minus(after) > 0.0) == forward and Instant(k) != after
-            ]
-            return None if not ahead else Instant(ahead[0] if forward else ahead[-1])
+            # pairs compare in the order of time; a table may have many knots, and each asks for the next
+            index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1
+            return self._knots[index] if 0 <= index < len(self._knots) else None
         if self.kind == "chirp":
             end = Instant(self._number["duration"])
             candidates = [Instant(0.0), end]
@@ -97,9 +97,8 @@ class Signal:
         )
 
     def _table_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        ahead = [Instant(k).minus(origin) for k in self._times]
-        index = sum(d <= 0.0 if forward else d < 0.0 for d in ahead)
-        start = ahead[max(index - 1, 0)]
+        index = (bisect_right if forward else bisect_left)(self._knots, origin)
+        start = self._knots[max(index - 1, 0)].minus(origin)
         return (*self._coefficients[index], start, 0.0)
 
     def _chirp_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
@@ -123,7 +122,7 @@ def _exact(instant: Instant) -> Fraction:
     return Fraction(instant.high) + Fraction(instant.low)
 
 
-def _table(declared: Input) -> tuple[list[float], list[tuple[float, float, float, float]]]:
+def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
     """Knots, and the cubic after each (index 0: before the first); the end values hold beyond the table."""
     times, values = np.array(declared.times), np.array(declared.values)
     if declared.interpolation == "cubic":
@@ -138,4 +137,4 @@ def _table(declared: Input) -> tuple[list[float], list[tuple[float, float, float
             slopes = np.where(np.diff(times) > 0.0, np.diff(values) / np.diff(times), 0.0)
         rows = [(float(v), float(m), 0.0, 0.0) for v, m in zip(values, slopes, strict=False)]
     first, last = (float(values[0]), 0.0, 0.0, 0.0), (float(values[-1]), 0.0, 0.0, 0.0)
-    return [float(t) for t in times], [first, *rows, last]
+    return [Instant(float(t)) for t in times], [first, *rows, last]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ class Timetable:
         self._signals = system.signals
         self._schedules = []
         for schedule in system.model.schedules:
-            times = sorted(evaluate(t, values) for t in schedule.times)
+            times = sorted(Instant(float(evaluate(t, values))) for t in schedule.times)
             start = evaluate(schedule.start, values) if schedule.start is not None else 0.0
             period = evaluate(schedule.period, values) if schedule.period is not None else 0.0
             count = 1 if schedule.start is not None and schedule.period is None else schedule.count
@@ -84,21 +85,26 @@ class Timetable:
 
     def _first(self, k: int) -> Instant | None:
         times, start, _period, _ = self._schedules[k]
-        if times:
-            return Instant(times[0])
-        return Instant(start)
+        return times[0] if times else Instant(start)
 
     def _next(self, k: int, after: Instant, forward: bool) -> Instant | None:
         times, start, period, count = self._schedules[k]
-        if times:
-            candidates = [Instant(t) for t in times]
-        else:
-            last = math.inf if count is None else count - 1
-            near = 0 if period == 0.0 else math.floor((float(after) - start) / period)
-            ticks = range(int(max(min(near - 1, last), 0)), int(min(max(near, 0) + 3, last)) + 1)
-            candidates = [multiple(start, i, period) for i in ticks]
+        if times:  # a list may be long
+            index, step = (bisect_right(times, after), 1) if forward else (bisect_left(times, after) - 1, -1)
+            while 0 <= index < len(times):
+                if not self._is_settled(times[index]):
+                    return times[index]
+                index += step
+            return None
+        last = math.inf if count is None else count - 1
+        near = 0 if period == 0.0 else math.floor((float(after) - start) / period)
+        ticks = range(int(max(min(near - 1, last), 0)), int(min(max(near, 0) + 3, last)) + 1)
+        candidates = [multiple(start, i, period) for i in ticks]
         ahead = [c for c in candidates if (c.minus(after) > 0.0 if forward else c.minus(after) < 0.0)]
-        if self._settled is not None:
-            settled, slack = self._settled, self._slack(self._settled)
-            ahead = [c for c in ahead if abs(c.minus(settled)) > slack]
+        ahead = [c for c in ahead if not self._is_settled(c)]
         return None if not ahead else (ahead[0] if forward else ahead[-1])
+
+    def _is_settled(self, instant: Instant) -> bool:
+        """Whether it lies within rounding of the last appointment that was kept."""
+        settled = self._settled
+        return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from fractions import Fraction
 from itertools import pairwise
 
@@ -310,6 +311,37 @@ def test_the_knots_of_a_table_both_ways() -> None:
     for ahead, table in ((True, forward), (False, backward)):
         for t, knot in table.items():
             assert signal.next_knot(Instant(t), ahead) == (None if knot is None else Instant(knot))
+
+
+def test_walking_a_table_meets_each_knot_once_both_ways() -> None:
+    """A record of ten thousand knots, uneven, far from the origin of time."""
+    times = 1e6 + np.cumsum(np.random.default_rng(2).uniform(1e-3, 0.1, 10_000))
+    signal = Signal(Input("u", "table", times=times, values=np.zeros(10_000)), {})
+    for forward in (True, False):
+        met, instant = [], Instant(0.0 if forward else 1e7)
+        while (knot := signal.next_knot(instant, forward)) is not None:
+            met.append(float(knot))
+            instant = knot
+        assert met == (times.tolist() if forward else times[::-1].tolist())
+
+
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_a_knot_costs_the_same_in_a_long_table(kind: str) -> None:
+    """The work for one knot, counted in function calls, does not grow with the table."""
+
+    def calls(knots: int) -> int:
+        times = np.arange(knots) * 0.02
+        signal = Signal(Input("u", "table", times=times, values=times, interpolation=kind), {})
+        counted: list[str] = []
+        sys.setprofile(lambda _frame, event, _argument: counted.append(event))
+        try:
+            signal.next_knot(Instant(0.09), True)
+            signal.piece(Instant(0.09), True)
+        finally:
+            sys.setprofile(None)
+        return len(counted)
+
+    assert calls(10_000) == calls(10)
 
 
 def test_a_jump_in_a_table_has_two_sides() -> None:

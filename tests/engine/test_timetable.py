@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -55,6 +56,23 @@ def test_single_times_in_any_order() -> None:
 def test_times_may_be_expressions_of_parameters() -> None:
     table = timetable(Schedule("a", start="T/2", period="2*T", count=2), T=0.25)
     assert walk(table, Instant(0.0)) == [(Instant(0.125), (0,)), (Instant(0.625), (0,))]
+
+
+def test_a_long_list_of_times_costs_no_more_for_each() -> None:
+    """The work for one appointment, counted in function calls, does not grow with the list."""
+
+    def calls(count: int) -> int:
+        table = timetable(Schedule("a", times=tuple(0.25 * k for k in range(count))))
+        table.kept(Instant(1.0))
+        counted: list[str] = []
+        sys.setprofile(lambda _frame, event, _argument: counted.append(event))
+        try:
+            assert table.next(Instant(1.0), True).instant == Instant(1.25)
+        finally:
+            sys.setprofile(None)
+        return len(counted)
+
+    assert calls(1000) == calls(10)
 
 
 @given(
