@@ -39,6 +39,7 @@ _HOME = {
     "Solution": "hybridsim.solution",
     "list_integrators": "hybridsim.integrators",
     "simulate": "hybridsim.simulate",
+    "to_ivp": "hybridsim.ivp",
     # asking
     "Comparison": "hybridsim.analysis",
     "compare": "hybridsim.analysis",

@@ -9,6 +9,7 @@ from hybridsim.errors import Place as Place
 from hybridsim.errors import SimulationError as SimulationError
 from hybridsim.errors import UsageError as UsageError
 from hybridsim.integrators import list_integrators as list_integrators
+from hybridsim.ivp import to_ivp as to_ivp
 from hybridsim.model import Choice as Choice
 from hybridsim.model import Component as Component
 from hybridsim.model import Contact as Contact

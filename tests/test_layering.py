@@ -23,6 +23,7 @@ FLOORS = (
     "integrators",
     "solution",
     "simulate",
+    "ivp",
     "analysis",
     "plot",
     "cli",
@@ -35,7 +36,7 @@ LIBRARIES = {
     "llvmlite": {"engine"},
     "sksundae": {"integrators"},
     "scipy": {"engine", "integrators", "solution", "analysis"},
-    "numpy": {"engine", "integrators", "solution", "simulate", "analysis", "plot"},
+    "numpy": {"engine", "integrators", "solution", "simulate", "ivp", "analysis", "plot"},
     "matplotlib": {"plot"},
 }
 

@@ -37,7 +37,7 @@ class Compiled:
         return {}
 
     def address(self, name: str) -> Any:
-        """Address of one of flow, project, guards, surfaces, monitors, quantities; compiled on first use."""
+        """Address of one of flow, tangent, project, guards, surfaces, monitors, quantities; compiled on first use."""
         if name not in self._kept:
             from hybridsim.engine.jit import compile_model_function
 

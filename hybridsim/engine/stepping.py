@@ -103,6 +103,20 @@ class Flow:
         evaluate(self._flow, float(s), x, self.p, self.z, out)
         return out
 
+    def jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
+        """d(dx/dt)/dx, (n, n), as it is differentiated from the declaration."""
+        tangent, columns, both = (
+            self.system.address("tangent"),
+            np.empty((self.n, self.n)),
+            np.zeros(2 * self.n),
+        )
+        both[: self.n] = x
+        for k in range(self.n):
+            both[self.n :] = 0.0
+            both[self.n + k] = 1.0
+            evaluate(tangent, float(s), both, self.p, self.z, columns[k])
+        return columns.T
+
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """States (k, n) at local times (k,) with held states on their constraints."""
         x = np.ascontiguousarray(x, dtype=float)

@@ -69,6 +69,13 @@ def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
         ) from None
 
 
+def derivative(e: Any, symbol: Any) -> Any:
+    """de/d(symbol) where it exists; at the corner of an absolute value, minimum or step the side of zero's right."""
+    slope = sympy.diff(e, symbol)
+    slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    return slope.replace(sympy.Heaviside, lambda a, *_: sympy.Piecewise((1, a >= 0), (0, True)))
+
+
 def _convert(node: ast.expr, symbols: Mapping[str, Any]) -> Any:
     match node:
         case ast.Constant(value=bool() as truth):

@@ -16,8 +16,12 @@ from hybridsim.integrators.base import Integrator
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
-    "scipy_explicit:ScipyDOP853",
-    "scipy_explicit:ScipyRK45",
+    "scipy_solvers:ScipyDOP853",
+    "scipy_solvers:ScipyRK45",
+    "scipy_solvers:ScipyRK23",
+    "scipy_solvers:ScipyRadau",
+    "scipy_solvers:ScipyBDF",
+    "scipy_solvers:ScipyLSODA",
     "sundials:CvodeAdams",
     "sundials:CvodeBDF",
     "published:Rk4Dichotomy",

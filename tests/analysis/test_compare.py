@@ -99,7 +99,7 @@ def test_failures_are_rows(monkeypatch) -> None:
 
 
 def test_a_third_partys_exception_costs_its_own_row_only(monkeypatch) -> None:
-    from hybridsim.integrators.scipy_explicit import ScipyRK45
+    from hybridsim.integrators.scipy_solvers import ScipyRK45
 
     def broken(*arguments, **keywords):
         raise ZeroDivisionError("somebody's bug")

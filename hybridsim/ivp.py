@@ -1,0 +1,134 @@
+"""One mode of a model as an initial value problem, for solvers that know nothing of hybridsim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from os import PathLike
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import Model, load
+
+Function = Callable[[float, np.ndarray], Any]
+
+
+class Ivp(NamedTuple):
+    """What `to_ivp` hands out; the names are those of the arguments of `scipy.integrate.solve_ivp`."""
+
+    fun: Function
+    events: tuple[Function, ...]
+    jac: Function
+
+
+def to_ivp(
+    model: Model | str | PathLike[str],
+    z: Mapping[str, str] | None = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+) -> Ivp:
+    """One mode of a model as functions of (t, x) in plain absolute time.
+
+    fun(t, x) is dx/dt (n,), jac(t, x) its Jacobian (n, n), and events the guards of the mode: the mode lasts while
+    all of them are >= 0. Each is a function (t, x) -> float with the attributes terminal = True and direction = -1
+    as `solve_ivp` reads them, and component and guard, which name it. States that the mode holds are evaluated from
+    their constraint. Discrete states keep their initial values.
+
+    Parameters
+    ----------
+    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    z : mode of each component by name; left out, a component is in its declared initial mode. A contact has none:
+        its mode must be given.
+    params : parameter values that replace the declared ones.
+
+    When to use it: to bring a solver of your own. What follows an event is then yours to decide; `simulate` does
+    both, and takes a solver of your own as an integrator (`hybridsim.integrators.base.Integrator`).
+
+    Errors
+    ------
+    UsageError for a component or a mode that the model does not have, or a contact without one.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> from scipy.integrate import solve_ivp
+    >>> fun, events, jac = hs.to_ivp("dfcs", {"f": "stick"})
+    >>> release = solve_ivp(fun, (0, 0.01), [0.0, 0.0], events=events, max_step=1e-4)
+    >>> float(round(release.t[-1], 6))  # asin(mu*N/F0)/omega
+    0.00172
+    """
+    from hybridsim.engine.jit import announce_compilation
+    from hybridsim.engine.stepping import Counters, Flow
+    from hybridsim.engine.system import System
+    from hybridsim.engine.timepair import Instant
+
+    model = model if isinstance(model, Model) else load(model)
+    model = model.with_(**(params or {})).validate()
+    announce_compilation()
+    system = System(model)
+    modes = _modes(system, z or {})
+    discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
+
+    def flow_from(origin: float) -> Flow:
+        return Flow(system, system.vector(Instant(origin), discrete), modes, Counters())
+
+    from_zero = flow_from(0.0)
+
+    def at(t: float) -> tuple[Flow, float]:
+        """A flow and the local time in it; the piece of an input that holds at t is looked up anew."""
+        return (flow_from(float(t)), 0.0) if system.signals else (from_zero, float(t))
+
+    def fun(t: float, x: Any) -> np.ndarray:
+        flow, s = at(t)
+        return flow.rhs(s, _state(x))
+
+    def jac(t: float, x: Any) -> np.ndarray:
+        flow, s = at(t)
+        return flow.jacobian(s, _state(x))
+
+    def event(number: int, component: str, guard: str) -> Function:
+        def value(t: float, x: Any) -> float:
+            flow, s = at(t)
+            return float(flow.guards(np.array([s]), _state(x)[None, :])[0, number])
+
+        # a function has no such attributes by its type; solve_ivp reads the first two off it
+        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
+        value.component, value.guard = component, guard  # type: ignore[attr-defined]
+        return value
+
+    events = tuple(
+        event(number, automaton.name, name)
+        for automaton, mode in zip(system.automata, modes, strict=True)
+        for number, name in zip(automaton.guards[mode], automaton.guard_names[mode], strict=True)
+    )
+    return Ivp(fun, events, jac)
+
+
+def _state(x: Any) -> np.ndarray:
+    return np.ascontiguousarray(x, dtype=float)
+
+
+def _modes(system: Any, z: Mapping[str, str]) -> np.ndarray:
+    names = [a.name for a in system.automata]
+    for name in z:
+        if name not in names:
+            raise UsageError(
+                f"z names {name!r}, which is no component of model {system.model.name}",
+                remedy=nearest(name, names, kind="components"),
+            )
+    modes = []
+    for automaton in system.automata:
+        mode = z.get(automaton.name)
+        if mode is None and automaton.initial < 0:
+            raise UsageError(
+                f"z gives no mode of {automaton.name}, and it has no initial one",
+                remedy=f"give one of {', '.join(automaton.modes)}",
+            )
+        if mode is not None and mode not in automaton.modes:
+            raise UsageError(
+                f"z of {automaton.name} is {mode!r}, which is no mode of it",
+                remedy=nearest(mode, automaton.modes, kind="modes"),
+            )
+        modes.append(automaton.initial if mode is None else automaton.modes.index(mode))
+    return np.array(modes, dtype=np.int64)
