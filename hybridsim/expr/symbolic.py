@@ -1,4 +1,4 @@
-"""A checked expression as a SymPy object; the only file of this floor that imports SymPy."""
+"""A checked expression as a SymPy object."""
 
 from __future__ import annotations
 

@@ -1,0 +1,46 @@
+"""The partial derivative of an expression, as an expression again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.expr.parse import Expression, parse
+
+
+def slope(expr: Expression, name: str) -> Expression:
+    """d(expr)/d(name) with everything else held.
+
+    Errors
+    ------
+    ExpressionError where the derivative cannot be written with the functions that expressions have.
+    """
+    if name not in expr.names:
+        return parse(0, expr.place)
+    import sympy
+
+    from hybridsim.expr.symbolic import derivative, to_sympy
+
+    symbols = {n: sympy.Symbol(n, real=True) for n in expr.names}
+    found = derivative(to_sympy(expr, symbols), symbols[name])
+    return parse(_printer().doprint(found), expr.place)
+
+
+def _printer() -> Any:
+    from sympy.printing.pycode import PythonCodePrinter
+
+    class Printer(PythonCodePrinter):
+        """The functions of expressions by their own names, numbers to the last digit."""
+
+        def __init__(self) -> None:
+            super().__init__({"fully_qualified_modules": False, "standard": "python3"})
+
+        def _print_Float(self, e: Any) -> str:
+            return repr(float(e))
+
+        def _print_sign(self, e: Any) -> str:
+            return f"sign({self._print(e.args[0])})"
+
+        def _print_Exp1(self, e: Any) -> str:
+            return "exp(1)"
+
+    return Printer()

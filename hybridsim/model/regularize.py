@@ -1,0 +1,228 @@
+"""A model with its dry friction made single-valued: what one does when the corner is in the way."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import ModelError, UsageError, nearest
+from hybridsim.expr import Expression, evaluate, parse, substitute
+from hybridsim.model.component import Choice, Component, Guard, Mode
+from hybridsim.model.contact import Contact
+from hybridsim.model.law import SPEED
+from hybridsim.model.quantities import Parameter
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+KINDS = ("tanh", "arctan", "karnopp")
+_SMOOTH = {"tanh": "slip*tanh(velocity/v0)", "arctan": "slip*2/pi*atan(velocity/v0)"}
+_TRIALS = 8  # points at which a law is tried for a jump at rest; one would do but for accidents
+
+
+def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
+    """The model with every contact in a regularised form; see `Model.regularized`."""
+    if kind not in KINDS:
+        raise UsageError(
+            f"there is no regularisation {kind!r}", remedy=nearest(kind, KINDS, kind="regularisations")
+        )
+    if not model.contacts:
+        raise UsageError(f"the model '{model.name}' has no contact to regularise")
+    name = _free_name(model, "v0")
+    width = Parameter(name, parse(v0))
+    changed = replace(model, parameters=(*model.parameters, width))
+    value = changed.parameter_values()[name]
+    if not value > 0.0:
+        raise UsageError(f"v0 is {value!r}", remedy="give a velocity above zero")
+    build: Callable[[Model, Contact, str], Component]
+    build = _karnopp if kind == "karnopp" else lambda m, contact, w: _smooth(m, contact, w, kind)
+    components = tuple(build(changed, contact, name) for contact in model.contacts)
+    gone = {contact.name for contact in model.contacts}
+    outputs = tuple(
+        replace(
+            output, modes={place: e for place, e in output.modes.items() if place.split(".")[0] not in gone}
+        )
+        for output in model.outputs
+    )
+    definitions = model.definitions
+    if kind == "karnopp":
+        definitions += tuple((_holding(c.name), _holding_force(model, c)) for c in model.contacts)
+    return replace(
+        changed,
+        contacts=(),
+        components=(*components, *model.components),
+        outputs=outputs,
+        definitions=definitions,
+        title=f"{model.title or model.name}, regularised by {kind}",
+    )
+
+
+def _free_name(model: Model, wish: str) -> str:
+    taken = {part.name for part in (*model.parameters, *model.states, *model.discrete, *model.inputs)}
+    taken |= {name for name, _ in model.definitions} | set(model.variables())
+    while wish in taken:
+        wish += "_"
+    return wish
+
+
+def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
+    """One mode, f = slip(|v|) g(v/v0) with g odd and rising from -1 to 1."""
+    _refuse_static(model, contact, kind)
+    speed = _form("abs(velocity)", velocity=contact.velocity) if SPEED in contact.law.slip.names else parse(0)
+    force = _form(_SMOOTH[kind], slip=contact.slip_force(speed), velocity=contact.velocity, v0=parse(v0))
+    return Component(
+        contact.name,
+        (Mode("smooth", _loaded(model, contact), set={contact.name: force}),),
+        place=contact.place,
+    )
+
+
+def _refuse_static(model: Model, contact: Contact, kind: str) -> None:
+    """A single-valued force through zero has no peak at rest: static friction above slip(0) would be lost."""
+    surface = contact.component(model.constant_names()).surface
+    assert surface is not None  # every contact has one
+    jump = surface.jump_above
+    values, draw = model.parameter_values(), random.Random(0)
+    for _ in range(_TRIALS):
+        others = {name: draw.uniform(0.5, 1.5) for name in sorted(jump.names - values.keys())}
+        size = evaluate(jump, {**values, **others})
+        if abs(size) > 1e-12 * max(abs(value) for value in (1.0, *values.values(), *others.values())):
+            raise UsageError(
+                f"contact {contact.name}: its law '{contact.law.name}' holds more at rest than it slides with; "
+                f"'{kind}' has no force at rest of its own and would lose that",
+                remedy="use 'karnopp', or a law that falls from its static value over a speed, as stribeck does",
+            )
+
+
+def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
+    """A dead band |v| < v0 where the body is stopped and the force is what holds it, as far as the law allows.
+
+    D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698, in the form in which the
+    velocity is set to zero on entering the band; broken loose, the body slides at the limit force until it has
+    left the band.
+    """
+    name, velocity, loaded = contact.name, contact.velocity, _loaded(model, contact)
+    held, limit, width = parse(_holding(name)), contact.limit_force(), parse(v0)
+    backward = _form("-velocity", velocity=velocity)
+    parts = {"velocity": velocity, "v0": width, "held": held, "limit": limit}
+    up, down = _form("held > limit", **parts), _form("-held > limit", **parts)
+    stop = _stopping(model, contact)
+    into_band = (Choice("break+", up, stop), Choice("break-", down, stop), Choice("stick", None, stop))
+    out_up = Guard("fast", _form("v0 - velocity", **parts), (Choice("slip+"),))
+    out_down = Guard("fast-backward", _form("v0 + velocity", **parts), (Choice("slip-"),))
+    forward_force = contact.slip_force(velocity)
+    backward_force = _form("-f", f=contact.slip_force(backward))
+    modes = (
+        Mode(
+            "slip+",
+            (Guard("slow", _form("velocity - v0", **parts), into_band), *loaded),
+            set={name: forward_force},
+        ),
+        Mode(
+            "slip-",
+            (Guard("slow", _form("-velocity - v0", **parts), into_band), *loaded),
+            set={name: backward_force},
+        ),
+        Mode(
+            "stick",
+            (
+                Guard("upper", _form("limit - held", **parts), (Choice("break+"),)),
+                Guard("lower", _form("limit + held", **parts), (Choice("break-"),)),
+                out_up,
+                out_down,
+                *loaded,
+            ),
+            set={name: held},
+        ),
+        Mode(
+            "break+",
+            (Guard("held", _form("held - limit", **parts), (Choice("stick"),)), out_up, out_down, *loaded),
+            set={name: limit},
+        ),
+        Mode(
+            "break-",
+            (Guard("held", _form("-held - limit", **parts), (Choice("stick"),)), out_up, out_down, *loaded),
+            set={name: _form("-limit", **parts)},
+        ),
+    )
+    return Component(name, modes, initial="stick", place=contact.place)
+
+
+def _holding(contact: str) -> str:
+    return f"{contact}_held"
+
+
+def _holding_force(model: Model, contact: Contact) -> Expression:
+    """The force that keeps the relative velocity as it is: -(its rate without f)/(what f adds to it).
+
+    Errors
+    ------
+    UsageError where the relative velocity uses an input, or where another contact's force acts on it.
+    """
+    from hybridsim.expr.slope import slope
+
+    definitions = dict(model.definitions)
+    velocity = _inlined(contact.velocity, definitions)
+    inputs = velocity.names & {i.name for i in model.inputs}
+    if inputs:
+        raise UsageError(
+            f"contact {contact.name}: its velocity uses the input {', '.join(sorted(inputs))}, whose rate "
+            f"'karnopp' would need",
+            remedy="use 'tanh' or 'arctan'",
+        )
+    rate = slope(velocity, "t")
+    for state in model.states:
+        part = slope(velocity, state.name)
+        if part.text != "0":
+            der = _inlined(state.der, definitions)
+            rate = _form("rate + part*der", rate=rate, part=part, der=der)
+    others = rate.names & {c.name for c in model.contacts if c is not contact}
+    if others:
+        raise UsageError(
+            f"contact {contact.name}: the force {', '.join(sorted(others))} acts on its velocity; "
+            f"'karnopp' holds one contact at a time",
+            remedy="use 'tanh' or 'arctan'",
+        )
+    effect = slope(rate, contact.name)
+    if contact.name in effect.names or effect.text == "0":
+        raise ModelError(
+            f"contact {contact.name}: the force {contact.name} does not act linearly on its own velocity",
+            place=contact.place,
+            remedy="let it enter the derivative of the velocity as '- f/m'",
+        )
+    free = substitute(rate, {contact.name: parse(0)})
+    return _form("-free/effect", free=free, effect=effect)
+
+
+def _inlined(expr: Expression, definitions: Mapping[str, Expression]) -> Expression:
+    while used := expr.names & definitions.keys():
+        expr = substitute(expr, {name: definitions[name] for name in used})
+    return expr
+
+
+def _stopping(model: Model, contact: Contact) -> dict[str, Expression]:
+    """The reset that makes the relative velocity zero: of the state in it whose coefficient is a number."""
+    from hybridsim.expr.slope import slope
+
+    for state in model.states:
+        part = slope(contact.velocity, state.name)
+        if part.text != "0" and not part.names & {s.name for s in model.states}:
+            after = _form("x - velocity/part", x=parse(state.name), velocity=contact.velocity, part=part)
+            return {state.name: after}
+    raise ModelError(
+        f"contact {contact.name}: its relative velocity is linear in no state",
+        place=contact.velocity.place or contact.place,
+        remedy="introduce the relative velocity as a state of its own",
+    )
+
+
+def _loaded(model: Model, contact: Contact) -> tuple[Guard, ...]:
+    """The guard that ends the run where the normal load would become negative, if it can."""
+    guards = contact.component(model.constant_names()).modes[0].guards
+    return tuple(guard for guard in guards if guard.fatal)
+
+
+def _form(template: str, **parts: Expression) -> Expression:
+    return substitute(parse(template), parts)
