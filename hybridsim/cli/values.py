@@ -96,7 +96,7 @@ def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PE
         "--t-end",
         metavar="TIME",
         help="end of the run: a time, an expression of the parameters, or '100T' for 100 periods of forcing "
-        f"(default: {periods}T, or {DEFAULT_SECONDS:g} where there is no period)",
+        f"(default: {periods}T; without a period the end of the longest table or chirp, else {DEFAULT_SECONDS:g})",
     )
 
 
@@ -143,7 +143,7 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
 
     if text is None:
         period = forcing_period(model)
-        return default_periods * period if period is not None else DEFAULT_SECONDS
+        return default_periods * period if period is not None else _record_end(model) or DEFAULT_SECONDS
     periods = _PERIODS.fullmatch(text)
     if periods:
         period = forcing_period(model)
@@ -158,6 +158,16 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
     if not (value > 0 and math.isfinite(value)):
         raise UsageError(f"--t-end {text} is {value:g}", remedy="give a finite time above zero")
     return value
+
+
+def _record_end(model: Model) -> float:
+    """When the longest table or chirp ends; 0 where there is none after that."""
+    from hybridsim.expr import evaluate
+
+    values = model.parameter_values()
+    ends = [signal.times[-1] for signal in model.inputs if signal.kind == "table"]
+    ends += [evaluate(signal.duration, values) for signal in model.inputs if signal.duration is not None]
+    return max([0.0, *ends])
 
 
 def _time(model: Model, text: str) -> float:

@@ -12,7 +12,7 @@ from hybridsim.model.library import list_laws, models_folder
 
 WANTED = {
     "dfcs", "dfcs-stribeck", "belt", "free-decay", "static-kinetic", "bouncing-ball", "thermostat", "square-wave",
-    "sampled-servo",
+    "sampled-servo", "base-isolation",
 }  # fmt: skip
 
 

@@ -112,3 +112,19 @@ def test_sampled_servo() -> None:
     assert [b.t - a.t for a, b in itertools.pairwise(stops)] == pytest.approx(
         [2.1] * (len(stops) - 1), abs=0.05
     )
+
+
+def test_base_isolation() -> None:
+    model = hs.load("base-isolation")
+    run = hs.simulate(model, (0, 20))
+    assert run.events[0].t == pytest.approx(1.086, abs=5e-4)
+    stops = [e for e in run.events if e.target == "stick"]
+    turns = [e for e in run.events if "stick" not in (e.source, e.target)]
+    assert (len(stops), len(turns)) == (31, 2)
+    assert stops[-1] is run.events[-1] and stops[-1].t == pytest.approx(13.77, abs=5e-3)
+    assert run(20.0)[0] == pytest.approx(-8e-3, abs=5e-4)
+    fixed = hs.simulate(model.with_(mu=10), (0, 20))
+    assert not fixed.events
+    assert abs(run.output("a_g")).max() == pytest.approx(3.4, abs=0.05)
+    assert abs(run.output("acc")).max() == pytest.approx(2.05, abs=0.05)
+    assert abs(fixed.output("acc")).max() == pytest.approx(11, abs=0.1)
