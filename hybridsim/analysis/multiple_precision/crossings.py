@@ -1,0 +1,116 @@
+"""Where a series changes its sign within a step: all such places, in order.
+
+A polynomial in Bernstein form has, within its interval, no more zeros than its coefficients have changes of sign, and
+as many but for an even number (R. T. Farouki, Computer Aided Geometric Design 29 (2012) 379,
+doi:10.1016/j.cagd.2012.03.001). So halving leaves intervals with no zero or with one.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsim.analysis.multiple_precision.expansion import Coefficients, rate_at, value_at
+from hybridsim.analysis.multiple_precision.precision import Number, Precision
+
+# An interval of 2^-40 of a step in which the signs still leave two zeros possible holds a touch, which is no crossing.
+_DEEPEST = 40
+# Bernstein coefficients in double precision are good to 1e-14 of the largest coefficient: of the sums of up to forty
+# terms, each rounded at 1e-16. Beyond ten times that their signs are sure.
+_SURE = 1e-13
+
+
+def crossings(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
+    """Times in (0, h] at which a series changes its sign.
+
+    Parameters
+    ----------
+    c : coefficients, the first of which is not zero: leading zeros are what a step starts from and no crossing.
+    """
+    scaled, power = [], precision.context.one
+    for value in c:
+        scaled.append(value * power)
+        power = power * h
+    if abs(scaled[0]) > sum(abs(value) for value in scaled[1:]):
+        return []
+    size = max(abs(value) for value in scaled)
+    rough = _double_table(len(c)) @ np.array([float(value / size) for value in scaled])
+    if (rough > _SURE).all() or (rough < -_SURE).all():
+        return []
+    table = _table(precision, len(c))
+    fdot = precision.context.fdot
+    bernstein = [fdot(row, scaled[: len(row)]) for row in table]
+    zero, one = precision.context.zero, precision.context.one
+    return [h * u for u in _isolate(scaled, bernstein, zero, one, 0, precision)]
+
+
+def _isolate(
+    p: Sequence[Number], bernstein: list[Number], low: Number, width: Number, depth: int, precision: Precision
+) -> list[Number]:
+    """Places in (low, low + width] at which p changes its sign."""
+    signs = [value > 0 for value in bernstein if value != 0]
+    changes = sum(a != b for a, b in zip(signs[:-1], signs[1:]))
+    if changes == 0:
+        return []
+    if changes == 1 or depth == _DEEPEST:
+        return [_refine(p, low, low + width, precision)] if changes % 2 else []
+    left, right, row = [bernstein[0]], [bernstein[-1]], bernstein
+    while len(row) > 1:
+        row = [(a + b) / 2 for a, b in zip(row[:-1], row[1:])]
+        left.append(row[0])
+        right.append(row[-1])
+    half = width / 2
+    found = _isolate(p, left, low, half, depth + 1, precision)
+    found += _isolate(p, right[::-1], low + half, half, depth + 1, precision)
+    if row[0] == 0 and _side_at_end(left) != _side_at_end(right):  # in the middle itself, seen by neither half
+        found = sorted([*found, low + half])
+    return found
+
+
+def _side_at_end(row: Sequence[Number]) -> bool:
+    """Whether the last coefficient that is not zero is positive."""
+    return bool(next(value for value in reversed(row) if value != 0) > 0)
+
+
+def _refine(p: Sequence[Number], low: Number, high: Number, precision: Precision) -> Number:
+    """The only zero in an interval: Newton's method, halving where it leaves the interval."""
+    rising = value_at(p, high) > value_at(p, low)
+    resolution = precision.context.eps
+    u = (low + high) / 2
+    for _ in range(4 * math.ceil(precision.bits)):
+        value = value_at(p, u)
+        if value == 0:
+            return u
+        low, high = (low, u) if (value > 0) == rising else (u, high)
+        slope = rate_at(p, u)
+        following = u - value / slope if slope != 0 else low
+        if not low < following < high:
+            following = (low + high) / 2
+        if abs(following - u) <= resolution:
+            return following
+        u = following
+    return u
+
+
+@functools.cache
+def _fractions(n: int) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """Row j of the change to Bernstein form for n coefficients: binomials (j over i) and (n - 1 over i), i <= j."""
+    return tuple(tuple((math.comb(j, i), math.comb(n - 1, i)) for i in range(j + 1)) for j in range(n))
+
+
+@functools.cache
+def _double_table(n: int) -> NDArray[np.float64]:
+    table = np.zeros((n, n))
+    for j, row in enumerate(_fractions(n)):
+        table[j, : j + 1] = [a / b for a, b in row]
+    return table
+
+
+@functools.lru_cache(maxsize=8)
+def _table(precision: Precision, n: int) -> list[list[Any]]:
+    return [[precision.number(a) / b for a, b in row] for row in _fractions(n)]

@@ -1,0 +1,136 @@
+"""Series of the motion from one instant on: how far they reach, and on which side of zero they set out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from hybridsim.analysis.multiple_precision.nodes import Given, Negative, Node, Product, Quotient, Sum
+from hybridsim.analysis.multiple_precision.precision import Number, Precision
+
+Coefficients = Sequence[Number]
+
+# 2 to the power of this is no step that anybody takes; it stands for "nothing moves".
+_FOREVER = 1000.0
+
+
+@dataclass(frozen=True)
+class Term:
+    """A part of a sum whose size says what rounding of the sum amounts to; ``late`` where it is a part of the rate."""
+
+    factor: Number
+    c: Coefficients
+    late: bool
+
+
+@dataclass(frozen=True)
+class Watched:
+    """The series of a state, a guard, a monitor or a surface, and the terms that it is the sum of."""
+
+    c: Coefficients
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """Series of the states, of the guards of each component's mode, of the monitors and of the surfaces."""
+
+    precision: Precision
+    states: tuple[Watched, ...]
+    guards: tuple[tuple[Watched, ...], ...]
+    monitors: tuple[Watched, ...]
+    surfaces: tuple[Watched, ...]
+
+    @property
+    def watched(self) -> tuple[Watched, ...]:
+        """All that a step must resolve besides the states."""
+        return (*(guard for row in self.guards for guard in row), *self.monitors)
+
+    @cached_property
+    def reach(self) -> Number:
+        """How far the series hold by themselves."""
+        return self.reach_above([self.precision.context.zero] * len(self.states))
+
+    def reach_above(self, sizes: Sequence[Number]) -> Number:
+        """How far the series hold: the last two terms are below 10^-digits of the largest, or of a state's given size."""
+        log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
+        log2_reach += [self._log2_reach(watched.c, self.precision.context.zero) for watched in self.watched]
+        longest = min(log2_reach, default=_FOREVER)
+        whole = int(longest // 1)
+        return self.precision.context.ldexp(self.precision.number(2.0 ** (longest - whole)), whole)
+
+    def _log2_reach(self, c: Coefficients, size: Number) -> float:
+        log2, last = self.precision.log2, len(c) - 1
+        if last < 2:
+            return _FOREVER
+        heads = [(n, log2(value)) for n, value in enumerate(c[: last - 1]) if value != 0]
+        if size != 0:
+            heads.append((0, log2(size)))
+        reach = _FOREVER
+        for m in (last - 1, last):
+            if heads and c[m] != 0:
+                tail = self.precision.bits + log2(c[m])
+                reach = min(reach, max((head - tail) / (m - n) for n, head in heads))
+        return reach
+
+    def side_after(self, watched: Watched) -> tuple[int, int]:
+        """Sign just after the start, and the order of the first coefficient that is not zero (0: all are zero).
+
+        A coefficient is zero where it is below 10^-20 (for 32 digits) of the terms of the sum that it comes from.
+        """
+        scale, power = self.scale(watched), self.precision.context.one
+        for n, value in enumerate(watched.c):
+            if abs(value) * power > self.precision.zero * scale:
+                return (1 if value > 0 else -1), n
+            power = power * self.reach
+        return 0, 0
+
+    def is_zero(self, watched: Watched) -> bool:
+        """Whether it is zero at the start."""
+        return bool(abs(watched.c[0]) <= self.precision.zero * self.scale(watched))
+
+    def scale(self, watched: Watched) -> Number:
+        """The size of the largest of its terms within reach."""
+        return max((self._size(term) for term in watched.terms), default=self.precision.context.zero)
+
+    def _size(self, term: Term) -> Number:
+        power, largest = self.precision.context.one, self.precision.context.zero
+        for value in term.c:
+            largest = max(largest, abs(value) * power)
+            power = power * self.reach
+        return abs(term.factor) * largest * (self.reach if term.late else 1)
+
+
+def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
+    """The terms of a sum, constants multiplied out; a state also counts the terms of its rate."""
+    found: list[Term] = []
+    open_ = [(node, node.context.one, False)]
+    while open_:
+        part, factor, late = open_.pop()
+        if isinstance(part, (Sum, Negative)):
+            open_ += [(other, factor, late) for other in part.operands]
+        elif isinstance(part, Product) and part.operands[0].constant:
+            open_.append((part.operands[1], factor * part.operands[0].c[0], late))
+        elif isinstance(part, (Product, Quotient)) and part.operands[1].constant:
+            constant = part.operands[1].c[0]
+            factor = factor * constant if isinstance(part, Product) else factor / constant
+            open_.append((part.operands[0], factor, late))
+        else:
+            found.append(Term(factor, part.c, late))
+            if isinstance(part, Given) and id(part) in rates and not late:
+                open_.append((rates[id(part)], factor, True))
+    return tuple(found)
+
+
+def value_at(c: Coefficients, s: Number) -> Number:
+    """The value of a series after a time s."""
+    total = c[-1]
+    for value in reversed(c[:-1]):
+        total = total * s + value
+    return total
+
+
+def rate_at(c: Coefficients, s: Number) -> Number:
+    """The slope of a series after a time s."""
+    return value_at([n * value for n, value in enumerate(c)][1:] or [0 * s], s)

@@ -1,0 +1,283 @@
+"""What holds just after an event: transitions and resets at x-, then modes that are admissible, tried one by one.
+
+The rules, in words:
+
+1.  Guards of the present modes that are zero here and would be negative just after have fired. Of an automaton with
+    choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors among
+    them, are evaluated at x- and made at once; two that set one variable to different values are an error.
+2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
+3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
+    combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of theirs
+    becomes negative. Of the admissible ones that is taken which keeps most modes, then which holds most surfaces (stick
+    before slip). A tie, or none at all, ends the run.
+4.  Rounds of 1 to 3 are repeated until no guard of any component is about to be negative.
+
+Whether a quantity is zero, and on which side of zero it sets out, is read from its Taylor coefficients in the mode that is
+tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits) is zero, and the next decides. No rule
+says in advance what is zero at an event.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.multiple_precision.expansion import Expansion
+from hybridsim.analysis.multiple_precision.precision import Number, Precision
+from hybridsim.analysis.multiple_precision.program import Point, Program
+from hybridsim.analysis.multiple_precision.reading import Reading
+from hybridsim.analysis.multiple_precision.signals import Signal
+from hybridsim.errors import SimulationError, UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+    from hybridsim.model import Model
+
+Modes = tuple[str, ...]
+_UNDECIDED = ""  # the mode of a contact before the first decision
+
+_MOST_TOGETHER = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
+_MOST_ROUNDS = 50  # that one instant may take; a cascade of resets is far shorter
+
+
+@dataclass(frozen=True)
+class Move:
+    """A change of one component's mode."""
+
+    component: int
+    source: str
+    target: str
+    guard: str
+
+
+@dataclass
+class Settled:
+    """What holds after an event."""
+
+    point: Point
+    modes: Modes
+    expansion: Expansion
+    moves: list[Move] = field(default_factory=list)
+
+
+class Rules:
+    """The decisions of one model."""
+
+    def __init__(self, model: Model, precision: Precision, signals: Sequence[Signal]) -> None:
+        self.model, self.precision, self.signals = model, precision, signals
+        self.components = model.all_components()
+        self.states = [state.name for state in model.states]
+        self.discrete = [part.name for part in model.discrete]
+        self._programs: dict[Modes, Program] = {}
+
+    @property
+    def first_modes(self) -> Modes:
+        """Modes before the first decision."""
+        return tuple(component.initial or _UNDECIDED for component in self.components)
+
+    def program(self, modes: Modes) -> Program:
+        """The equations in these modes."""
+        if modes not in self._programs:
+            reading = Reading(self.model, modes, self.precision, self.signals)
+            self._programs[modes] = Program(reading, self.precision)
+        return self._programs[modes]
+
+    def settle(
+        self,
+        point: Point,
+        modes: Modes,
+        located: Iterable[tuple[int, int]] = (),
+        resets: Iterable[Mapping[str, Expression]] = (),
+    ) -> Settled:
+        """Settle an event at x-: the guards (component, number) located at zero, and resets that are due."""
+        moves: list[Move] = []
+        fired = set(located)
+        if fired:
+            fired.update(self.leaving(self.program(modes).expand(point)))
+        due = list(resets)
+        for _ in range(_MOST_ROUNDS):
+            names = {c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)}
+            point, modes = self._transit(point, modes, fired, due, moves)
+            modes, open_ = self._take_sides(point, modes, moves)
+            open_ |= {c for c in names if self.components[c].surface}
+            point, modes = self._decide(point, modes, open_, names, moves)
+            expansion = self.program(modes).expand(point)
+            fired, due = set(self.leaving(expansion)), []
+            if not fired:
+                return Settled(point, modes, expansion, moves)
+        moving = ", ".join(sorted({self.components[move.component].name for move in moves[-8:]}))
+        raise UsageError(
+            f"at t = {float(point.t)!r} the transitions of {moving} follow each other over and over: motion along a "
+            "surface of a general automaton is not supported by the multiple-precision run",
+            remedy="compare against runs",
+        )
+
+    def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
+        """Guards that are negative just after; a mode that is left open has none."""
+        return [
+            (c, j)
+            for c, row in enumerate(expansion.guards)
+            for j, guard in enumerate(row)
+            if expansion.side_after(guard)[0] < 0
+        ]
+
+    # -- transitions and resets -----------------------------------------------------------------------------
+
+    def _transit(
+        self,
+        point: Point,
+        modes: Modes,
+        fired: Iterable[tuple[int, int]],
+        resets: list[Mapping[str, Expression]],
+        moves: list[Move],
+    ) -> tuple[Point, Modes]:
+        """Take the declared choices of the guards that fired, and make all resets at once."""
+        after = list(modes)
+        ways: dict[int, tuple[str, Mapping[str, Expression]]] = {}
+        for c, j in sorted(fired):
+            component = self.components[c]
+            guard = component.mode(modes[c]).guards[j]
+            if guard.fatal:
+                raise SimulationError(f"at t = {float(point.t)!r}: {guard.fatal}")
+            if component.surface:
+                continue
+            choice = next((way for way in guard.then if way.when is None or self._value(way.when, point, modes)), None)
+            if choice is None:
+                raise SimulationError(
+                    f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "
+                    "the conditions of its choices holds"
+                )
+            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset):
+                raise SimulationError(
+                    f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
+                )
+            if after[c] is modes[c]:
+                moves.append(Move(c, modes[c], choice.to, guard.name))
+            after[c] = choice.to
+        values = self._reset_values(point, modes, [*(reset for _, reset in ways.values()), *resets])
+        x = tuple(values.get(name, value) for name, value in zip(self.states, point.x, strict=True))
+        discrete = tuple(
+            values.get(name, value) for name, value in zip(self.discrete, point.discrete, strict=True)
+        )
+        return replace(point, x=x, discrete=discrete), tuple(after)
+
+    def _reset_values(
+        self, point: Point, modes: Modes, resets: list[Mapping[str, Expression]]
+    ) -> dict[str, Number]:
+        values: dict[str, Number] = {}
+        for reset in resets:
+            for name, expr in reset.items():
+                value = self._value(expr, point, modes)
+                if values.setdefault(name, value) != value:
+                    raise SimulationError(
+                        f"two resets at t = {float(point.t)!r} set {name} to {float(values[name])!r} and to "
+                        f"{float(value)!r}"
+                    )
+        return values
+
+    def _value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
+        return self.program(modes).value(expr, point)
+
+    # -- surfaces -------------------------------------------------------------------------------------------
+
+    def _surfaces(self) -> list[int]:
+        return [c for c, component in enumerate(self.components) if component.surface]
+
+    def _held(self, modes: Modes, components: Iterable[int]) -> Modes:
+        """The same modes with some components holding."""
+        changed = list(modes)
+        for c in components:
+            surface = self.components[c].surface
+            assert surface is not None
+            changed[c] = surface.hold
+        return tuple(changed)
+
+    def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
+        """Give components off their surface the mode of their side; return those on it without a mode."""
+        order = self._surfaces()
+        if not order:
+            return modes, set()
+        expansion = self.program(self._decided(modes)).expand(point)
+        after, open_ = list(modes), set()
+        for c, watched in zip(order, expansion.surfaces, strict=True):
+            surface = self.components[c].surface
+            assert surface is not None
+            if expansion.is_zero(watched):
+                if modes[c] == _UNDECIDED:
+                    open_.add(c)
+                continue
+            side = surface.above if watched.c[0] > 0 else surface.below
+            if after[c] != side:
+                if after[c] != _UNDECIDED:
+                    moves.append(Move(c, after[c], side, "reset"))
+                after[c] = side
+        return tuple(after), open_
+
+    def _decided(self, modes: Modes) -> Modes:
+        """Components without a mode are read as holding; their surfaces are the same functions in every mode."""
+        return self._held(modes, [c for c, mode in enumerate(modes) if mode == _UNDECIDED])
+
+    def _decide(
+        self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
+    ) -> tuple[Point, Modes]:
+        """Decide the open components that are on their surfaces, each with those that its force acts on."""
+        deciding = {c for c in open_ if self._on_surface(c, point, modes)}
+        while deciding:
+            chosen = self._with_coupled(min(deciding), deciding, point, modes)
+            if len(chosen) > _MOST_TOGETHER:
+                coupled = ", ".join(self.components[c].name for c in chosen)
+                raise UsageError(
+                    f"{len(chosen)} coupled contacts start or stop at once ({coupled}), the multiple-precision run "
+                    f"decides {_MOST_TOGETHER}",
+                    remedy="compare against runs",
+                )
+            point = self.program(self._held(self._decided(modes), chosen)).project(point)
+            best = self._best(point, modes, chosen)
+            for c in chosen:
+                if modes[c] not in (best[c], _UNDECIDED):
+                    moves.append(Move(c, modes[c], best[c], names.get(c, "")))
+            modes = tuple(best[c] if c in chosen else mode for c, mode in enumerate(modes))
+            deciding -= set(chosen)
+        return point, modes
+
+    def _on_surface(self, c: int, point: Point, modes: Modes) -> bool:
+        expansion = self.program(self._decided(modes)).expand(point)
+        return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
+
+    def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
+        """A component with all, to be decided or holding, whose forces act on its surface or on each other's."""
+        together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
+        program = self.program(self._held(self._decided(modes), together))
+        program.begin(point)
+        held = [c for c in self._surfaces() if self._holds(c, program.modes)]
+        coupled = {c: {held[j] for j in program.coupled(i)} for i, c in enumerate(held)}
+        found = {first}
+        while more := set().union(*(coupled[c] for c in found)) & set(together) - found:
+            found |= more
+        return sorted(found)
+
+    def _holds(self, c: int, modes: Modes) -> bool:
+        surface = self.components[c].surface
+        return surface is not None and modes[c] == surface.hold
+
+    def _best(self, point: Point, modes: Modes, chosen: Sequence[int]) -> Modes:
+        """The admissible combination that keeps most modes, then holds most surfaces."""
+        scores: dict[tuple[int, int], list[Modes]] = {}
+        for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
+            candidate = list(self._decided(modes))
+            for c, mode in zip(chosen, combination, strict=True):
+                candidate[c] = mode
+            trial = tuple(candidate)
+            expansion = self.program(trial).expand(point)
+            if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
+                kept = sum(trial[c] == modes[c] for c in chosen)
+                held = sum(self._holds(c, trial) for c in chosen)
+                scores.setdefault((kept, held), []).append(trial)
+        best = scores[max(scores)] if scores else []
+        if len(best) != 1:
+            what = "several motions are" if best else "no motion is"
+            names = ", ".join(self.components[c].name for c in chosen)
+            raise SimulationError(f"at t = {float(point.t)!r} {what} admissible for {names}")
+        return best[0]

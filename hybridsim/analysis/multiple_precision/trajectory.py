@@ -1,0 +1,69 @@
+"""The trajectory of any declared model in multiple precision, for a comparison to be measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.trajectory import Trajectory
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+# Fewer digits than this leave nothing between rounding and what counts as zero; more take ever longer.
+_FEWEST, _MOST = 20, 200
+
+
+def multiple_precision_trajectory(
+    model: Model,
+    t_span: tuple[float, float],
+    digits: int = 32,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Follow a model by Taylor series in multiple precision, deciding its events without the engine.
+
+    It reads the declaration alone: expressions become series in mpmath numbers, an event is where a guard's series
+    leaves zero downward, and what follows it is found by trying the modes (`multiple_precision.settling` has the rules
+    in words). So it agrees with the engine only where both are right. Numbers are the doubles that the engine uses:
+    parameters, initial values and times are worked out in double precision first and exact from there on.
+
+    Parameters
+    ----------
+    t_span : (t0, t1), t1 >= t0.
+    digits : digits that are carried; what comes out is good to nearly as many where the motion does not amplify errors.
+    progress : called with the fraction of the span that has been done.
+
+    Returns
+    -------
+    Trajectory. Its ``states`` is a `Motion`, whose method ``state(t)`` gives all digits. It ends early where a monitor or
+    a schedule ends the run.
+
+    Errors
+    ------
+    UsageError naming what is not supported: flows or guards with corners or conditionals, motion along a surface of a
+    general automaton, more than four coupled contacts at once, events that accumulate, running backward in time.
+    SimulationError where the model has no unique motion, or a fatal guard ends it.
+
+    When to use
+    -----------
+    As a reference that owes nothing to the engine's event code. A step takes some milliseconds.
+    """
+    from hybridsim.analysis.multiple_precision.precision import Precision
+    from hybridsim.analysis.multiple_precision.run import Run
+
+    if not _FEWEST <= digits <= _MOST:
+        raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_FEWEST} to {_MOST}")
+    if t_span[1] < t_span[0]:
+        raise UsageError(
+            f"t_span {t_span} runs backward, and the multiple-precision run does not", remedy="let t1 be after t0"
+        )
+    model.validate()
+    run = Run(model, t_span, Precision.of(digits), progress)
+    run.follow()
+    return Trajectory(
+        states=run.motion,
+        t_span=(t_span[0], float(run.now.point.t)),
+        events=tuple(run.events),
+        initial_modes=run.initial_modes,
+    )
