@@ -11,7 +11,7 @@ from hybridsim.analysis.multiple_precision.precision import Number, Precision
 
 Coefficients = Sequence[Number]
 
-# 2 to the power of this is no step that anybody takes; it stands for "nothing moves".
+# 2 to the power of this is no step that anybody takes; it stands for "as far as one likes".
 _FOREVER = 1000.0
 
 
@@ -34,13 +34,19 @@ class Watched:
 
 @dataclass(frozen=True)
 class Expansion:
-    """Series of the states, of the guards of each component's mode, of the monitors and of the surfaces."""
+    """Series of the states, of the guards of each component's mode, of the monitors and of the surfaces.
+
+    Parameters
+    ----------
+    longest : no series is looked at farther than this: the length of the run.
+    """
 
     precision: Precision
     states: tuple[Watched, ...]
     guards: tuple[tuple[Watched, ...], ...]
     monitors: tuple[Watched, ...]
     surfaces: tuple[Watched, ...]
+    longest: Number
 
     @property
     def watched(self) -> tuple[Watched, ...]:
@@ -56,9 +62,9 @@ class Expansion:
         """How far the series hold: the last two terms are below 10^-digits of the largest, or of a state's given size."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
         log2_reach += [self._log2_reach(watched.c, self.precision.context.zero) for watched in self.watched]
-        longest = min(log2_reach, default=_FOREVER)
-        whole = int(longest // 1)
-        return self.precision.context.ldexp(self.precision.number(2.0 ** (longest - whole)), whole)
+        reach = min(log2_reach, default=_FOREVER)
+        whole = int(reach // 1)
+        return min(self.longest, self.precision.context.ldexp(self.precision.number(2.0 ** (reach - whole)), whole))
 
     def _log2_reach(self, c: Coefficients, size: Number) -> float:
         log2, last = self.precision.log2, len(c) - 1

@@ -39,8 +39,9 @@ class Point:
 class Program:
     """Taylor series of the states, and of what is watched, in one vector of modes."""
 
-    def __init__(self, reading: Reading, precision: Precision) -> None:
+    def __init__(self, reading: Reading, precision: Precision, longest: Number) -> None:
         self.reading, self.precision, self.context = reading, precision, precision.context
+        self.longest = longest
         self.modes = reading.modes
         self.states = list(reading.states.values())
         self.unknowns = list(reading.unknowns.values())
@@ -101,6 +102,7 @@ class Program:
             tuple(tuple(map(watched, row)) for row in reading.guards),
             tuple(map(watched, reading.monitors)),
             tuple(map(watched, reading.surfaces.values())),
+            self.longest,
         )
 
     def value(self, expr: Expression, point: Point) -> Number | bool:

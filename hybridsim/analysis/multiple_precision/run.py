@@ -42,7 +42,7 @@ class Run:
         self.model, self.precision, self.progress = model, precision, progress
         self.t0, self.t1 = (number(t) for t in t_span)
         self.signals = [Signal(model, declared, precision) for declared in model.inputs]
-        self.rules = Rules(model, precision, self.signals)
+        self.rules = Rules(model, precision, self.signals, self.t1 - self.t0)
         self.appointments = Appointments(model, self.signals, precision, self.t0, self.t1)
         self.motion = Motion(precision)
         self.events: list[ExactEvent] = []

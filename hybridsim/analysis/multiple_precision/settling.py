@@ -65,8 +65,10 @@ class Settled:
 class Rules:
     """The decisions of one model."""
 
-    def __init__(self, model: Model, precision: Precision, signals: Sequence[Signal]) -> None:
-        self.model, self.precision, self.signals = model, precision, signals
+    def __init__(
+        self, model: Model, precision: Precision, signals: Sequence[Signal], longest: Number
+    ) -> None:
+        self.model, self.precision, self.signals, self.longest = model, precision, signals, longest
         self.components = model.all_components()
         self.states = [state.name for state in model.states]
         self.discrete = [part.name for part in model.discrete]
@@ -81,7 +83,7 @@ class Rules:
         """The equations in these modes."""
         if modes not in self._programs:
             reading = Reading(self.model, modes, self.precision, self.signals)
-            self._programs[modes] = Program(reading, self.precision)
+            self._programs[modes] = Program(reading, self.precision, self.longest)
         return self._programs[modes]
 
     def settle(
