@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from hybridsim.analysis.multiple_precision.nodes import Given, Negative, Node, Product, Quotient, Sum
@@ -17,9 +17,9 @@ _FOREVER = 1000.0
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a sum whose size says what rounding of the sum amounts to; ``late`` where it is a part of the rate."""
+    """A part of a sum, whose size says what rounding of the sum amounts to; ``late`` where it is a part of its rate."""
 
-    factor: Number
+    log2_factor: int
     c: Coefficients
     late: bool
 
@@ -47,6 +47,7 @@ class Expansion:
     monitors: tuple[Watched, ...]
     surfaces: tuple[Watched, ...]
     longest: Number
+    _logs: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
 
     @property
     def watched(self) -> tuple[Watched, ...]:
@@ -67,18 +68,23 @@ class Expansion:
         return min(self.longest, self.precision.context.ldexp(self.precision.number(2.0 ** (reach - whole)), whole))
 
     def _log2_reach(self, c: Coefficients, size: Number) -> float:
-        log2, last = self.precision.log2, len(c) - 1
+        logs, last = self._log2(c), len(c) - 1
         if last < 2:
             return _FOREVER
-        heads = [(n, log2(value)) for n, value in enumerate(c[: last - 1]) if value != 0]
+        heads = [(n, log) for n, log in logs if n < last - 1]
         if size != 0:
-            heads.append((0, log2(size)))
+            heads.append((0, self.precision.log2(size)))
         reach = _FOREVER
-        for m in (last - 1, last):
-            if heads and c[m] != 0:
-                tail = self.precision.bits + log2(c[m])
-                reach = min(reach, max((head - tail) / (m - n) for n, head in heads))
+        for m, log in logs[-2:]:
+            if heads and m >= last - 1:
+                reach = min(reach, max((head - log - self.precision.bits) / (m - n) for n, head in heads))
         return reach
+
+    def _log2(self, c: Coefficients) -> list[tuple[int, int]]:
+        """(n, binary magnitude) of the coefficients that are not zero."""
+        if id(c) not in self._logs:
+            self._logs[id(c)] = [(n, self.precision.log2(value)) for n, value in enumerate(c) if value != 0]
+        return self._logs[id(c)]
 
     def side_after(self, watched: Watched) -> tuple[int, int]:
         """Sign just after the start, and the order of the first coefficient that is not zero (0: all are zero).
@@ -97,31 +103,30 @@ class Expansion:
         return bool(abs(watched.c[0]) <= self.precision.zero * self.scale(watched))
 
     def scale(self, watched: Watched) -> Number:
-        """The size of the largest of its terms within reach."""
-        return max((self._size(term) for term in watched.terms), default=self.precision.context.zero)
-
-    def _size(self, term: Term) -> Number:
-        power, largest = self.precision.context.one, self.precision.context.zero
-        for value in term.c:
-            largest = max(largest, abs(value) * power)
-            power = power * self.reach
-        return abs(term.factor) * largest * (self.reach if term.late else 1)
+        """The size of the largest of its terms within reach, to the next power of two."""
+        log2_reach = self.precision.log2(self.reach)
+        sizes = [
+            max(log + n * log2_reach for n, log in logs) + term.log2_factor + log2_reach * term.late
+            for term in watched.terms
+            if (logs := self._log2(term.c))
+        ]
+        return self.precision.context.ldexp(1, max(sizes)) if sizes else self.precision.context.zero
 
 
 def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
-    """The terms of a sum, constants multiplied out; a state also counts the terms of its rate."""
+    """The terms of a sum, constant factors multiplied out; a state also counts the terms of its rate."""
     found: list[Term] = []
-    open_ = [(node, node.context.one, False)]
+    log2 = node.context.mag
+    open_ = [(node, 0, False)]
     while open_:
         part, factor, late = open_.pop()
         if isinstance(part, (Sum, Negative)):
             open_ += [(other, factor, late) for other in part.operands]
-        elif isinstance(part, Product) and part.operands[0].constant:
-            open_.append((part.operands[1], factor * part.operands[0].c[0], late))
-        elif isinstance(part, (Product, Quotient)) and part.operands[1].constant:
-            constant = part.operands[1].c[0]
-            factor = factor * constant if isinstance(part, Product) else factor / constant
-            open_.append((part.operands[0], factor, late))
+        elif isinstance(part, (Product, Quotient)) and (constant := part.operands[1]).constant:
+            size = log2(constant.c[0]) if constant.c[0] != 0 else 0
+            open_.append((part.operands[0], factor + (size if isinstance(part, Product) else -size), late))
+        elif isinstance(part, Product) and (constant := part.operands[0]).constant:
+            open_.append((part.operands[1], factor + (log2(constant.c[0]) if constant.c[0] != 0 else 0), late))
         else:
             found.append(Term(factor, part.c, late))
             if isinstance(part, Given) and id(part) in rates and not late:

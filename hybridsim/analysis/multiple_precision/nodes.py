@@ -155,12 +155,13 @@ class Power(Node):
 class Integral(Node):
     """f(u) with f' = slope, a node itself that may depend on f: n f_n = sum of k u_k slope_(n-k)."""
 
-    __slots__ = ("first", "slope")
+    __slots__ = ("first", "slope", "weights")
 
     def __init__(self, context: Any, u: Node, first: Callable[[Number], Number]) -> None:
         super().__init__(context, (u,))
         self.first = first
         self.slope: tuple[Node, bool] = (self, False)  # the node, and whether it counts with a minus
+        self.weights: list[Any] = []  # k u_k
 
     @property
     def delayed(self) -> tuple[Node, ...]:
@@ -171,11 +172,11 @@ class Integral(Node):
         if n == 0:
             self.c.append(self.first(u.c[0]))
             return
+        self.weights[n - 1 :] = [n * u.c[n]]
         if slope.constant:
-            total = n * u.c[n] * slope.c[0]
+            total = self.weights[n - 1] * slope.c[0]
         else:
-            weights = [k * u.c[k] for k in range(1, n + 1)]
-            total = self.context.fdot(weights, slope.c[n - 1 :: -1])
+            total = self.context.fdot(self.weights, slope.c[n - 1 :: -1])
         self.c.append(-total / n if minus else total / n)
 
 

@@ -73,6 +73,7 @@ class Rules:
         self.states = [state.name for state in model.states]
         self.discrete = [part.name for part in model.discrete]
         self._programs: dict[Modes, Program] = {}
+        self._expansions: dict[tuple[Modes, Point], Expansion] = {}
 
     @property
     def first_modes(self) -> Modes:
@@ -86,6 +87,13 @@ class Rules:
             self._programs[modes] = Program(reading, self.precision, self.longest)
         return self._programs[modes]
 
+    def expand(self, point: Point, modes: Modes) -> Expansion:
+        """The series from a point on; those of the event at hand are kept."""
+        key = (modes, point)
+        if key not in self._expansions:
+            self._expansions[key] = self.program(modes).expand(point)
+        return self._expansions[key]
+
     def settle(
         self,
         point: Point,
@@ -96,8 +104,9 @@ class Rules:
         """Settle an event at x-: the guards (component, number) located at zero, and resets that are due."""
         moves: list[Move] = []
         fired = set(located)
+        self._expansions.clear()
         if fired:
-            fired.update(self.leaving(self.program(modes).expand(point)))
+            fired.update(self.leaving(self.expand(point, modes)))
         due = list(resets)
         for _ in range(_MOST_ROUNDS):
             names = {c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)}
@@ -105,7 +114,7 @@ class Rules:
             modes, open_ = self._take_sides(point, modes, moves)
             open_ |= {c for c in names if self.components[c].surface}
             point, modes = self._decide(point, modes, open_, names, moves)
-            expansion = self.program(modes).expand(point)
+            expansion = self.expand(point, modes)
             fired, due = set(self.leaving(expansion)), []
             if not fired:
                 return Settled(point, modes, expansion, moves)
@@ -201,7 +210,7 @@ class Rules:
         order = self._surfaces()
         if not order:
             return modes, set()
-        expansion = self.program(self._decided(modes)).expand(point)
+        expansion = self.expand(point, self._decided(modes))
         after, open_ = list(modes), set()
         for c, watched in zip(order, expansion.surfaces, strict=True):
             surface = self.components[c].surface
@@ -245,7 +254,7 @@ class Rules:
         return point, modes
 
     def _on_surface(self, c: int, point: Point, modes: Modes) -> bool:
-        expansion = self.program(self._decided(modes)).expand(point)
+        expansion = self.expand(point, self._decided(modes))
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
@@ -272,7 +281,7 @@ class Rules:
             for c, mode in zip(chosen, combination, strict=True):
                 candidate[c] = mode
             trial = tuple(candidate)
-            expansion = self.program(trial).expand(point)
+            expansion = self.expand(point, trial)
             if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
                 kept = sum(trial[c] == modes[c] for c in chosen)
                 held = sum(self._holds(c, trial) for c in chosen)
