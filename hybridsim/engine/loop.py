@@ -19,6 +19,9 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Occurrence, Task, Trajectory
 
+# Local time rounds angles that grow in time: after this many turns, by 1e-13. A stretch without events begins anew then.
+_TURNS = 100
+
 
 class ModeLoop:
     """One run of a system with one stepping method."""
@@ -35,6 +38,11 @@ class ModeLoop:
             int, int
         ] = {}  # monitors whose resets an event set off, and their direction
         self.adopted: Instant | None = None  # the last instant at which an event was settled
+        self.renewal = (
+            _TURNS * 2.0 * math.pi / fastest
+            if (fastest := max(map(abs, system.rates), default=0.0))
+            else math.inf
+        )
         self.accumulation = Accumulation(1e-3 * task.tolerances.rtol * abs(task.t1 - task.t0))
         self.progress: Callable[[Instant], None] | None = None
         if progress is not None:
@@ -71,6 +79,9 @@ class ModeLoop:
         while not stop and self.origin != self.end:
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
+            if abs(target.minus(self.origin)) > self.renewal:
+                target = self.origin.plus(self.renewal if self.forward else -self.renewal)
+                appointment = Appointment(target, (), is_renewal=True)
             segment = self._segment_run()
             bound = target.minus(self.origin)
             try:
@@ -172,7 +183,8 @@ class ModeLoop:
                 return True
             sides, x_minus = outcome.monitor_sides, outcome.x
         if appointment:
-            self.timetable.kept(instant)
+            if not appointment.is_renewal:
+                self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
             outcome = self._settle_appointment(instant, x_minus, schedules, segment)
             outcome = self._apply_crossed(outcome, 0.0, sides, ())

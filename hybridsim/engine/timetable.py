@@ -16,10 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Appointment:
-    """An instant to be stepped to, and the schedules that are due then (none: a knot of an input)."""
+    """An instant to be stepped to, and the schedules that are due then (none: a knot of an input).
+
+    At a renewal nothing happens but that local time begins anew.
+    """
 
     instant: Instant
     schedules: tuple[int, ...]
+    is_renewal: bool = False
 
 
 class Timetable:

@@ -52,19 +52,25 @@ class NativeStepper:
         if np.isinf(longest) and period:
             longest = period / _STEPS_PER_PERIOD
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            result = solve_ivp(
-                self._rhs,
-                (0.0, bound),
-                x0,
-                method=solver_class,
-                dense_output=True,
-                events=events,
-                rtol=tolerances.rtol,
-                atol=tolerances.atol,
-                max_step=longest,
-                first_step=first_step,
-                **({"jac": flow.jacobian} if implicit else {}),
-            )
+            try:
+                result = solve_ivp(
+                    self._rhs,
+                    (0.0, bound),
+                    x0,
+                    method=solver_class,
+                    dense_output=True,
+                    events=events,
+                    rtol=tolerances.rtol,
+                    atol=tolerances.atol,
+                    max_step=longest,
+                    first_step=first_step,
+                    **({"jac": flow.jacobian} if implicit else {}),
+                )
+            except (
+                RuntimeError,
+                ValueError,
+            ) as failure:  # of its root finder, or of a matrix that is no number
+                raise StepFailure(f"solve_ivp raises {type(failure).__name__}: {failure}") from None
         self.failure = result.message if result.status < 0 else ""
         self.steps = iter(self._cut(result, guards, monitors))
 
@@ -107,6 +113,11 @@ class NativeStepper:
         )
         s0 = 0.0
         if 0.0 in found:
+            if result.status == 1 and result.t[-1] == 0.0:
+                raise StepFailure(
+                    "solve_ivp stops at an event where it starts: its sign test is closed at both ends of a step, "
+                    "so what is zero at a restart and does not rise fires at once"
+                )
             steps.append(Step(0.0, 0.0, x0, x0, _dense(result.sol), tuple(found[0.0])))
         for s1 in map(float, ends):
             x1 = result.sol(s1)

@@ -49,12 +49,17 @@ class SolverStepper:
             max_step=self.tolerances.max_step,
             rtol=self.tolerances.rtol,
             atol=self.tolerances.atol,
-            **({"jac": self.flow.jacobian} if self.implicit else {}),
+            **({"jac": self._jacobian} if self.implicit else {}),
         )
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1
         return self.flow.rhs(s, x)
+
+    def _jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
+        """Zero where it is no number: no step from there succeeds, and SciPy then tries a shorter one."""
+        jacobian = self.flow.jacobian(s, x)
+        return jacobian if np.isfinite(jacobian).all() else np.zeros_like(jacobian)
 
     def step(self) -> Step:
         """One accepted step."""

@@ -110,8 +110,8 @@ def adaptive(rtol: float, scene: Scene) -> Setting:
     return Setting(f"rtol {rtol:.0e}", {"rtol": rtol}, max(rtol, scene.floor), FALL)
 
 
-def outcome(name: str, scene: Scene) -> Outcome:
-    """Run one scene with one integrator at all settings and judge it."""
+def outcome(name: str, scene: Scene, **options: Any) -> Outcome:
+    """Run one scene with one integrator (and its options) at all settings and judge it."""
     one = integrator(name)
     lacks = lacking(one)
     for capability in sorted(scene.needs):
@@ -127,7 +127,7 @@ def outcome(name: str, scene: Scene) -> Outcome:
     for number, setting in enumerate(settings):
         try:
             with bounded_work():
-                measured = judge.measure(scene, judge.run(scene, name, **setting.options), lacks)
+                measured = judge.measure(scene, judge.run(scene, name, **setting.options, **options), lacks)
         except HybridsimError as error:
             wrong.append(f"{setting.text}: refused: {error}")
             break

@@ -16,6 +16,7 @@ from pathlib import Path
 import hybridsim as hs
 from conformance.catalogue import LEFT_OUT, SCENES
 from conformance.facts import CASES
+from conformance.native import MECHANISMS, mechanism
 from conformance.suite import Outcome, outcome
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conformance.md"
@@ -42,6 +43,34 @@ def cell(result: Outcome) -> str:
         return "**wrong**"
     _, time_error, state_error = result.errors[-1]
     return f"{time_error:.0e}, {state_error:.0e}"
+
+
+NATIVE = """
+## SciPy's own event finding
+
+The same solvers with `events="native"`: one call of `solve_ivp` with terminal events for each smooth stretch, called
+anew after each event, directions given, and steps bounded by a tenth of the forcing's period where there is one. What
+follows an event is decided as with all others. Scenes that all of them get right as above are left out.
+"""
+
+
+def native(names: Sequence[str]) -> list[str]:
+    """The part of the page on `solve_ivp`'s own event finding: every failure with its mechanism."""
+    solvers = [name for name in names if name.startswith("scipy-")]
+    lines = []
+    for scene in SCENES:
+        results = [outcome(name, scene, events="native") for name in solvers]
+        if any(result.verdict == "wrong" for result in results):
+            lines.append((scene.name, *map(native_cell, results)))
+    table = rows(("scene", *solvers), lines)
+    return [NATIVE, table, "", rows(("mechanism", "what happens"), MECHANISMS.items())] if solvers else []
+
+
+def native_cell(result: Outcome) -> str:
+    """One field of the table: right, lacking, or the mechanism of the failure."""
+    if result.verdict == "wrong":
+        return f"**wrong**: {mechanism(result.integrator, result.scene) or 'not understood'}"
+    return cell(result)
 
 
 def rows(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
@@ -74,6 +103,7 @@ def page(names: Sequence[str]) -> str:
     ]
     if faults:
         parts += ["\n## What is wrong\n", rows(("integrator", "scene", "what"), faults)]
+    parts += native(names)
     sources = ((case, fact["name"], fact["source"]) for case, fact in CASES.items() if case not in LEFT_OUT)
     parts += ["\n## Where the scenes come from\n", rows(("case", "what it is", "source"), sources)]
     parts += ["\n## Cases left to later work\n", rows(("case", "why"), LEFT_OUT.items())]

@@ -7,6 +7,7 @@ import pytest
 import hybridsim as hs
 from conformance import judge
 from conformance.catalogue import SCENES
+from conformance.native import mechanism
 from conformance.scene import VOCABULARY, Scene
 from conformance.suite import integrator, outcome
 from hybridsim.errors import HybridsimError
@@ -29,6 +30,14 @@ def test_scene(scene: Scene, name: str) -> None:
             with pytest.raises(HybridsimError) as refusal:
                 judge.run(scene, name)
             assert any(reasons[capability] in str(refusal.value) for capability in missing)
+
+
+@pytest.mark.parametrize("name", [name for name in INTEGRATORS if name.startswith("scipy-")])
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_events_found_by_scipy(scene: Scene, name: str) -> None:
+    """Right, or wrong for a reason that is known; what is called wrong is."""
+    result = outcome(name, scene, events="native")
+    assert (result.verdict == "wrong") == bool(mechanism(name, scene.name)), "\n".join(result.reasons)
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

@@ -1,0 +1,134 @@
+"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, an orbit without a stop over 10^6.
+
+    python studies/long_runs.py [periods]        (10^6 by default: most of an hour; 10^4 take half a minute)
+
+Errors are over the last hundred periods before each checkpoint, relative to the amplitude, against closed forms in 40
+digits (tests/reference). A run of a million periods is cut into runs of a thousand, each of which starts at a time
+that is no running sum, so that memory does not grow.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import mpmath
+import numpy as np
+
+import hybridsim as hs
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from reference.arithmetic import multiprecision
+from reference.dfcs_closed_form import Oscillator
+
+CHECKPOINTS = (100, 1000, 10**4, 10**5, 10**6)
+WINDOW = 100  # periods over which an error is taken
+CHUNK = 1000  # periods of one run
+POINTS = 997  # in a window, at all phases
+SETTLED = 400  # periods after which the transient is below 1e-15: exp(-zeta*wn*400*T) at zeta = 0.02
+
+
+def no_stop(last: int) -> None:
+    """F0 = 60, N = 40, omega = 1.4 wn: the body turns round twice a period and never sticks."""
+    model = hs.load("dfcs").with_(F0=60, N=40, omega="1.4*sqrt(k/m)")
+    values = model.parameter_values()
+    omega = values["omega"]
+    period, limit = 2 * math.pi / omega, values["mu"] * values["N"]
+    numbers = multiprecision(40)
+    oscillator = Oscillator(
+        values["m"], values["c"], values["k"], limit, limit, values["F0"], omega, numbers=numbers
+    )
+    motion = oscillator.run(0, (SETTLED + 2) * period, 0)
+
+    def exact(t: float) -> tuple[float, float]:
+        """From rest at t = 0; later than SETTLED periods, the orbit at the same phase."""
+        with mpmath.workdps(40):
+            turns = mpmath.mpf(t) * mpmath.mpf(omega) / (2 * mpmath.pi)
+            if turns > SETTLED:
+                turns = SETTLED + turns - mpmath.floor(turns)
+            x, v, _ = motion.state(turns * 2 * mpmath.pi / mpmath.mpf(omega))
+            return float(x), float(v)
+
+    state, done, began = np.zeros(2), 0, time.perf_counter()
+    for checkpoint in [n for n in CHECKPOINTS if n <= last]:
+        while done < checkpoint:
+            count = min(CHUNK, checkpoint - done)
+            t0, t1 = done * period, (done + count) * period
+            sol = hs.simulate(model, (t0, t1), x0=state, rtol=1e-9)
+            assert sol.success, sol.message
+            modes = [interval.mode for interval in sol.modes["f"]]
+            assert done == 0 or "stick" not in modes
+            state, done = sol(t1), done + count
+        times = np.linspace(max(t0, t1 - WINDOW * period), t1, POINTS)
+        truth = np.array([exact(t) for t in times]).T
+        error = np.max(np.abs(sol(times) - truth) / np.max(np.abs(truth), axis=1)[:, None])
+        print(
+            f"no stop, {checkpoint:8d} periods: error {error:.1e}  ({time.perf_counter() - began:.0f} s)",
+            flush=True,
+        )
+
+
+def square(last: int, damping: float, rtol: float) -> None:
+    """x'' + 2 d x' + x = +-1, switched at resonance; without damping the amplitude grows by 4 a period, for ever.
+
+    Damped, an error is forgotten and the accuracy lasts. Undamped, nothing is: each step's truncation error adds to
+    the phase, and the relative error grows with the number of periods, at any tolerance.
+    """
+    model = hs.Model(
+        "square",
+        states=[hs.State("x", 0, der="v"), hs.State("v", 0, der="u - x - 2*d*v")],
+        parameters={"d": damping},
+        inputs=[hs.Input("u", "wave", shape="square", period=2 * math.pi)],
+    )
+    began = time.perf_counter()
+    sol = hs.simulate(model, (0, last * 2 * math.pi), rtol=rtol)
+    assert sol.success, sol.message
+    half = mpmath.mpf(math.pi)  # of the double that the model's period is
+    with mpmath.workdps(40):
+        starts = [(mpmath.mpf(0), mpmath.mpf(0))]
+        for k in range(2 * last):
+            starts.append(turned(*starts[-1], (-1) ** k, half, damping))
+    for checkpoint in [n for n in CHECKPOINTS if n <= last]:
+        times = np.linspace((checkpoint - WINDOW) * 2 * math.pi, checkpoint * 2 * math.pi, POINTS)
+        with mpmath.workdps(40):
+            truth = np.array([square_state(mpmath.mpf(t), starts, half, damping) for t in times])
+        error = np.max(np.abs(sol(times).T - truth)) / np.max(np.abs(truth))
+        say(f"square wave, d = {damping:g}, rtol {rtol:.0e}", checkpoint, error, began)
+
+
+def square_state(
+    t: mpmath.mpf, starts: list[tuple[mpmath.mpf, mpmath.mpf]], half: mpmath.mpf, damping: float
+) -> list[float]:
+    """The exact state at t from that at the last switch."""
+    k = min(int(t / half), len(starts) - 1)
+    return [float(value) for value in turned(*starts[k], (-1) ** k, t - k * half, damping)]
+
+
+def turned(
+    x: mpmath.mpf, v: mpmath.mpf, u: int, s: mpmath.mpf, damping: float
+) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """The free motion about u for a time s."""
+    d = mpmath.mpf(damping)
+    w = mpmath.sqrt(1 - d * d)
+    cosine, sine, decay = mpmath.cos(w * s), mpmath.sin(w * s), mpmath.exp(-d * s)
+    y = x - u
+    return (
+        u + decay * (y * cosine + (v + d * y) / w * sine),
+        decay * (v * cosine - (d * v + y) / w * sine),
+    )
+
+
+def say(what: str, periods: int, error: float, began: float) -> None:
+    """One line of the result."""
+    print(
+        f"{what}, {periods:8d} periods: error {error:.1e}  ({time.perf_counter() - began:.0f} s)", flush=True
+    )
+
+
+if __name__ == "__main__":
+    longest = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10**6
+    for damping in (0.05, 0.0):
+        square(min(longest, 10**4), damping, 1e-12)
+    no_stop(longest)

@@ -1,0 +1,42 @@
+"""What `solve_ivp`'s own event finding gets wrong in the scenes, and by which mechanism."""
+
+from __future__ import annotations
+
+CLOSED = "closed sign test"
+ENDS = "only step ends"
+BRENT = "Brent's method"
+TWO_VALUES = "two values at a step end"
+NUMBERS = "no number in a trial"
+
+MECHANISMS = {
+    CLOSED: "the sign test is closed at both ends of a step: what is zero where a run or a restart begins fires at "
+    "once if it is negative, or again zero, at the end of the first step",
+    ENDS: "signs are tested at the ends of a step only: of two zeros within one step neither is seen, and what dips "
+    "below zero and comes back in a step has not happened",
+    BRENT: "its root finder stops with an error after 100 iterations where a zero is of third order",
+    TWO_VALUES: "signs are tested on the state at the end of a step and the zero is sought on the dense output, which "
+    "differs there by rounding: the root finder stops with an error, finding no change of sign",
+    NUMBERS: "the step beyond the domain of the model is tried and its Jacobian or its state is no number; the solver "
+    "stops or goes astray before the event is looked for",
+}
+
+# scene -> mechanism, and where it is another one with some solvers, solver -> mechanism ("" where it is right)
+FAILURES: dict[str, tuple[str, dict[str, str]]] = {
+    "ball-accumulation": (CLOSED, {"scipy-rk23": ENDS}),
+    "BALL2D": (CLOSED, {}),
+    "SCI-cubic": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
+    "cubic-modes": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
+    "double-root": (ENDS, {}),
+    "HEY-box": (CLOSED, {"scipy-dop853": "", "scipy-rk45": "", "scipy-radau": TWO_VALUES}),
+    "box-from-the-side": (CLOSED, {}),
+    "flat-guard": (CLOSED, {}),
+    "u-and-its-cube": (BRENT, {}),
+    "clock-and-guard-at-once": ("", {"scipy-radau": TWO_VALUES}),
+    "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),
+}
+
+
+def mechanism(integrator: str, scene: str) -> str:
+    """Why `solve_ivp` fails in a scene with a solver; empty where it does not."""
+    usual, others = FAILURES.get(scene, ("", {}))
+    return others.get(integrator, usual)
