@@ -36,7 +36,9 @@ class Appointments:
         values = model.parameter_values()
         self._clocks = [_Clock(schedule, values, precision) for schedule in model.schedules]
         self.due_at_start = tuple(
-            k for k, clock in enumerate(self._clocks) if (first := clock.time(0)) is not None and _same(first, t0)
+            k
+            for k, clock in enumerate(self._clocks)
+            if (first := clock.time(0)) is not None and _same(first, t0)
         )
         for clock in self._clocks:
             while (time := clock.next) is not None and (time < t0 or _same(time, t0)):

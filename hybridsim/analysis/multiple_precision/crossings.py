@@ -8,6 +8,7 @@ doi:10.1016/j.cagd.2012.03.001). So halving leaves intervals with no zero or wit
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -54,20 +55,22 @@ def _isolate(
 ) -> list[Number]:
     """Places in (low, low + width] at which p changes its sign."""
     signs = [value > 0 for value in bernstein if value != 0]
-    changes = sum(a != b for a, b in zip(signs[:-1], signs[1:]))
+    changes = sum(a != b for a, b in itertools.pairwise(signs))
     if changes == 0:
         return []
     if changes == 1 or depth == _DEEPEST:
         return [_refine(p, low, low + width, precision)] if changes % 2 else []
     left, right, row = [bernstein[0]], [bernstein[-1]], bernstein
     while len(row) > 1:
-        row = [(a + b) / 2 for a, b in zip(row[:-1], row[1:])]
+        row = [(a + b) / 2 for a, b in itertools.pairwise(row)]
         left.append(row[0])
         right.append(row[-1])
     half = width / 2
     found = _isolate(p, left, low, half, depth + 1, precision)
     found += _isolate(p, right[::-1], low + half, half, depth + 1, precision)
-    if row[0] == 0 and _side_at_end(left) != _side_at_end(right):  # in the middle itself, seen by neither half
+    if row[0] == 0 and _side_at_end(left) != _side_at_end(
+        right
+    ):  # in the middle itself, seen by neither half
         found = sorted([*found, low + half])
     return found
 

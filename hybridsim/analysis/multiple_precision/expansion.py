@@ -60,12 +60,14 @@ class Expansion:
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:
-        """How far the series hold: the last two terms are below 10^-digits of the largest, or of a state's given size."""
+        """How far the series hold: the last two terms are below 10^-digits of the largest, or of a state's size."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
         log2_reach += [self._log2_reach(watched.c, self.precision.context.zero) for watched in self.watched]
         reach = min(log2_reach, default=_FOREVER)
         whole = int(reach // 1)
-        return min(self.longest, self.precision.context.ldexp(self.precision.number(2.0 ** (reach - whole)), whole))
+        return min(
+            self.longest, self.precision.context.ldexp(self.precision.number(2.0 ** (reach - whole)), whole)
+        )
 
     def _log2_reach(self, c: Coefficients, size: Number) -> float:
         logs, last = self._log2(c), len(c) - 1
@@ -126,7 +128,9 @@ def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
             size = log2(constant.c[0]) if constant.c[0] != 0 else 0
             open_.append((part.operands[0], factor + (size if isinstance(part, Product) else -size), late))
         elif isinstance(part, Product) and (constant := part.operands[0]).constant:
-            open_.append((part.operands[1], factor + (log2(constant.c[0]) if constant.c[0] != 0 else 0), late))
+            open_.append(
+                (part.operands[1], factor + (log2(constant.c[0]) if constant.c[0] != 0 else 0), late)
+            )
         else:
             found.append(Term(factor, part.c, late))
             if isinstance(part, Given) and id(part) in rates and not late:

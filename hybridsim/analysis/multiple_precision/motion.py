@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -84,5 +83,3 @@ class Motion:
                 total = total * fraction + value
             rows.append(total)
         return np.array(rows).reshape(len(piece.states), len(times))
-
-

@@ -23,7 +23,7 @@ class Node:
     def __init__(self, context: Any, operands: Sequence[Node], constant: bool | None = None) -> None:
         self.context = context
         self.operands = tuple(operands)
-        self.constant = all(node.constant for node in operands) if constant is None else constant
+        self.constant: bool = all(node.constant for node in operands) if constant is None else constant
         self.c: list[Any] = []
 
     @property

@@ -120,7 +120,9 @@ class Program:
         if not self.held:
             return point
         x = list(point.x)
-        for _ in range(3):  # Newton's method: a surface is linear in the velocities, as a rule, and zero at once
+        for _ in range(
+            3
+        ):  # Newton's method: a surface is linear in the velocities, as a rule, and zero at once
             self.begin(Point(point.t, tuple(x), point.discrete, point.pieces))
             for i, change in zip(self.pins, self._pin_changes(0), strict=True):
                 x[i] = x[i] - change
@@ -150,7 +152,9 @@ class Program:
                 node.forget(0)
             self._extend(self.nodes, 0)
             columns.append([rate.coefficient(0) for rate in self.reading.rates])
-        self.effects = [[c - base for c, base in zip(column, columns[0], strict=True)] for column in columns[1:]]
+        self.effects = [
+            [c - base for c, base in zip(column, columns[0], strict=True)] for column in columns[1:]
+        ]
         if not m:
             return
         for unknown in self.unknowns:
@@ -244,7 +248,7 @@ class Program:
     def _linear(self, matrix: list[list[Number]], right: list[Number]) -> list[Number]:
         if len(right) == 1:
             if matrix[0][0] == 0:
-                name = list(self.reading.unknowns)[0]
+                name = next(iter(self.reading.unknowns))
                 raise UsageError(
                     f"the force {name} does not act on the velocity of its own contact",
                     remedy="let it enter the rate of that velocity",

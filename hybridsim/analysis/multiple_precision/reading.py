@@ -107,7 +107,7 @@ class Reading:
 
     def _walk(self, tree: ast.expr) -> Node:
         match tree:
-            case ast.Constant(value=value):
+            case ast.Constant(value=bool() | int() | float() as value):
                 number = value if isinstance(value, bool) else float(value)
                 return self._share(("number", number), lambda: Held(self.context, number))
             case ast.Name(id=name):
@@ -137,9 +137,7 @@ class Reading:
             if exponent.constant and base.constant:
                 return self._share(
                     ("**", id(base), id(exponent)),
-                    lambda: Pointwise(
-                        self.context, (base, exponent), lambda a, b: a**b, ast.unparse(tree)
-                    ),
+                    lambda: Pointwise(self.context, (base, exponent), lambda a, b: a**b, ast.unparse(tree)),
                 )
             logarithm = self._share(("log", id(base)), lambda: self.functions.build("log", base))
             return self.functions.build("exp", self.product(exponent, logarithm))

@@ -3,18 +3,22 @@
 The rules, in words:
 
 1.  Guards of the present modes that are zero here and would be negative just after have fired. Of an automaton with
-    choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors among
-    them, are evaluated at x- and made at once; two that set one variable to different values are an error.
+    choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors
+    among them, are evaluated at x- and made at once; two that set one variable to different values are an error.
 2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
 3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
-    combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of theirs
-    becomes negative. Of the admissible ones that is taken which keeps most modes, then which holds most surfaces (stick
-    before slip). A tie, or none at all, ends the run.
+    combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of
+    theirs becomes negative. Of the admissible ones that is taken which keeps most modes, then which holds most surfaces
+    (stick before slip). A tie, or none at all, ends the run.
 4.  Rounds of 1 to 3 are repeated until no guard of any component is about to be negative.
 
-Whether a quantity is zero, and on which side of zero it sets out, is read from its Taylor coefficients in the mode that is
-tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits) is zero, and the next decides. No rule
+Whether a quantity is zero, and on which side of zero it sets out, is read from its Taylor coefficients in the mode that
+is tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits) is zero, and the next decides. No rule
 says in advance what is zero at an event.
+
+A monitor has the side of zero on which it is just after an event, or none where it stays zero for a while. It fires
+where it goes from one side to the other: between events where its series changes its sign; at an event that changes a
+mode, or that a schedule sets off, where its sides just before and just after are opposite. Its reset is made at once.
 """
 
 from __future__ import annotations
@@ -109,7 +113,9 @@ class Rules:
             fired.update(self.leaving(self.expand(point, modes)))
         due = list(resets)
         for _ in range(_MOST_ROUNDS):
-            names = {c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)}
+            names = {
+                c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)
+            }
             point, modes = self._transit(point, modes, fired, due, moves)
             modes, open_ = self._take_sides(point, modes, moves)
             open_ |= {c for c in names if self.components[c].surface}
@@ -154,7 +160,9 @@ class Rules:
                 raise SimulationError(f"at t = {float(point.t)!r}: {guard.fatal}")
             if component.surface:
                 continue
-            choice = next((way for way in guard.then if way.when is None or self._value(way.when, point, modes)), None)
+            choice = next(
+                (way for way in guard.then if way.when is None or self._value(way.when, point, modes)), None
+            )
             if choice is None:
                 raise SimulationError(
                     f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "

@@ -119,9 +119,7 @@ class Signal:
 def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple[Number, ...]]:
     """The cubic in t - knot before the first knot, after each knot, and after the last."""
     values, zero = [number(v) for v in declared.values], number(0)
-    bends = (
-        _natural_bends(times, values, zero) if declared.interpolation == "cubic" else [zero] * len(times)
-    )
+    bends = _natural_bends(times, values, zero) if declared.interpolation == "cubic" else [zero] * len(times)
     rows = []
     for i in range(len(times) - 1):
         width = times[i + 1] - times[i]

@@ -30,14 +30,14 @@ def multiple_precision_trajectory(
 
     Parameters
     ----------
-    t_span : (t0, t1), t1 >= t0.
+    t_span : (t0, t1), t1 > t0.
     digits : digits that are carried; what comes out is good to nearly as many where the motion does not amplify errors.
     progress : called with the fraction of the span that has been done.
 
     Returns
     -------
-    Trajectory. Its ``states`` is a `Motion`, whose method ``state(t)`` gives all digits. It ends early where a monitor or
-    a schedule ends the run.
+    Trajectory. Its ``states`` is a `Motion`, whose method ``state(t)`` gives all digits. It ends early where a monitor
+    or a schedule ends the run.
 
     Errors
     ------
@@ -54,9 +54,9 @@ def multiple_precision_trajectory(
 
     if not _FEWEST <= digits <= _MOST:
         raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_FEWEST} to {_MOST}")
-    if t_span[1] < t_span[0]:
+    if not t_span[1] > t_span[0]:
         raise UsageError(
-            f"t_span {t_span} runs backward, and the multiple-precision run does not", remedy="let t1 be after t0"
+            f"the multiple-precision run goes forward, and t_span is {t_span}", remedy="let t1 be after t0"
         )
     model.validate()
     run = Run(model, t_span, Precision.of(digits), progress)
