@@ -64,10 +64,7 @@ def no_stop(last: int) -> None:
         times = np.linspace(max(t0, t1 - WINDOW * period), t1, POINTS)
         truth = np.array([exact(t) for t in times]).T
         error = np.max(np.abs(sol(times) - truth) / np.max(np.abs(truth), axis=1)[:, None])
-        print(
-            f"no stop, {checkpoint:8d} periods: error {error:.1e}  ({time.perf_counter() - began:.0f} s)",
-            flush=True,
-        )
+        say("no stop, rtol 1e-09", checkpoint, error, began)
 
 
 def square(last: int, damping: float, rtol: float) -> None:
