@@ -42,7 +42,9 @@ _HOME = {
     "to_ivp": "hybridsim.ivp",
     # asking
     "Comparison": "hybridsim.analysis",
+    "SuiteComparison": "hybridsim.analysis",
     "compare": "hybridsim.analysis",
+    "compare_suite": "hybridsim.analysis",
     # failing
     "ExpressionError": "hybridsim.errors",
     "HybridsimError": "hybridsim.errors",

@@ -1,7 +1,9 @@
 """What type checkers see of the package: the same names, imported at once."""
 
 from hybridsim.analysis import Comparison as Comparison
+from hybridsim.analysis import SuiteComparison as SuiteComparison
 from hybridsim.analysis import compare as compare
+from hybridsim.analysis import compare_suite as compare_suite
 from hybridsim.errors import ExpressionError as ExpressionError
 from hybridsim.errors import HybridsimError as HybridsimError
 from hybridsim.errors import ModelError as ModelError

@@ -3,5 +3,6 @@
 from hybridsim.analysis.compare import compare
 from hybridsim.analysis.comparison import Comparison
 from hybridsim.analysis.series import Series
+from hybridsim.analysis.suite import SuiteComparison, compare_suite
 
-__all__ = ["Comparison", "Series", "compare"]
+__all__ = ["Comparison", "Series", "SuiteComparison", "compare", "compare_suite"]

@@ -28,6 +28,8 @@ class Comparison:
     repeat : timed repetitions.
     provenance : versions, machine, hash of the model.
     warnings : what a reader must know before he trusts the numbers.
+    second_reference : another reference, of another kind, that the first was held against; "" where there is none.
+    difference : how far it is from the first.
     """
 
     title: str
@@ -39,24 +41,38 @@ class Comparison:
     repeat: int
     provenance: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    second_reference: str = ""
+    difference: Errors | None = None
 
     def reading(self, row: Row, quantity: str) -> Reading | None:
-        """An error of a row ("state", "state_last_period", "event_time"); None where the row has none.
+        """An error of a row, one of `QUANTITIES`; None where the row has none.
 
         Event times are in periods where there is a period, else in the model's unit of time.
         """
-        value = getattr(row.errors, quantity, None)
+        value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
-        value, floor = value / self._scale(quantity), self.floor(quantity)
         return Reading(max(value, floor), value <= floor and floor > 0)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The kinds of error that some row has; the error of the states in any case."""
+        return tuple(
+            name
+            for name in QUANTITIES
+            if name == "state" or any(getattr(row.errors, name, None) is not None for row in self.rows)
+        )
 
     def floor(self, quantity: str) -> float:
         """The reference's own uncertainty in the units of `reading`; 0 where it is not known."""
-        return (getattr(self.uncertainty, quantity, None) or 0.0) / self._scale(quantity)
+        return self.scaled(self.uncertainty, quantity) or 0.0
 
-    def _scale(self, quantity: str) -> float:
-        return self.period if quantity == "event_time" and self.period else 1.0
+    def scaled(self, errors: Errors | None, quantity: str) -> float | None:
+        """An error in the units of `reading`."""
+        value: float | None = getattr(errors, quantity, None)
+        return (
+            value / self.period if value is not None and quantity == "event_time" and self.period else value
+        )
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -69,7 +85,7 @@ class Comparison:
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line a row; times in the model's unit, wall times in seconds."""
-        records = [self._record(row) for row in self.rows]
+        records = self.records()
         with open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(records[0]) if records else [])
             writer.writeheader()
@@ -84,11 +100,17 @@ class Comparison:
             "period": self.period,
             "reference": self.reference,
             "uncertainty": asdict(self.uncertainty) if self.uncertainty else None,
+            "second_reference": self.second_reference,
+            "difference": asdict(self.difference) if self.difference else None,
             "repeat": self.repeat,
             "warnings": list(self.warnings),
             "provenance": dict(self.provenance),
-            "rows": [self._record(row) for row in self.rows],
+            "rows": self.records(),
         }
+
+    def records(self) -> list[dict[str, Any]]:
+        """The rows as plain values."""
+        return [self._record(row) for row in self.rows]
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
@@ -102,6 +124,7 @@ class Comparison:
         record: dict[str, Any] = {
             "integrator": row.integrator,
             "label": row.label,
+            "regularized": row.form,
             "setting": row.setting[0],
             "value": row.setting[1],
             "options": dict(row.options),
@@ -113,10 +136,10 @@ class Comparison:
             record[f"{quantity}_error"] = getattr(errors, quantity, None)
             record[f"{quantity}_below_uncertainty"] = reading.is_bound if reading else None
         for fault in ("missed", "spurious", "wrong"):
-            record[f"{fault}_modes"] = getattr(errors.sequence, fault) if errors else None
+            record[f"{fault}_modes"] = getattr(errors.sequence, fault, None) if errors else None
         record["wall_time"] = cost.wall_time if cost else None
         record["wall_time_min"] = min(cost.wall_times) if cost else None
         record["wall_time_max"] = max(cost.wall_times) if cost else None
-        for count in ("rhs_evaluations", "guard_evaluations", "steps"):
+        for count in ("repetitions", "compile_time", "rhs_evaluations", "guard_evaluations", "steps"):
             record[count] = getattr(cost, count, None)
         return record

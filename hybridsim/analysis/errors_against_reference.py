@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridsim.analysis.graph_distance import CompletedGraph, graph_distance
 from hybridsim.analysis.mode_sequence import MatchedEvents, SequenceVerdict, match_events
 from hybridsim.analysis.resets import Resets
 from hybridsim.analysis.trajectory import Trajectory
@@ -28,13 +29,21 @@ class Errors:
     state : largest error of a state over the run, relative to that state's amplitude in the reference.
     state_last_period : the same over the last period; None without a period.
     event_time : largest error in time of an event that both have; None if there is none.
-    sequence : how the sequence of modes differs.
+    sequence : how the sequence of modes differs; None for a run that has no modes, as of a regularised law.
+    graph : distance of the completed graphs (`hybridsim.analysis.graph_distance`), in periods (without a period, in
+        spans) and amplitudes; None where no state jumps.
     """
 
     state: float
     state_last_period: float | None
     event_time: float | None
-    sequence: SequenceVerdict
+    sequence: SequenceVerdict | None
+    graph: float | None = None
+
+    @property
+    def wrong_modes(self) -> bool:
+        """Whether there are modes, and not the right ones."""
+        return self.sequence is not None and not self.sequence.right
 
 
 class Yardstick:
@@ -67,6 +76,12 @@ class Yardstick:
         self.states = _states(trajectory, self.times, self.before)
         amplitude = (self.states.max(axis=1) - self.states.min(axis=1)) / 2
         self.amplitude = np.where(amplitude > 0, amplitude, nominal)
+        self.graph = self._graph(trajectory) if any(event in resets for event in trajectory.events) else None
+
+    def _graph(self, trajectory: Trajectory) -> CompletedGraph:
+        t0, t1 = self.trajectory.t_span
+        jumps = [event.t for event in trajectory.events if event in self.resets]
+        return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
         """Errors of a run from the same start, up to the end of the shorter of the two."""
@@ -80,7 +95,8 @@ class Yardstick:
         if self.period:
             last = float(np.max(error[self.times[shared] >= end - self.period]))
         mismatches = [abs(a.t - b.t) for a, b in matched.pairs if a.kind != "scheduled"]
-        return Errors(float(np.max(error)), last, max(mismatches, default=None), matched.verdict)
+        graph = graph_distance(self.graph, self._graph(run)) if self.graph else None
+        return Errors(float(np.max(error)), last, max(mismatches, default=None), matched.verdict, graph)
 
     def _matched_times(
         self, matched: MatchedEvents, t_span: tuple[float, float]

@@ -36,10 +36,10 @@ class SequenceVerdict:
 
 @dataclass(frozen=True)
 class MatchedEvents:
-    """Pairs of events (reference's, run's), and the verdict over the mode changes."""
+    """Pairs of events (reference's, run's), and the verdict over the mode changes; None if the run has no modes."""
 
     pairs: tuple[tuple[EventLike, EventLike], ...]
-    verdict: SequenceVerdict
+    verdict: SequenceVerdict | None
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,20 @@ def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
 
     Sequences of different components are not woven into one: which of two independent events comes first by a
     rounding error is no mistake. An event is matched to one displaced by at most half of the longest stretch
-    without an event; beyond, it is another one.
+    without an event; beyond, it is another one. A component that the run does not have at all, as a regularised
+    contact, is not judged.
     """
     ours, theirs = _sequences(reference), _sequences(run)
+    components = {channel for channel in ours if channel[0] == "transition"}
+    absent = components - theirs.keys()
     t0, t1 = reference.t_span[0], min(reference.t_span[1], run.t_span[1])
     pairs: list[tuple[EventLike, EventLike]] = []
     missed: list[float] = []
     spurious: list[float] = []
     wrong = 0
     for channel, expected in ours.items():
+        if channel in absent:
+            continue
         found = theirs.get(channel, [])
         times = [t0, *(entry.t for entry in expected), reference.t_span[1]]
         window = max(after - before for before, after in itertools.pairwise(times)) / 2
@@ -81,7 +86,8 @@ def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
     # Close to the end, an event may fall on the other side of it by its error alone.
     last = t1 - max((abs(a.t - b.t) for a, b in pairs), default=0.0)
     verdict = SequenceVerdict(sum(t < last for t in missed), sum(t < last for t in spurious), wrong)
-    return MatchedEvents(tuple(sorted(pairs, key=lambda pair: pair[0].t)), verdict)
+    judged = None if absent and absent == components else verdict
+    return MatchedEvents(tuple(sorted(pairs, key=lambda pair: pair[0].t)), judged)
 
 
 def _left_over(entries: Sequence[_Entry], matched: set[int]) -> list[float]:

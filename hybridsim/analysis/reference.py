@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.closed_forms import find_closed_form
@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 Run = Callable[..., "Solution"]
 """Runs the model over the span: (integrator, **options) -> Solution."""
 
-CLOSED_FORM, RUNS = "closed form", "runs"
-# Two methods of different kind (one step against many steps, our location of events against SUNDIALS' own),
-# close to the least tolerance that each can keep in double precision.
+CLOSED_FORM, MULTIPLE_PRECISION, RUNS = "closed form", "multiple precision", "runs"
+KINDS = (CLOSED_FORM, MULTIPLE_PRECISION, RUNS)
+# The most accurate integrator, close to the least tolerance that it can keep in double precision.
+_BEST: tuple[str, Mapping[str, Any]] = ("dop853", {"rtol": 1e-13})
+# Two methods of different kind (one step against many steps, our location of events against SUNDIALS' own).
 _FIRST: tuple[str, Mapping[str, Any]] = ("scipy-dop853", {"rtol": 1e-13})
 _SECOND: tuple[str, Mapping[str, Any]] = ("cvode-adams", {"rtol": 1e-12})
+DIGITS = 32
 
 
 @dataclass(frozen=True)
@@ -34,47 +37,102 @@ class Reference:
     ----------
     title : what it is, in words.
     yardstick : measures runs against it.
-    uncertainty : how far off a second reference is; None where there is none.
+    uncertainty : how far off it may be itself; None where that is not known.
     warnings : what makes it doubtful.
+    second : a reference of another kind, in words, and
+    difference : how far it is from this one; "" and None where there is none.
     """
 
     title: str
     yardstick: Yardstick
     uncertainty: Errors | None
     warnings: tuple[str, ...] = ()
+    second: str = ""
+    difference: Errors | None = None
 
 
 def find_reference(
-    model: Model, t_span: tuple[float, float], period: float | None, run: Run, wanted: Any = None
+    model: Model,
+    t_span: tuple[float, float],
+    period: float | None,
+    run: Run,
+    wanted: Any = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Reference:
     """The reference of a comparison.
 
     Parameters
     ----------
-    wanted : None for a closed form where one is known, else two runs; "closed form" or "runs" to insist; or
-        the reference itself: a Solution, a Trajectory, or a function of times (k,) that gives states (n, k).
+    wanted : None for a closed form where one is known, else two runs; "closed form", "multiple precision" or
+        "runs" to insist; several of these to take the first that there is; or the reference itself: a Solution,
+        a Trajectory, or a function of times (k,) that gives states (n, k).
     run : runs the model with an integrator and its options.
+    progress : called with the finished fraction of a reference in multiple precision.
 
-    A closed form owes nothing to the engine. Of two runs the first is the reference, and the distance of the
-    second its uncertainty. Both follow the engine's decisions at events: what it got wrong would not show.
+    A closed form and a motion in multiple precision owe nothing to the engine; they are held against the most
+    accurate integrator, which does. Of two runs the first is the reference, and the distance of the second its
+    uncertainty. Both follow the engine's decisions at events: what it got wrong would not show.
     """
-    if isinstance(wanted, str) and wanted not in (CLOSED_FORM, RUNS):
-        raise UsageError(f"reference {wanted!r} is unknown", remedy=f"say {CLOSED_FORM!r} or {RUNS!r}")
 
     def yardstick(trajectory: Trajectory) -> Yardstick:
         nominal = [state.nominal or 1.0 for state in model.states]
         return Yardstick(trajectory, resets_of(model), nominal, period)
 
-    if wanted is not None and not isinstance(wanted, str):
+    if wanted is None:
+        kinds: tuple[str, ...] = (CLOSED_FORM, RUNS)
+    elif isinstance(wanted, str | tuple):
+        kinds = (wanted,) if isinstance(wanted, str) else wanted
+    else:
         return Reference("given by the caller", yardstick(as_trajectory(wanted, t_span)), None)
-    if wanted != RUNS:
-        closed = find_closed_form(model, t_span)
-        if closed is not None:
-            exact = yardstick(closed.exact)
-            return Reference(closed.title, exact, exact.measure(closed.nudged))
-        if wanted == CLOSED_FORM:
-            raise UsageError(f"no closed form is known for {model.name}", remedy=f"use reference={RUNS!r}")
-    return _two_runs(run, yardstick)
+    refusal: UsageError | None = None
+    for kind in kinds:
+        if kind not in KINDS:
+            raise UsageError(
+                f"reference {kind!r} is unknown", remedy=f"say one of {', '.join(map(repr, KINDS))}"
+            )
+        try:
+            if kind == CLOSED_FORM:
+                return _checked(_closed_form(model, t_span, yardstick), run)
+            if kind == MULTIPLE_PRECISION:
+                return _checked(_multiple_precision(model, t_span, yardstick, progress), run)
+            return _two_runs(run, yardstick)
+        except UsageError as error:
+            refusal = refusal or error
+    assert refusal is not None
+    raise refusal
+
+
+def _closed_form(
+    model: Model, t_span: tuple[float, float], yardstick: Callable[[Trajectory], Yardstick]
+) -> Reference:
+    closed = find_closed_form(model, t_span)
+    if closed is None:
+        raise UsageError(f"no closed form is known for {model.name}", remedy=f"use reference={RUNS!r}")
+    exact = yardstick(closed.exact)
+    return Reference(closed.title, exact, exact.measure(closed.nudged))
+
+
+def _multiple_precision(
+    model: Model,
+    t_span: tuple[float, float],
+    yardstick: Callable[[Trajectory], Yardstick],
+    progress: Callable[[float], None] | None,
+) -> Reference:
+    from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+
+    motion = multiple_precision_trajectory(model, t_span, digits=DIGITS, progress=progress)
+    return Reference(f"Taylor series with {DIGITS} digits", yardstick(motion), None)
+
+
+def _checked(reference: Reference, run: Run) -> Reference:
+    """The reference held against the most accurate integrator."""
+    difference, warnings = _held_against(reference.yardstick, run, _BEST)
+    return replace(
+        reference,
+        warnings=reference.warnings + warnings,
+        second=f"run with {_describe(_BEST)}" if difference else "",
+        difference=difference,
+    )
 
 
 def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Reference:
@@ -85,21 +143,25 @@ def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Referen
             remedy="shorten the span, or give a reference",
         )
     best = yardstick(trajectory_of(first))
-    title = f"run with {_describe(_FIRST)}"
+    difference, warnings = _held_against(best, run, _SECOND)
+    second = f"run with {_describe(_SECOND)}" if difference else ""
+    return Reference(f"run with {_describe(_FIRST)}", best, difference, warnings, second, difference)
+
+
+def _held_against(
+    best: Yardstick, run: Run, second: tuple[str, Mapping[str, Any]]
+) -> tuple[Errors | None, tuple[str, ...]]:
+    """How far a second reference is from the best one, and what is to be said about it."""
     try:
-        second = run(_SECOND[0], **_SECOND[1])
+        solution = run(second[0], **second[1])
     except HybridsimError as error:
-        return Reference(
-            title, best, None, (f"no second reference with {_describe(_SECOND)}: {error.message}",)
-        )
-    if not second.success:
-        reason = f"{second.status}: {second.message}"
-        return Reference(title, best, None, (f"no second reference with {_describe(_SECOND)}: {reason}",))
-    uncertainty = best.measure(trajectory_of(second))
-    warnings: tuple[str, ...] = ()
-    if not uncertainty.sequence.right:
-        warnings = (f"the two reference runs differ in their modes: {uncertainty.sequence}",)
-    return Reference(f"{title}, against {_describe(_SECOND)}", best, uncertainty, warnings)
+        return None, (f"no second reference with {_describe(second)}: {error.message}",)
+    if not solution.success:
+        return None, (f"no second reference with {_describe(second)}: {solution.status}: {solution.message}",)
+    difference = best.measure(trajectory_of(solution))
+    if difference.wrong_modes:
+        return difference, (f"the two references differ in their modes: {difference.sequence}",)
+    return difference, ()
 
 
 def _describe(run: tuple[str, Mapping[str, Any]]) -> str:

@@ -9,17 +9,35 @@ from typing import Any
 
 from hybridsim.analysis.errors_against_reference import Errors
 
-QUANTITIES = ("state", "state_last_period", "event_time")
+QUANTITIES = ("state", "state_last_period", "event_time", "graph")
+
+# How a run ended that the budget of time did not allow.
+NOT_STARTED, STOPPED = "not started", "stopped"
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run cost: wall times in seconds over the timed repetitions, and counts of one run."""
+    """What a run cost.
+
+    Parameters
+    ----------
+    wall_times : seconds of each timed repetition; of the run that warmed up, where there was no time for more.
+    rhs_evaluations, guard_evaluations, steps : counts of one run.
+    compile_time : seconds that the first run spent on making and compiling the model's functions, apart.
+    repetitions : how many of the wall times are of a run that others had warmed up.
+    """
 
     wall_times: tuple[float, ...]
     rhs_evaluations: int
     guard_evaluations: int
     steps: int
+    compile_time: float = 0.0
+    repetitions: int = 0
+
+    @property
+    def work(self) -> int:
+        """Evaluations and steps: what grows as the tolerance falls, and is the same on every machine."""
+        return max(self.rhs_evaluations + self.guard_evaluations, self.steps, 1)
 
     @property
     def wall_time(self) -> float:
@@ -37,6 +55,7 @@ class Row:
     setting : name and value of what is varied along the line, such as ("rtol", 1e-9).
     options : everything it was called with.
     status, message : how the run ended; of a failure there is no error and no cost.
+    form : the regularised form that was run in place of the model, or "".
     """
 
     integrator: str
@@ -47,10 +66,13 @@ class Row:
     message: str = ""
     errors: Errors | None = None
     cost: Cost | None = None
+    form: str = ""
 
     def timed(self, wall_times: tuple[float, ...]) -> Row:
-        """The row with its wall times."""
-        return replace(self, cost=replace(self.cost, wall_times=wall_times) if self.cost else None)
+        """The row with the wall times of its repetitions; as it is, where there are none."""
+        if self.cost is None or not wall_times:
+            return self
+        return replace(self, cost=replace(self.cost, wall_times=wall_times, repetitions=len(wall_times)))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ from hybridsim.errors import UsageError
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 STEPS_PER_PERIOD = (300, 600, 1200, 2400, 4800)
+# SciPy's own event finding is shown of its default method and of its best one for the task; of all six it would
+# hide the rest.
+_ALSO_NATIVE = ("scipy-rk45", "scipy-dop853")
 _PERIODS = 10  # that a run without a period counts as, where a step is a share of one
 
 
@@ -21,10 +24,11 @@ class Series:
     Parameters
     ----------
     integrator : a registered name.
-    varied : name of the option that is varied, such as "rtol" or "steps_per_period".
+    varied : name of the option that is varied, such as "rtol" or "steps_per_period"; "v0" of a regularised form.
     values : its values.
     options : further options; a function of the value where they go with it.
     label : name in the table and the chart; the integrator's and the options if not given.
+    regularized : kind of the regularised form (see `Model.regularized`) that is run in place of the model.
     """
 
     integrator: str
@@ -32,21 +36,26 @@ class Series:
     values: tuple[float, ...]
     options: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
+    regularized: str = ""
 
     def __post_init__(self) -> None:
         if not self.values:
             raise UsageError(f"no values of {self.varied} for {self.integrator}", remedy="give at least one")
+        if (self.varied == "v0") != bool(self.regularized):
+            raise UsageError(
+                f"a line that varies {self.varied!r} with regularized = {self.regularized!r}",
+                remedy="vary v0 along a regularised form, and nothing else",
+            )
         if not self.label:
             shown = {name: value for name, value in self.options.items() if name != "period"}
             details = ", ".join(f"{name}={_shown(value)}" for name, value in shown.items())
-            object.__setattr__(
-                self, "label", f"{self.integrator} ({details})" if details else self.integrator
-            )
+            name = f"{self.regularized}, {self.integrator}" if self.regularized else self.integrator
+            object.__setattr__(self, "label", f"{name} ({details})" if details else name)
 
     def options_at(self, value: float) -> dict[str, Any]:
-        """Options of the run with the varied one at a value."""
+        """Options that the integrator is run with where the varied one is at a value."""
         others = {name: item(value) if callable(item) else item for name, item in self.options.items()}
-        return {self.varied: value, **others}
+        return others if self.regularized else {self.varied: value, **others}
 
 
 def _shown(value: Any) -> str:
@@ -118,6 +127,8 @@ def _line(
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
     """Options and label of each line of an integrator; more than one where a choice decides what it is worth."""
+    if name in _ALSO_NATIVE:
+        return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":
         return [({}, "")]
     from hybridsim.integrators import integrator_class
@@ -129,4 +140,4 @@ def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
 
     # As published, a body in stick creeps, and the zone of zero velocity is as wide however short the step.
     refined = {"stick_velocity": "zero", "eps_v": eps_v}
-    return [({}, ""), (refined, f"{name}, v zeroed, eps_v falling")]
+    return [({}, ""), (refined, f"{name}, refined")]

@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.analysis.timing import ENOUGH
 
 if TYPE_CHECKING:
     from hybridsim.analysis.comparison import Comparison
+    from hybridsim.analysis.errors_against_reference import Errors
 
+_NAMES = dict(zip(QUANTITIES, ("state", "last period", "event time", "graph")))
 _VERSIONS = ("numpy", "scipy", "numba", "scikit-sundae")
 
 
 def table(comparison: Comparison) -> str:
     """Heading, a block of rows for each line of the comparison, and notes."""
-    times = "event time / T" if comparison.period else "event time"
-    header = (
-        "",
-        "state error",
-        "last period",
-        times,
-        "wall time",
-        "min .. max",
-        "rhs",
-        "guards",
-        "steps",
-        "modes",
+    names = {**_NAMES, "state": "state error"} | (
+        {"event_time": "event time / T"} if comparison.period else {}
     )
+    errors = (names[quantity] for quantity in comparison.quantities)
+    header = ("", *errors, "wall time", "min .. max", "rhs", "guards", "steps", "modes")
     cells = [_cells(comparison, row) for row in comparison.rows]
     widths = [max(map(len, column)) for column in zip(header, *(line for line in cells if line))]
     text = [_aligned(header, widths)]
@@ -57,6 +52,13 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1e3:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"
 
 
+def versions(facts: Mapping[str, Any]) -> str:
+    """Versions and machine of a result, in a line."""
+    packages = ", ".join(f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name))
+    machine = f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs"
+    return f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {packages}; {machine}"
+
+
 def _failure(row: Row) -> str:
     return f"{row.status}: {row.message}" if row.message else row.status
 
@@ -65,7 +67,7 @@ def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
     """What stands in a row; nothing for a failure."""
     if row.errors is None or row.cost is None:
         return ()
-    readings = [comparison.reading(row, quantity) for quantity in QUANTITIES]
+    readings = [comparison.reading(row, quantity) for quantity in comparison.quantities]
     low, high = min(row.cost.wall_times), max(row.cost.wall_times)
     counts = (row.cost.rhs_evaluations, row.cost.guard_evaluations, row.cost.steps)
     return (
@@ -74,7 +76,7 @@ def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
         milliseconds(row.cost.wall_time),
         f"{milliseconds(low)} .. {milliseconds(high)}" if high > low else "once",
         *map(str, counts),
-        str(row.errors.sequence),
+        "none" if row.errors.sequence is None else str(row.errors.sequence),
     )
 
 
@@ -93,26 +95,37 @@ def _heading(comparison: Comparison) -> list[str]:
         f"  reference  {comparison.reference}",
     ]
     if comparison.uncertainty is not None:
-        words = zip(QUANTITIES, ("state", "last period", "event time"))
-        floors = [(name, comparison.floor(quantity)) for quantity, name in words]
-        known = [f"{name} {floor:.1e}" for name, floor in floors if floor]
-        lines.append(f"             uncertain by: {', '.join(known) or 'nothing that shows'}")
+        lines.append(f"             uncertain by: {differences(comparison, comparison.uncertainty)}")
+    if comparison.difference is not None:
+        lines.append(f"             {comparison.second_reference} differs by: {differences(comparison)}")
     return lines
+
+
+def differences(comparison: Comparison, errors: Errors | None = None) -> str:
+    """Errors in the units of the table, in words; those of the second reference, if none are given."""
+    readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
+    return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
+
+
+def _graph_notes(comparison: Comparison) -> list[str]:
+    if "graph" not in comparison.quantities:
+        return []
+    unit = "periods" if comparison.period else "lengths of the run"
+    return [f"Graph: Hausdorff distance of the completed graphs, in {unit} and amplitudes, to 1 %."]
 
 
 def _notes(comparison: Comparison) -> list[str]:
     unit = "periods T" if comparison.period else "the model's unit of time"
     facts = comparison.provenance
-    versions = [f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name)]
     counted = any(row.setting[0] == "steps_per_period" for row in comparison.rows)
     return [
         "State errors: the largest of all states, relative to each one's amplitude in the reference.",
         f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
+        *_graph_notes(comparison),
         *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
         f"Wall time of a call: median of {comparison.repeat} after a warm-up, in turns over all rows; fewer",
         f"of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
-        f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {', '.join(versions)};",
-        f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs; "
+        versions(facts),
         f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
         *(f"warning: {warning}" for warning in comparison.warnings),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -11,25 +12,36 @@ ENOUGH = 2.0
 
 
 def timed_in_turns(
-    runs: Sequence[Callable[[], object]], repeat: int, progress: Callable[[int], None] | None = None
+    runs: Sequence[Callable[[], object]],
+    repeat: int,
+    progress: Callable[[int], None] | None = None,
+    expected: Sequence[float] | None = None,
+    until: float = math.inf,
 ) -> list[tuple[float, ...]]:
     """Seconds of each call of each run, round by round: `repeat` calls, fewer of those that take long.
 
     The runs have been warmed up before. The collection of garbage is left out, as `timeit` does: it strikes whom
-    it happens to strike.
+    it happens to strike. What is alive at the start is left alone, so that the collections in between cost little.
 
     Parameters
     ----------
     progress : called with the index of a run before it has its turn, also where the turn is passed over.
+    expected : seconds that each run is likely to take; with it, a round that would not be over in time is shortened
+        by its longest runs.
+    until : time of `time.monotonic` at which all has to be over.
     """
     times: list[list[float]] = [[] for _ in runs]
     collecting = gc.isenabled()
+    gc.collect()
+    gc.freeze()
     try:
         for _ in range(repeat):
+            turn = set(_fitting(expected or [0.0] * len(runs), until - time.monotonic()))
             for i, run in enumerate(runs):
                 if progress is not None:
                     progress(i)
-                if sum(times[i]) >= ENOUGH:
+                late = expected is not None and time.monotonic() + expected[i] > until
+                if i not in turn or late or sum(times[i]) >= ENOUGH:
                     continue
                 gc.collect()
                 gc.disable()
@@ -37,6 +49,18 @@ def timed_in_turns(
                 run()
                 times[i].append(time.perf_counter() - start)
     finally:
+        gc.unfreeze()
         if collecting:
             gc.enable()
     return [tuple(spent) for spent in times]
+
+
+def _fitting(expected: Sequence[float], seconds: float) -> list[int]:
+    """Indices of as many runs, cheapest first, as fit in the seconds that are left."""
+    chosen, left = [], seconds
+    for i in sorted(range(len(expected)), key=lambda i: expected[i]):
+        if expected[i] > left:
+            break
+        left -= expected[i]
+        chosen.append(i)
+    return chosen

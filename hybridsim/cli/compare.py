@@ -1,4 +1,4 @@
-"""`hybridsim compare MODEL`: which integrator buys accuracy cheapest on it: a table, a chart and the data."""
+"""`hybridsim compare MODEL`: which integrator buys accuracy cheapest on it; `compare --suite`: on many scenes."""
 
 from __future__ import annotations
 
@@ -10,21 +10,31 @@ from hybridsim.cli import values
 from hybridsim.cli.output import require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
+from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
-    from hybridsim.analysis import Comparison
+    from hybridsim.analysis import Comparison, SuiteComparison
+
+_SUITE_FOLDER = Path("compare-suite")
 
 
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
-        help="compare integrators on a model: error against cost",
-        description="Compare integrators on a model, error against cost: a table, a chart and the data.",
-        epilog="The folder gets chart.png, table.csv and comparison.json.",
+        help="compare integrators on a model, or on a suite of scenes: error against cost",
+        description="Compare integrators on a model, or on a suite of scenes, error against cost: a table, a chart "
+        "and the data.",
+        epilog="The folder gets chart.png (suite.png), table.csv and comparison.json.",
     )
-    values.add_model_arguments(parser)
+    values.add_model_arguments(parser, optional=True)
     values.add_span_argument(parser, values.COMPARED_PERIODS)
+    parser.add_argument(
+        "--suite", action="store_true", help="run the scenes of the suite instead of one model"
+    )
+    parser.add_argument(
+        "--scenes", metavar="A,B", type=values.names, help="of the suite, run these only (default: all)"
+    )
     parser.add_argument(
         "--integrators", metavar="A,B", type=values.names, help="compare these only (default: all that can)"
     )
@@ -45,6 +55,12 @@ def add_to(commands: Any) -> None:
         help="timed repetitions of every run (default: 3)",
     )
     parser.add_argument(
+        "--budget",
+        metavar="SECONDS",
+        type=values.positive,
+        help="what all of it may take (default: 120, and 600 for the suite); what does not fit is left out, and said",
+    )
+    parser.add_argument(
         "--out", metavar="FOLDER", type=Path, help="folder of the results (default: compare-MODEL, here)"
     )
     parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
@@ -56,6 +72,16 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     folder: Path | None = args.out
     if folder is not None:
         require_folder(folder, "--out")
+    if args.suite:
+        return _suite(args, folder or _SUITE_FOLDER, session)
+    if args.model is None:
+        raise UsageError("compare what?", remedy="name a model (see: hybridsim models), or say --suite")
+    if args.scenes:
+        raise UsageError("--scenes is for --suite", remedy="say --suite too, or leave it out")
+    return _model(args, folder, session)
+
+
+def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> int:
     model = values.changed_model(args)
     span = (0.0, values.end_time(model, args.t_end, values.COMPARED_PERIODS))
     folder = folder or Path(f"compare-{model.name}")
@@ -71,23 +97,58 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             rtols=args.rtol,
             steps=args.steps,
             repeat=args.repeat,
+            **({} if args.budget is None else {"budget": args.budget}),
             progress=lambda done, total, what: progress(done / total, what),
         )
-    if args.json:
-        print(comparison.to_json())
-    else:
-        print(comparison.table())
-    _write(comparison, folder, session)
+    from hybridsim.plot import work_precision
+
+    _write(comparison, args.json, folder, "chart.png", work_precision, session)
     return 0
 
 
-def _write(comparison: Comparison, folder: Path, session: Session) -> None:
-    from hybridsim.plot import save, work_precision
+def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
+    given = {"MODEL": args.model, "-p": args.param, "--x0": args.x0, "--t-end": args.t_end}
+    for option, value in given.items():
+        if value:
+            raise UsageError(
+                f"{option} and --suite", remedy="the suite has its own models; leave out one of the two"
+            )
+    require_folder(folder, "--out")
 
+    import hybridsim
+
+    with Progress(session) as progress:
+        suite = hybridsim.compare_suite(
+            scenes=args.scenes,
+            integrators=args.integrators,
+            rtols=args.rtol,
+            steps=args.steps,
+            repeat=args.repeat,
+            **({} if args.budget is None else {"budget": args.budget}),
+            progress=lambda done, total, what: progress(done / total, what),
+        )
+    from hybridsim.plot import suite_page
+
+    _write(suite, args.json, folder, "suite.png", suite_page, session)
+    return 0
+
+
+def _write(
+    result: Comparison | SuiteComparison,
+    as_json: bool,
+    folder: Path,
+    picture: str,
+    draw: Any,
+    session: Session,
+) -> None:
+    """Print the result, and fill the folder."""
+    from hybridsim.plot import save
+
+    print(result.to_json() if as_json else result.table())
     folder.mkdir(parents=True, exist_ok=True)
-    comparison.to_csv(folder / "table.csv")
+    result.to_csv(folder / "table.csv")
     session.wrote(folder / "table.csv")
-    comparison.to_json(folder / "comparison.json")
+    result.to_json(folder / "comparison.json")
     session.wrote(folder / "comparison.json")
-    save(work_precision(comparison), folder / "chart.png")
-    session.wrote(folder / "chart.png")
+    save(draw(result), folder / picture)
+    session.wrote(folder / picture)

@@ -66,10 +66,13 @@ def names(text: str) -> tuple[str, ...]:
     return found
 
 
-def add_model_arguments(parser: argparse.ArgumentParser) -> None:
+def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False) -> None:
     """The arguments that say which model, with which parameters, from where and for how long."""
     parser.add_argument(
-        "model", metavar="MODEL", help="name of a model (see: hybridsim models) or a .toml file"
+        "model",
+        metavar="MODEL",
+        nargs="?" if optional else None,
+        help="name of a model (see: hybridsim models) or a .toml file",
     )
     parser.add_argument(
         "-p",

@@ -3,7 +3,16 @@
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.style import save
+from hybridsim.plot.suite_page import suite_page
 from hybridsim.plot.time_history import TimeHistoryAxes, time_history
 from hybridsim.plot.work_precision import work_precision
 
-__all__ = ["TimeHistoryAxes", "friction_loop", "phase_portrait", "save", "time_history", "work_precision"]
+__all__ = [
+    "TimeHistoryAxes",
+    "friction_loop",
+    "phase_portrait",
+    "save",
+    "suite_page",
+    "time_history",
+    "work_precision",
+]

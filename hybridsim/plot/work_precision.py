@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.lines import Line2D
@@ -13,6 +13,7 @@ from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormat
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
+from hybridsim.plot.lines import SIZE, Look, draw_line, looks
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,45 +21,53 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Comparison
 
-_SIZE = 6.5
 _MOST_TICKS = 5  # across a panel
-_NOTHING = {
-    "state": "no run to show",
-    "state_last_period": "the model has no period",
-    "event_time": "no events to compare",
+_TITLES = {
+    "state": "State error, whole run / amplitude",
+    "state_last_period": "State error, last period / amplitude",
+    "event_time": "Largest event-time error",
+    "graph": "Distance of the graphs",
 }
 _ZERO = 1e-17  # where an error of exactly zero is drawn: below any rounding
+_UNCERTAIN = "#eeeeee"
 
 
-def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
-    """Draw three panels: state error over the whole run, over the last period, and of the event times.
+def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -> tuple[Axes, ...]:
+    """Draw a panel for each kind of error that there is: of the states over the whole run and over the last period,
+    of the times of events, and of the graphs where states jump (`Comparison.quantities`).
 
     The wall time runs across, the error up; a line joins the settings of one integrator. A run with a wrong
     sequence of modes is hollow: its errors compare what is not the same motion. Stick erases memory, so an
-    error at the end alone may be small after a run that was wrong; that is why there are three panels.
+    error at the end alone may be small after a run that was wrong; that is why there are several panels.
 
     Parameters
     ----------
-    axes : three axes to draw in; a new figure if not given.
+    axes : as many axes as there are kinds of error, to draw in; a new figure if not given.
     """
+    quantities = comparison.quantities
     if axes is None:
-        figure = style.figure(13.0, 5.4)
+        figure = style.figure(4.1 * len(quantities) + 1.8, 5.4)
         figure.suptitle(_headline(comparison), fontsize=10, x=0.01, ha="left")
-        panels = tuple(figure.subplots(1, 3))
+        panels = tuple(figure.subplots(1, len(quantities), squeeze=False)[0])
     else:
         panels = tuple(axes)
-    if len(panels) != 3:
-        raise UsageError(f"{len(panels)} axes for three panels", remedy="give three axes")
-    per = " / T" if comparison.period else ""
-    titles = (
-        "State error, whole run / amplitude",
-        "State error, last period / amplitude",
-        f"Largest event-time error{per}",
+    if len(panels) != len(quantities):
+        raise UsageError(
+            f"{len(panels)} axes for {len(quantities)} kinds of error", remedy=f"give {len(quantities)} axes"
+        )
+    chosen = looks(comparison.rows)
+    for panel, quantity in zip(panels, quantities, strict=True):
+        draw_panel(panel, comparison, quantity, chosen)
+        per = " / T" if comparison.period and quantity == "event_time" else ""
+        panel.set_title(_TITLES[quantity] + per, fontsize=10, loc="left")
+    panels[-1].legend(
+        handles=handles(comparison.rows, [comparison], chosen),
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        frameon=False,
+        fontsize=9,
+        handlelength=3,
     )
-    for panel, quantity, title in zip(panels, QUANTITIES, titles):
-        _panel(panel, comparison, quantity)
-        panel.set_title(title, fontsize=10, loc="left")
-    _legend(comparison, panels[-1])
     return panels
 
 
@@ -68,31 +77,24 @@ def _headline(comparison: Comparison) -> str:
     return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
 
 
-def _panel(panel: Axes, comparison: Comparison, quantity: str) -> None:
-    for i, label in enumerate(comparison.labels):
-        colour, marker = _look(i)
+def draw_panel(
+    panel: Axes, comparison: Comparison, quantity: str, chosen: dict[str, Look], size: float = SIZE
+) -> None:
+    """One kind of error against the wall time, for all lines."""
+    for label in comparison.labels:
         rows = [row for row in comparison.rows if row.label == label]
-        points = [point for row in rows if (point := _point(comparison, row, quantity))]
-        if not points:
-            continue
-        x, y = zip(*(point for point, _ in points))
-        panel.plot(x, y, color=colour, linewidth=1.1, zorder=2)
-        for row in rows:
-            point = _point(comparison, row, quantity)
-            if point is None or row.cost is None:
-                continue
-            (time, error), right = point
-            times = row.cost.wall_times
-            panel.plot(
-                [min(times), max(times)], [error, error], color=colour, linewidth=2.5, alpha=0.35, zorder=2
-            )
-            fill = colour if right else "white"
-            panel.plot(
-                time, error, marker, color=colour, markerfacecolor=fill, markersize=_SIZE, markeredgewidth=1.3
-            )
+        found = [(row, point) for row in rows if (point := _point(comparison, row, quantity))]
+        draw_line(
+            panel,
+            chosen[label],
+            [point for _, point in found],
+            [(min(row.cost.wall_times), max(row.cost.wall_times)) for row, _ in found if row.cost],
+            [_verdict(row) for row, _ in found],
+            size,
+        )
     style.dress(panel)
     if not panel.lines:
-        panel.text(0.5, 0.5, _NOTHING[quantity], transform=panel.transAxes, ha="center", color=style.FAINT)
+        panel.text(0.5, 0.5, "no run to show", transform=panel.transAxes, ha="center", color=style.FAINT)
         panel.set_xticks([])
         panel.set_yticks([])
         return
@@ -102,25 +104,24 @@ def _panel(panel: Axes, comparison: Comparison, quantity: str) -> None:
     if floor > 0:
         low, high = panel.get_ylim()
         panel.set_ylim(min(low, floor / 3), high)
-        panel.axhspan(min(low, floor / 3), floor, color="#eeeeee", zorder=0)
-    _ticks(panel)
+        panel.axhspan(min(low, floor / 3), floor, color=_UNCERTAIN, zorder=0)
+    label_ticks(panel)
     panel.set_xlabel("wall time", fontsize=9)
 
 
-def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[tuple[float, float], bool] | None:
-    """(Wall time, error) and whether the modes are right; None for what cannot be drawn."""
+def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, float] | None:
+    """(Wall time, error); None for what cannot be drawn."""
     reading = comparison.reading(row, quantity)
-    if reading is None or row.cost is None or row.errors is None or not math.isfinite(reading.value):
+    if reading is None or row.cost is None or not math.isfinite(reading.value):
         return None
-    return (row.cost.wall_time, max(reading.value, _ZERO)), row.errors.sequence.right
+    return row.cost.wall_time, max(reading.value, _ZERO)
 
 
-def _look(i: int) -> tuple[str, str]:
-    colours = (*style.PALETTE, style.INK)
-    return colours[i % len(colours)], style.MARKERS[i % len(style.MARKERS)]
+def _verdict(row: Row) -> bool | None:
+    return row.errors.sequence.right if row.errors and row.errors.sequence is not None else None
 
 
-def _ticks(panel: Axes) -> None:
+def label_ticks(panel: Axes) -> None:
     """Wall times as "20 ms", as many as can be read; decades of the error."""
     low, high = panel.get_xlim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
@@ -136,28 +137,24 @@ def _ticks(panel: Axes) -> None:
     panel.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _legend(comparison: Comparison, panel: Axes) -> None:
-    handles: list[Artist] = []
-    for i, label in enumerate(comparison.labels):
-        colour, marker = _look(i)
-        failed = sum(row.label == label and row.errors is None for row in comparison.rows)
-        text = style.literal(label) + (f" ({failed} failed)" if failed else "")
-        handles.append(
-            Line2D([], [], color=colour, marker=marker, markersize=_SIZE, linewidth=1.1, label=text)
-        )
-    if any(row.errors is not None and not row.errors.sequence.right for row in comparison.rows):
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=style.INK,
-                marker="o",
-                markerfacecolor="white",
-                markersize=_SIZE,
-                linewidth=0,
-                label="hollow: wrong modes",
-            )
-        )
-    if any(comparison.floor(quantity) > 0 for quantity in QUANTITIES):
-        handles.append(Patch(color="#eeeeee", label="reference uncertain"))
-    panel.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=9)
+def handles(
+    rows: Iterable[Row], comparisons: Sequence[Comparison], chosen: dict[str, Look], size: float = SIZE
+) -> list[Artist]:
+    """The legend: a line each, and what hollow, half filled and grey mean where they occur."""
+    rows = list(rows)
+    found: list[Artist] = []
+    for label, look in chosen.items():
+        lost = sum(row.label == label and row.errors is None for row in rows)
+        found.append(look.handle(style.literal(label) + (f" ({lost} without result)" if lost else ""), size))
+    verdicts = {_verdict(row) for row in rows if row.errors is not None}
+    for verdict, fill, text in (
+        (False, "none", "hollow: wrong modes"),
+        (None, "left", "half filled: no modes to judge"),
+    ):
+        if verdict in verdicts:
+            mark = Line2D([], [], color=style.INK, marker="o", markersize=size, linewidth=0, label=text)
+            mark.set(fillstyle=fill, markerfacecoloralt="white")
+            found.append(mark)
+    if any(comparison.floor(quantity) > 0 for comparison in comparisons for quantity in QUANTITIES):
+        found.append(Patch(color=_UNCERTAIN, label="reference uncertain"))
+    return found

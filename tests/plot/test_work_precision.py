@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.figure import Figure
 from plot.fake_comparison import PERIOD, comparison
 
 from hybridsim.errors import UsageError
 from hybridsim.plot import save, work_precision
+from hybridsim.plot.lines import looks
 
 
 def points(panel) -> list[tuple[float, float, bool]]:
@@ -35,23 +37,59 @@ def test_points_stand_where_they_belong_and_wrong_modes_are_hollow() -> None:
 def test_legend_names_every_line_once_and_what_hollow_means() -> None:
     *_, panel = work_precision(comparison())
     texts = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert texts[:8] == [*comparison().labels[:7], "third-party (1 failed)"]
+    assert texts[:8] == [*comparison().labels[:7], "third-party (1 without result)"]
     assert texts[8:] == ["hollow: wrong modes", "reference uncertain"]
 
 
-def test_without_period_and_events_the_panels_say_so() -> None:
+def without(result, *quantities: str):
+    """The comparison without some kinds of error."""
+    gone = dict.fromkeys(quantities)
+    rows = tuple(
+        replace(row, errors=replace(row.errors, **gone)) if row.errors else row for row in result.rows
+    )
+    return replace(result, rows=rows, period=None, uncertainty=None)
+
+
+def test_there_is_a_panel_for_each_kind_of_error_and_no_other() -> None:
+    result = without(comparison(), "state_last_period")
+    whole, events = work_precision(result)
+    assert len(points(whole)) == len(points(events)) == 35
+    assert events.get_title(loc="left") == "Largest event-time error"
+    rows = tuple(
+        replace(row, errors=replace(row.errors, graph=1e-5)) if row.errors else row for row in result.rows
+    )
+    *_, graphs = work_precision(replace(result, rows=rows))
+    assert graphs.get_title(loc="left") == "Distance of the graphs"
+    assert {y for _, y, _ in points(graphs)} == {1e-5}
+
+
+def test_where_nothing_ran_the_chart_says_so() -> None:
+    result = comparison()
+    lost = replace(result, rows=result.rows[-1:], uncertainty=None)
+    (panel,) = work_precision(lost)
+    assert [text.get_text() for text in panel.texts] == ["no run to show"]
+
+
+def test_families_share_a_hue_and_every_line_looks_different() -> None:
+    rows = list(comparison().rows)
+    rows += [replace(row, label=f"{row.label}, native events") for row in rows[:10]]
+    chosen = looks(rows)
+    assert len({(look.colour, look.marker, look.dashes) for look in chosen.values()}) == len(chosen)
+    native, ours = chosen["scipy-rk45, native events"], chosen["scipy-rk45"]
+    assert (native.colour, native.marker) == (ours.colour, ours.marker) and native.dashes != ours.dashes
+    hues = {name: round(rgb_to_hsv(to_rgb(look.colour))[0], 2) for name, look in chosen.items()}
+    assert hues["scipy-rk45"] == hues["scipy-dop853"] != hues["cvode-bdf"] == hues["cvode-adams"]
+
+
+def test_a_run_without_modes_is_half_filled() -> None:
     result = comparison()
     rows = tuple(
-        replace(
-            row, errors=replace(row.errors, state_last_period=None, event_time=None) if row.errors else None
-        )
-        for row in result.rows
+        replace(row, errors=replace(row.errors, sequence=None)) if row.errors else row for row in result.rows
     )
-    whole, last, events = work_precision(replace(result, rows=rows, period=None, uncertainty=None))
-    assert len(points(whole)) == 35 and not points(last) and not points(events)
-    assert [text.get_text() for text in last.texts] == ["the model has no period"]
-    assert [text.get_text() for text in events.texts] == ["no events to compare"]
-    assert events.get_title(loc="left") == "Largest event-time error"
+    *_, panel = work_precision(replace(result, rows=rows))
+    marked = [line for line in panel.get_lines() if line.get_marker() != "None"]
+    assert {line.get_fillstyle() for line in marked} == {"left"}
+    assert "half filled: no modes to judge" in [text.get_text() for text in panel.get_legend().get_texts()]
 
 
 def test_an_error_of_zero_is_drawn() -> None:
@@ -65,7 +103,7 @@ def test_axes_of_the_caller_are_used(tmp_path) -> None:
     figure = Figure(figsize=(12, 4))
     axes = figure.subplots(1, 3)
     assert work_precision(comparison(), axes) == tuple(axes)
-    with pytest.raises(UsageError, match="2 axes for three panels"):
+    with pytest.raises(UsageError, match="2 axes for 3 kinds of error"):
         work_precision(comparison(), axes[:2])
     assert save(work_precision(comparison()), tmp_path / "chart.png").exists()
 

@@ -1,0 +1,157 @@
+"""All runs of one or several benches within a budget of time: first runs, then repetitions in turns over all."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from hybridsim.analysis.bench import Bench
+from hybridsim.analysis.reference import Reference
+from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
+from hybridsim.analysis.series import Series
+from hybridsim.analysis.timing import timed_in_turns
+
+# Of its equal share of the budget, a run may take this much: most runs take far less than theirs.
+_SHARES = 10
+# A run that turns out longer than was predicted is stopped at this many times what it may take.
+_PATIENCE = 2
+
+
+class Budget:
+    """Seconds that may be spent, from now on."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds, self._began = seconds, time.monotonic()
+
+    @property
+    def spent(self) -> float:
+        """Seconds since the start."""
+        return time.monotonic() - self._began
+
+    @property
+    def left(self) -> float:
+        """Seconds that remain, at least zero."""
+        return max(self.seconds - self.spent, 0.0)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A bench, its reference, and the lines that are to be run on it."""
+
+    bench: Bench
+    reference: Reference
+    lines: tuple[Series, ...]
+
+
+@dataclass(frozen=True)
+class _Run:
+    entry: int
+    line: int
+    level: int
+
+
+def race(
+    entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
+) -> list[tuple[Row, ...]]:
+    """Rows of each entry, in the order of its lines.
+
+    First everything is run once, the loosest setting of every line before the second of any. From two settings of
+    a line follows what its next will take. One that would take more than ten times its equal share of the budget is
+    not started; where all of the next ones do not fit, the longest are not. With the time that is left, all is
+    repeated in turns, and where that is short the repetitions go first. A row says what became of it.
+
+    Parameters
+    ----------
+    step : called with what comes next, once for each first run and each repetition, done or not.
+    """
+    rows: dict[_Run, Row] = {}
+    runs = [
+        _Run(e, i, level)
+        for e, entry in enumerate(entries)
+        for i, line in enumerate(entry.lines)
+        for level in range(len(line.values))
+    ]
+    share = _SHARES * budget.seconds / max(len(runs) * (1 + repeat), 1)
+    for level in range(max((run.level + 1 for run in runs), default=0)):
+        here = [run for run in runs if run.level == level]
+        predicted = {run: _predicted(entries, rows, run) for run in here}
+        too_long = {
+            run: f"it would take some {seconds:.2g} s, of a budget of {budget.seconds:.3g} s for all runs"
+            if math.isfinite(seconds)
+            else "a looser setting took too long"
+            for run, seconds in predicted.items()
+            if seconds > share
+        }
+        too_long |= dict.fromkeys(
+            _not_fitting({run: predicted[run] for run in here if run not in too_long}, budget.left),
+            f"the budget of {budget.seconds:.3g} s is spent",
+        )
+        for run in here:
+            entry = entries[run.entry]
+            line = entry.lines[run.line]
+            value = line.values[level]
+            step(f"{entry.bench.model.name}: {line.label}, {line.varied} {value:g}")
+            reason = too_long.get(run) or (
+                "" if budget.left else f"the budget of {budget.seconds:.3g} s is spent"
+            )
+            if reason:
+                row = Row(
+                    line.integrator, line.label, (line.varied, value), line.options_at(value), NOT_STARTED
+                )
+                rows[run] = replace(row, message=reason, form=line.regularized)
+            else:
+                limit = min(_PATIENCE * share, budget.left)
+                rows[run] = entry.bench.first_run(line, value, entry.reference, limit)
+    _time(entries, rows, repeat, budget, step)
+    return [tuple(rows[run] for run in runs if run.entry == e) for e in range(len(entries))]
+
+
+def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
+    """Seconds that a run will take, from two settings before it on its line; 0 where nothing is known."""
+    before = [rows[replace(run, level=level)] for level in range(run.level)]
+    done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
+    if any(row.status == STOPPED for row in before):
+        return math.inf
+    if len(done) < 2:  # and the time of the very first may hold what is only done once
+        return 0.0
+    (earlier, cheaper), (value, cost) = done[-2:]
+    line = entries[run.entry].lines[run.line]
+    growth = math.log(max(cost.work / cheaper.work, 1.0)) / abs(math.log(value / earlier))
+    return cost.wall_time * math.exp(growth * abs(math.log(line.values[run.level] / value)))
+
+
+def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:
+    """The longest runs, as many as must go for the others to fit."""
+    gone = []
+    total = sum(predicted.values())
+    for run in sorted(predicted, key=lambda run: -predicted[run]):
+        if total <= seconds:
+            break
+        total -= predicted[run]
+        gone.append(run)
+    return gone
+
+
+def _time(
+    entries: Sequence[Entry],
+    rows: dict[_Run, Row],
+    repeat: int,
+    budget: Budget,
+    step: Callable[[str], None],
+) -> None:
+    timed = [run for run, row in rows.items() if row.cost is not None]
+    calls, expected = [], []
+    for run in timed:
+        entry, cost = entries[run.entry], rows[run].cost
+        line = entry.lines[run.line]
+        calls.append(entry.bench.call(line, line.values[run.level]))
+        expected.append(cost.wall_time if cost else 0.0)
+
+    def announce(k: int) -> None:
+        step(f"timing {entries[timed[k].entry].bench.model.name}: {rows[timed[k]].label}")
+
+    times = timed_in_turns(calls, repeat, announce, expected, time.monotonic() + budget.left)
+    for run, spent in zip(timed, times, strict=True):
+        rows[run] = rows[run].timed(spent)

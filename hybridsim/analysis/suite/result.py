@@ -1,0 +1,167 @@
+"""The result of the comparison suite: a comparison for each scene, and what follows from all of them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hybridsim.analysis.comparison import Comparison
+from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
+from hybridsim.analysis.suite.scenes import Scene
+from hybridsim.analysis.suite.verdict import Verdict, verdict
+from hybridsim.analysis.table import setting
+
+ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
+
+
+@dataclass(frozen=True)
+class SceneResult:
+    """A scene and the comparison of the integrators on it."""
+
+    scene: Scene
+    comparison: Comparison
+
+    def cheapest(self, accuracy: float) -> Row | None:
+        """The row of least wall time whose states are within an accuracy over the whole run, in the right modes."""
+        good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
+        return min(good, key=lambda row: row.cost.wall_time if row.cost else 0.0, default=None)
+
+    def _reaches(self, row: Row, accuracy: float) -> bool:
+        reading = self.comparison.reading(row, "state")
+        return (
+            reading is not None
+            and reading.value <= accuracy
+            and row.errors is not None
+            and not row.errors.wrong_modes
+        )
+
+
+@dataclass(frozen=True)
+class SuiteComparison:
+    """All integrators on all scenes.
+
+    Parameters
+    ----------
+    results : one for each scene, in order.
+    repeat : timed repetitions that were asked for.
+    budget, seconds : what the suite was allowed to take, and what it took.
+    """
+
+    results: tuple[SceneResult, ...]
+    repeat: int
+    budget: float
+    seconds: float
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the lines, in order."""
+        return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
+
+    def verdicts(self) -> dict[str, dict[str, Verdict]]:
+        """Scene -> line -> verdict at a common tolerance."""
+        return {
+            result.scene.name: {
+                label: verdict(result.scene, [row for row in result.comparison.rows if row.label == label])
+                for label in result.comparison.labels
+            }
+            for result in self.results
+        }
+
+    def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
+        """Scene -> accuracy -> the cheapest row that reaches it; None where none does."""
+        return {
+            result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}
+            for result in self.results
+        }
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was not run, or not as often as was asked, and why; and what is doubtful about a reference."""
+        left_out: dict[tuple[str, str], list[str]] = {}
+        for result in self.results:
+            for row in result.comparison.rows:
+                if row.status in (NOT_STARTED, STOPPED):
+                    where = f"{result.scene.name} {setting(row)}"
+                    left_out.setdefault((row.label, row.status), []).append(where)
+        notes = [
+            f"{label}: {status}, because of the time it would take: {', '.join(places)}"
+            for (label, status), places in left_out.items()
+        ]
+        for result in self.results:
+            notes += [f"{result.scene.name}: {warning}" for warning in result.comparison.warnings]
+        timed = [
+            row.cost.repetitions for result in self.results for row in result.comparison.rows if row.cost
+        ]
+        fewer = [repetitions for repetitions in timed if repetitions < self.repeat]
+        if fewer:
+            notes.append(
+                f"{len(fewer)} of {len(timed)} runs were timed fewer than {self.repeat} times, "
+                f"{fewer.count(0)} of them only in the run that warms up"
+            )
+        return tuple(notes)
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """Versions and machine; the models' hashes are in the comparisons."""
+        facts = self.results[0].comparison.provenance
+        return {name: value for name, value in facts.items() if not name.startswith("model")}
+
+    def table(self) -> str:
+        """Who is right, what is cheapest, how well the references are known, and what is missing, as text."""
+        from hybridsim.analysis.suite.table import table
+
+        return table(self)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write one line a run of any scene; times in the model's unit, wall times in seconds."""
+        records = [
+            {"scene": result.scene.name, **record, "options": json.dumps(record["options"], default=str)}
+            for result in self.results
+            for record in result.comparison.records()
+        ]
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(records[0]))
+            writer.writeheader()
+            writer.writerows(records)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as plain values."""
+        return {
+            "repeat": self.repeat,
+            "budget": self.budget,
+            "seconds": self.seconds,
+            "notes": list(self.notes),
+            "provenance": dict(self.provenance),
+            "verdicts": {
+                scene: {label: str(found) for label, found in verdicts.items()}
+                for scene, verdicts in self.verdicts().items()
+            },
+            "cheapest": {
+                scene: {
+                    f"{accuracy:.0e}": {
+                        "label": row.label,
+                        "setting": setting(row),
+                        "wall_time": row.cost.wall_time,
+                    }
+                    if row and row.cost
+                    else None
+                    for accuracy, row in rows.items()
+                }
+                for scene, rows in self.cheapest().items()
+            },
+            "scenes": {
+                result.scene.name: {"why": result.scene.why, **result.comparison.to_dict()}
+                for result in self.results
+            },
+        }
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """Everything, with versions and machine, as text; written where a path is given."""
+        text = json.dumps(self.to_dict(), indent=2, default=str)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text

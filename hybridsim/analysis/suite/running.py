@@ -1,0 +1,127 @@
+"""Runs the comparison suite within a budget of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from hybridsim.analysis.bench import Bench
+from hybridsim.analysis.progress import Progress, Steps
+from hybridsim.analysis.race import Budget, Entry, race
+from hybridsim.analysis.reference import CLOSED_FORM, MULTIPLE_PRECISION, RUNS, Reference, find_reference
+from hybridsim.analysis.series import Series, choose_series
+from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
+from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
+from hybridsim.engine.period import forcing_period
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import load
+
+BUDGET = 600.0
+# Of the budget, what the reference of one scene may take: all of them together then leave most of it to the runs.
+_REFERENCE_SHARE = 1 / 20
+
+
+_RUNNING = 0.95  # what is left is for writing and drawing
+
+
+class _TooSlow(Exception):
+    """A reference has used up its time."""
+
+
+def compare_suite(
+    *,
+    scenes: Sequence[str] | None = None,
+    integrators: Sequence[str | tuple[str, Mapping[str, Any]] | Series] | None = None,
+    rtols: Sequence[float] | None = None,
+    steps: Sequence[int] | None = None,
+    repeat: int = 3,
+    budget: float = BUDGET,
+    progress: Progress | None = None,
+) -> SuiteComparison:
+    """Run the scenes of the suite with several integrators at several settings: who is right, and at what cost.
+
+    Every scene has a reference that owes nothing to the engine, a closed form or a motion in multiple precision,
+    and a second one by the most accurate integrator; the result says how far the two are apart.
+
+    Parameters
+    ----------
+    scenes : names of the scenes to run; all if not given.
+    integrators, rtols, steps, repeat : as in `compare`; repetitions take turns over all scenes.
+    budget : seconds that all of it may take. Where they do not suffice, the repetitions go first, then the
+        settings that take longest; `SuiteComparison.notes` says what is missing.
+    progress : called as progress(done, total, what is next).
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> suite = hs.compare_suite(scenes=["P1", "belt"], budget=60)  # doctest: +SKIP
+    >>> print(suite.table())  # doctest: +SKIP
+    """
+    if repeat < 1:
+        raise UsageError(f"repeat = {repeat}", remedy="give a whole number above zero")
+    if not budget > 0:
+        raise UsageError(f"budget = {budget!r}", remedy="give a number of seconds above zero")
+    spending = Budget(_RUNNING * budget)
+    chosen = _chosen(scenes)
+    benches = [_bench(scene) for scene in chosen]
+    lines = [
+        choose_series(integrators, rtols, steps, None if bench.period else bench.t_span[1] - bench.t_span[0])
+        for bench in benches
+    ]
+    runs = sum(len(line.values) for series in lines for line in series)
+    step = Steps(len(chosen) + (1 + repeat) * runs, progress)
+    entries = []
+    for scene, bench, series in zip(chosen, benches, lines, strict=True):
+        step(f"reference of {scene.name}")
+        reference = _reference(bench, min(budget * _REFERENCE_SHARE, spending.left), step)
+        entries.append(Entry(bench, reference, series))
+    rows = race(entries, repeat, spending, step)
+    step.finish()
+    results = [
+        SceneResult(scene, entry.bench.comparison(entry.reference, found, repeat))
+        for scene, entry, found in zip(chosen, entries, rows, strict=True)
+    ]
+    return SuiteComparison(tuple(results), repeat, budget, spending.spent)
+
+
+def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
+    if names is None:
+        return SCENES
+    for name in names:
+        if name not in scene_names():
+            raise UsageError(
+                f"the suite has no scene {name!r}", remedy=nearest(name, scene_names(), kind="scenes")
+            )
+    if not names:
+        raise UsageError("no scenes to run", remedy=f"name some of {', '.join(scene_names())}")
+    return tuple(scene for scene in SCENES if scene.name in names)
+
+
+def _bench(scene: Scene) -> Bench:
+    model = load(scene.model).with_(**scene.params).validate()
+    period = forcing_period(model)
+    length = scene.t_end if scene.periods is None else scene.periods * (period or math.nan)
+    return Bench(model, (0.0, float(length or math.nan)), period)
+
+
+def _reference(bench: Bench, seconds: float, step: Callable[[str], None]) -> Reference:
+    """A reference that owes nothing to the engine; two runs, and a warning, where that takes too long."""
+    limit = Budget(seconds)
+
+    def watch(_: float) -> None:
+        if not limit.left:
+            raise _TooSlow
+
+    def find(kinds: tuple[str, ...]) -> Reference:
+        return find_reference(bench.model, bench.t_span, bench.period, bench.simulate, kinds, watch)
+
+    try:
+        return find((CLOSED_FORM, MULTIPLE_PRECISION, RUNS))
+    except _TooSlow:
+        warning = (
+            f"a reference in multiple precision was not ready after {seconds:.2g} s: two runs stand in for it"
+        )
+        found = find((RUNS,))
+        return replace(found, warnings=(*found.warnings, warning))

@@ -1,0 +1,114 @@
+"""The scenes of the comparison suite, as data: what each one is, and which kind of error it sees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A model in one setting.
+
+    Parameters
+    ----------
+    name, title : for the table and the chart.
+    model : name of a packaged model.
+    why : what this scene shows that the others do not.
+    params : parameter values in place of the declared ones.
+    periods, t_end : length of the run, in periods of the forcing or in the model's unit of time.
+    needs : capabilities (keys of `CAPABILITIES`) without which a wrong sequence of modes is no surprise.
+    """
+
+    name: str
+    title: str
+    model: str
+    why: str
+    params: Mapping[str, float | str] = field(default_factory=dict)
+    periods: float | None = None
+    t_end: float | None = None
+    needs: tuple[str, ...] = ()
+
+
+SCENES: tuple[Scene, ...] = (
+    Scene(
+        "P1",
+        "P1: two stops a period",
+        "dfcs",
+        "The published point (He et al. 2026, Table 1 with F0 = 30 N): the body sticks twice in each period.",
+        {"F0": 30, "N": 40, "omega": "0.6*sqrt(k/m)"},
+        periods=10,
+    ),
+    Scene(
+        "P2",
+        "P2: barely moving",
+        "dfcs",
+        "The published point with F0 = 22 N: the force exceeds the limit of 20 N by little, so stick fills most of a "
+        "period, and a release is a small difference of large forces.",
+        {"F0": 22, "N": 40, "omega": "0.64*sqrt(k/m)"},
+        periods=10,
+    ),
+    Scene(
+        "no-stop",
+        "No stop: velocity crosses zero",
+        "dfcs",
+        "Forced hard above resonance, the body turns round without a stop: each zero of the velocity is a crossing, "
+        "and nothing erases an error of the past.",
+        {"F0": 60, "N": 40, "omega": "1.4*sqrt(k/m)"},
+        periods=12,
+    ),
+    Scene(
+        "grazing",
+        "Near grazing: stops that barely happen",
+        "dfcs",
+        "At 0.2 of resonance the body swings within each half period, and its velocity comes back to almost zero. In "
+        "the closed form it would go on to -5.2e-4, -1.0e-4 and -1.2e-5 of its largest value in the first three half "
+        "periods, which makes short stops, and stays above +7e-6 in the later ones, which makes none. So the modes "
+        "are right only where the velocity is right to some 1e-5 and both zeros of a pair are seen.",
+        {"F0": 62.035, "N": 40, "omega": "0.2*sqrt(k/m)"},
+        periods=4,
+        needs=("multiple-roots",),
+    ),
+    Scene(
+        "belt",
+        "Belt: friction falls with speed",
+        "belt",
+        "A limit cycle without any forcing, of a force that is not linear: one stick and one slip in each cycle.",
+        t_end=50.0,
+    ),
+    Scene(
+        "static-kinetic",
+        "Pulled slider: the force jumps",
+        "static-kinetic",
+        "Static friction above kinetic: at each release the acceleration jumps, after a stick that is forty times as "
+        "long as the slip.",
+        t_end=12.0,
+    ),
+    Scene(
+        "bouncing-ball",
+        "Bouncing ball: the state jumps",
+        "bouncing-ball",
+        "Impacts that follow each other faster and faster, and a rest. Around a jump errors are measured from the "
+        "same side of it, and as a distance of the graphs.",
+        t_end=2.8,
+    ),
+    Scene(
+        "stribeck",
+        "Stribeck law: not linear in slip",
+        "dfcs-stribeck",
+        "The reference model with friction that falls with speed: no closed form, and a jump at each release.",
+        periods=8,
+    ),
+    Scene(
+        "base-isolation",
+        "Base-isolated storey, measured record",
+        "base-isolation",
+        "Four states under an input with a thousand knots: each knot ends a step, so a long one is worth nothing.",
+        t_end=6.0,
+    ),
+)
+
+
+def scene_names() -> tuple[str, ...]:
+    """Names of the scenes, in order."""
+    return tuple(scene.name for scene in SCENES)

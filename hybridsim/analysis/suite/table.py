@@ -1,0 +1,76 @@
+"""The comparison suite as a text for people: who is right, what is cheapest, how well the references are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.suite.verdict import COMMON
+from hybridsim.analysis.table import differences, milliseconds, setting, versions
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.suite.result import SuiteComparison
+
+
+def table(suite: SuiteComparison) -> str:
+    """All blocks."""
+    blocks = [_who_is_right(suite), _cheapest(suite), _references(suite), _notes(suite)]
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _who_is_right(suite: SuiteComparison) -> list[str]:
+    verdicts = suite.verdicts()
+    # A long name goes over two lines, so that nine scenes fit beside each other.
+    heads = [name.rpartition("-") if len(name) > 8 else ("", "", name) for name in verdicts]
+    rows = [["", *(first + dash for first, dash, _ in heads)], ["", *(last for *_, last in heads)]]
+    rows += [
+        [f"  {label}", *(str(found.get(label, "-")) for found in verdicts.values())] for label in suite.labels
+    ]
+    title = (
+        f"Who is right, at rtol {COMMON['rtol']:.0e}, or with {COMMON['steps_per_period']:g} steps a period "
+        "where the step is fixed"
+    )
+    return [title, *_aligned(rows)]
+
+
+def _cheapest(suite: SuiteComparison) -> list[str]:
+    cheapest = suite.cheapest()
+    accuracies = next(iter(cheapest.values()))
+    rows = [["", *(f"to {accuracy:.0e}" for accuracy in accuracies)]]
+    for scene, found in cheapest.items():
+        cells = [
+            f"{row.label} {setting(row)}, {milliseconds(row.cost.wall_time)}" if row and row.cost else "none"
+            for row in found.values()
+        ]
+        rows.append([f"  {scene}", *cells])
+    return ["Cheapest, by the largest error of the states over the run", *_aligned(rows)]
+
+
+def _references(suite: SuiteComparison) -> list[str]:
+    lines = ["References"]
+    for result in suite.results:
+        found = result.comparison
+        if found.difference is None:
+            second = "no second one"
+        else:
+            second = f"{found.second_reference} differs by: {differences(found)}"
+        lines.append(f"  {result.scene.name}: {found.reference}; {second}")
+    return lines
+
+
+def _notes(suite: SuiteComparison) -> list[str]:
+    return [
+        "State errors: the largest of all states, relative to each one's amplitude in the reference.",
+        "Event times are in periods of the forcing where there is one, else in the model's unit of time.",
+        f"Wall times: median of up to {suite.repeat}, in turns over all runs of all scenes.",
+        f"It took {suite.seconds:.0f} s of {suite.budget:g} s.",
+        versions(suite.provenance),
+        *(["Not as asked:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
+    ]
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]

@@ -1,0 +1,111 @@
+"""How the lines of a comparison look: a hue for each family, a marker for each method, dashes for native events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.lines import Line2D
+
+from hybridsim.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis.rows import Row
+
+SIZE = 6.5
+
+# The hue of each family, from Okabe and Ito's palette: of the published methods, of SciPy's explicit ones, its other
+# ones, SUNDIALS, and of all that is none of these. A name belongs to the first prefix that it has.
+_FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (style.INK, ("rk4-",)),
+    (style.PALETTE[1], ("scipy-rk", "scipy-dop")),
+    (style.PALETTE[2], ("scipy-",)),
+    (style.PALETTE[3], ("cvode-",)),
+    (style.PALETTE[0], ("",)),
+)
+_MARKERS = (*style.MARKERS, "h", "d", "8")
+_DARK, _LIGHT = 0.7, 0.4  # the range of shades of a hue: this much of it in black, and in white
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour, marker and dashes of a line."""
+
+    colour: str
+    marker: str
+    dashes: str
+
+    def handle(self, label: str, size: float = SIZE) -> Line2D:
+        """What stands for the line in a legend."""
+        return Line2D(
+            [], [], color=self.colour, marker=self.marker, linestyle=self.dashes, markersize=size, linewidth=1.1,
+            label=label,
+        )  # fmt: skip
+
+
+def looks(rows: Iterable[Row]) -> dict[str, Look]:
+    """Label -> look, in the order of the rows.
+
+    Methods of one family share a hue and differ in lightness and marker; two lines of one method (our events and
+    its own, as published and refined) differ in their dashes.
+    """
+    methods: dict[str, list[str]] = {}
+    names: dict[str, str] = {}
+    for row in rows:
+        name = f"{row.form} {row.integrator}".strip()
+        names.setdefault(row.label, name)
+        labels = methods.setdefault(name, [])
+        if row.label not in labels:
+            labels.append(row.label)
+    families: dict[str, list[str]] = {}
+    for name in methods:
+        families.setdefault(_hue(name), []).append(name)
+    found = {}
+    for label, name in names.items():
+        hue = _hue(name)
+        place, size = families[hue].index(name), len(families[hue])
+        marker = _MARKERS[list(methods).index(name) % len(_MARKERS)]
+        dashes = ("-", "--", ":", "-.")[methods[name].index(label) % 4]
+        found[label] = Look(_shade(hue, place, size), marker, dashes)
+    return found
+
+
+def _hue(name: str) -> str:
+    return next(hue for hue, prefixes in _FAMILIES if name.startswith(prefixes))
+
+
+def _shade(hue: str, place: int, count: int) -> str:
+    """One of `count` shades of a hue, dark first."""
+    if count == 1:
+        return hue
+    part = place / (count - 1)
+    dark, light = _DARK + (1 - _DARK) * min(2 * part, 1), 1 - _LIGHT * max(2 * part - 1, 0)
+    return to_hex([light * dark * channel + 1 - light for channel in to_rgb(hue)])
+
+
+def draw_line(
+    panel: Axes, look: Look, points: Sequence[tuple[float, float]], spreads: Sequence[tuple[float, float]],
+    verdicts: Sequence[bool | None], size: float = SIZE,
+) -> None:  # fmt: skip
+    """Draw the settings of a line at their (time, error), with the spread of the times.
+
+    A point is filled where the modes are right, hollow where they are wrong, half filled where there are none to
+    judge.
+    """
+    if not points:
+        return
+    panel.plot(
+        *zip(*points, strict=True), color=look.colour, linestyle=look.dashes, linewidth=size / 6, zorder=2
+    )
+    for (x, y), (low, high), right in zip(points, spreads, verdicts, strict=True):
+        if high > low:
+            panel.plot([low, high], [y, y], color=look.colour, linewidth=size / 2.6, alpha=0.35, zorder=2)
+        panel.plot(
+            x, y, look.marker, color=look.colour, markersize=size, markeredgewidth=size / 5,
+            markerfacecolor="white" if right is False else look.colour, markerfacecoloralt="white",
+            fillstyle="left" if right is None else "full",
+        )  # fmt: skip
