@@ -150,7 +150,9 @@ def test_two_blocks_that_stick_to_each_other_are_released_where_their_contact_ca
 def test_dop853_agrees(name: str, end: float, period: float) -> None:
     """At rtol 1e-12 the states differ by less than 1e-8 of their amplitudes, event times by 1e-9 of a period."""
     model = hs.load(name)
-    truth = Yardstick(multiple_precision_trajectory(model, (0, end), digits=24), resets_of(model), [1, 1], None)
+    truth = Yardstick(
+        multiple_precision_trajectory(model, (0, end), digits=24), resets_of(model), [1, 1], None
+    )
     errors = truth.measure(trajectory_of(hs.simulate(model, (0, end), integrator="dop853", rtol=1e-12)))
     assert errors.sequence.right
     assert errors.state < 1e-8

@@ -25,7 +25,7 @@ _WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
 # The defect at the end of a step may be this much larger than the terms that the step was chosen by.
 _DEFECT = 2.0**12
 # So many events within so small a part of the span are an accumulation: no run gets past it event by event.
-_CROWD, _CROWDED = 60, 1e-10
+_CROWD, _CROWDED = 10, 1e-10
 
 
 class Run:
