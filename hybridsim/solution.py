@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -12,8 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError, nearest
+from hybridsim.model.units import time_unit, units_of
+from hybridsim.notebook import run_html
+from hybridsim.tables import Table, event_columns, event_frame
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
     from hybridsim.engine.system import System
     from hybridsim.engine.trajectory import Segment, Trajectory
     from hybridsim.model import Model
@@ -104,8 +110,8 @@ class Solution:
             low, high = sorted((self.t_start, self.t_end))
             return self._grid[(self._grid >= low) & (self._grid <= high)]
         parts = [segment.origin.high + (segment.s + segment.origin.low) for segment in self._segments]
-        if parts:
-            parts[-1][-1] = self.t_end  # asked for; the local time of the end is rounded
+        for part, end in zip(parts, self._ends, strict=True):
+            part[-1] = end  # its local time is rounded
         return np.concatenate(parts) if parts else np.zeros(0)
 
     @cached_property
@@ -167,20 +173,29 @@ class Solution:
         return out[0] if np.ndim(given) == 0 else out
 
     def _quantity(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        if name in self.names:
+            return x[:, self.names.index(name)]
+        return self._quantities([name], segment, s, x)[0]
+
+    def _quantities(
+        self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
+    ) -> list[np.ndarray]:
+        """Discrete states and other quantities that are no states, at points of a segment."""
         system = self._system
-        if name in system.names:
-            return x[:, system.names.index(name)]
         discrete = [d.name for d in self.model.discrete]
-        if name in discrete:
-            return np.full(len(s), segment.p[system.layout.discrete_at + discrete.index(name)])
-        values = system.rows(
-            "quantities", len(system.quantities), s, np.ascontiguousarray(x), segment.p, segment.z
-        )
-        chosen = name
-        for c, automaton in enumerate(system.automata):
-            special = f"{name} in {automaton.name}.{automaton.modes[segment.z[c]]}"
-            chosen = special if special in system.quantities else chosen
-        return values[:, system.quantities.index(chosen)]
+        known = system.quantities
+        values = np.zeros((len(s), 0))
+        if any(name not in discrete for name in names):
+            values = system.rows("quantities", len(known), s, np.ascontiguousarray(x), segment.p, segment.z)
+        modes = [f"{a.name}.{a.modes[m]}" for a, m in zip(system.automata, segment.z, strict=True)]
+        found = []
+        for name in names:
+            if name in discrete:
+                found.append(np.full(len(s), segment.p[system.layout.discrete_at + discrete.index(name)]))
+                continue
+            special = [f"{name} in {mode}" for mode in modes if f"{name} in {mode}" in known]
+            found.append(values[:, known.index(special[-1] if special else name)])
+        return found
 
     def _states(self, segment: Segment, s: np.ndarray) -> np.ndarray:
         x = np.ascontiguousarray(segment.dense(s), dtype=float)
@@ -195,6 +210,11 @@ class Solution:
     @cached_property
     def _starts(self) -> np.ndarray:
         return np.array([float(segment.start) for segment in self._segments])
+
+    @property
+    def _ends(self) -> list[float]:
+        """Where each segment ends: to the last bit where the next begins."""
+        return [*self._starts[1:].tolist(), self.t_end] if self._segments else []
 
     def _pieces(self, times: np.ndarray, side: str) -> list[tuple[Segment, np.ndarray, np.ndarray]]:
         """(segment, indices of the times in it, their local times)."""
@@ -249,12 +269,12 @@ class Solution:
         result = {}
         for c, automaton in enumerate(self._system.automata):
             runs: list[ModeInterval] = []
-            for segment in self._segments:
+            for segment, start, end in zip(self._segments, self._starts.tolist(), self._ends, strict=True):
                 mode = automaton.modes[segment.z[c]]
                 if runs and runs[-1].mode == mode:
-                    runs[-1] = ModeInterval(mode, runs[-1].t0, float(segment.end))
+                    runs[-1] = ModeInterval(mode, runs[-1].t0, end)
                 else:
-                    runs.append(ModeInterval(mode, float(segment.start), float(segment.end)))
+                    runs.append(ModeInterval(mode, start, end))
             result[automaton.name] = tuple(runs)
         return result
 
@@ -312,29 +332,63 @@ class Solution:
         ]
         return [np.array(rows).reshape(-1, self._system.n) for rows in found]
 
-    # -- files ----------------------------------------------------------------------------------------------
+    # -- tables ---------------------------------------------------------------------------------------------
+
+    def table(self, points: int | None = None) -> Table:
+        """Times, states, outputs and modes in columns: what all the forms below are made of.
+
+        Parameters
+        ----------
+        points : how many equal steps of time to take, both ends included; without it ``sol.t``: the integrator's own
+            steps with each event time twice, on both its sides, or the grid of `simulate`.
+        """
+        if points is not None and points < 2:
+            raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
+        model, own_steps = self.model, points is None and self._grid is None
+        if own_steps:
+            t, ends = self.t, np.cumsum([len(g.s) for g in self._segments], dtype=int)
+            pieces = [
+                (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(self._segments, ends, strict=True)
+            ]
+        else:
+            t = self.t if points is None else np.linspace(self.t_start, self.t_end, points)
+            pieces = self._pieces(t, "+") if len(t) else []
+        names = [d.name for d in model.discrete]
+        names += [q for q in self._system.quantities if " in " not in q]
+        columns = {name: np.empty(len(t)) for name in (*self.names, *names)}
+        numbers = np.empty((len(self._system.automata), len(t)), dtype=np.int64)
+        for segment, chosen, s in pieces:
+            x = segment.x if own_steps else self._states(segment, s)
+            for name, values in zip(columns, (*x.T, *self._quantities(names, segment, s, x)), strict=True):
+                columns[name][chosen] = values
+            numbers[:, chosen] = segment.z[:, None]
+        return Table(
+            t,
+            columns,
+            {a.name: (a.modes, row) for a, row in zip(self._system.automata, numbers, strict=True)},
+            {name: unit for name, unit in ({"t": time_unit(model)} | units_of(model)).items() if unit},
+            {"model": model.name, "title": model.title, "integrator": self.integrator, "status": self.status},
+        )
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write time, states, outputs and modes as CSV; at `points` equal steps, else at ``sol.t``."""
-        outputs = [d.name for d in self.model.discrete]
-        outputs += [q for q in self._system.quantities if " in " not in q]
-        components = [a.name for a in self._system.automata]
-        header = ["t", *self.names, *outputs, *(f"mode({c})" for c in components)]
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            for segment, t, s, x in self._rows(points):
-                columns = [self._quantity(name, segment, s, x) for name in outputs]
-                modes = [a.modes[m] for a, m in zip(self._system.automata, segment.z, strict=True)]
-                for k in range(len(t)):
-                    values = [t[k], *x[k], *(column[k] for column in columns)]
-                    writer.writerow([*(repr(float(v)) for v in values), *modes])
+        """Write the `table` as CSV."""
+        self.table(points).to_csv(path)
 
-    def _rows(self, points: int | None) -> list[tuple[Segment, np.ndarray, np.ndarray, np.ndarray]]:
-        if points is None and self._grid is None:
-            return [(g, g.origin.high + (g.s + g.origin.low), g.s, g.x) for g in self._segments]
-        times = self.t if points is None else np.linspace(self.t_start, self.t_end, points)
-        return [(g, times[chosen], s, self._states(g, s)) for g, chosen, s in self._pieces(times, "+")]
+    def to_npz(self, path: str | PathLike[str], points: int | None = None) -> None:
+        """Write the `table` and the events for `numpy.load`: ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
+        self.table(points).to_npz(path, event_columns(self.events, self.names))
+
+    def to_pandas(self, points: int | None = None) -> pd.DataFrame:
+        """The `table` as a data frame over t; modes are categorical, units stand in its ``attrs``."""
+        return self.table(points).to_pandas()
+
+    def to_xarray(self, points: int | None = None) -> xr.Dataset:
+        """The `table` as a data set over t; modes are coordinates, each variable has its unit in its ``attrs``."""
+        return self.table(points).to_xarray()
+
+    def events_to_pandas(self) -> pd.DataFrame:
+        """The events as a data frame, one row each: t, kind, component, ..., the states before and after."""
+        return event_frame(self.events, self.names)
 
     def __repr__(self) -> str:
         kinds = Counter(e.kind for e in self.events)
@@ -355,3 +409,15 @@ class Solution:
             *(f"  warning: {w}" for w in self.warnings),
         ]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: how the run went, a strip of modes for each component, the events."""
+        stats, computed = self.stats, bool(self._segments)
+        head = {
+            self.status: f"{self.model.title or self.model.name}, by {self.integrator}",
+            "cost": f"{stats['steps']} steps ({stats['rejected']} rejected), "
+            f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+        }
+        head |= {} if self.success else {"message": self.message}
+        span = (self.t_start, self.t_end) if computed else None
+        return run_html(self.model, head, self.success, span, self.modes, self.events, self.warnings)

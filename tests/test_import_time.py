@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("sympy", "scipy", "numba", "matplotlib", "sksundae", "llvmlite")
+HEAVY = ("sympy", "scipy", "numba", "matplotlib", "sksundae", "llvmlite", "pandas", "xarray")
 
 LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules])"
 

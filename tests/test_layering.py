@@ -21,6 +21,9 @@ FLOORS = (
     "model",
     "engine",
     "integrators",
+    "tables",
+    "colours",
+    "notebook",
     "solution",
     "simulate",
     "ivp",
@@ -36,7 +39,9 @@ LIBRARIES = {
     "llvmlite": {"engine"},
     "sksundae": {"integrators"},
     "scipy": {"engine", "integrators", "solution", "analysis"},
-    "numpy": {"engine", "integrators", "solution", "simulate", "ivp", "analysis", "plot"},
+    "pandas": {"tables", "solution"},
+    "xarray": {"tables", "solution"},
+    "numpy": {"engine", "integrators", "tables", "solution", "simulate", "ivp", "analysis", "plot"},
     "matplotlib": {"plot"},
 }
 

@@ -60,6 +60,15 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw the run ({', '.join(PICTURES)})")
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the run as a table")
+    parser.add_argument(
+        "--npz", metavar="FILE", type=Path, help="write the run and its events for numpy.load"
+    )
+    parser.add_argument(
+        "--points",
+        metavar="N",
+        type=values.count,
+        help="equal steps of time for --csv and --npz (default: the integrator's own, events on both sides)",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON instead of the summary")
     parser.set_defaults(execute=execute)
 
@@ -70,6 +79,12 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         require_writable(args.plot, "--plot", PICTURES)
     if args.csv:
         require_writable(args.csv, "--csv")
+    if args.npz:
+        require_writable(args.npz, "--npz", (".npz",))
+    if args.points is not None and not (args.csv or args.npz):
+        raise UsageError("--points without --csv or --npz", remedy="say where the table is to be written")
+    if args.points == 1:
+        raise UsageError("--points 1", remedy="give at least 2: the start and the end")
     settings = _settings(args)
     model = values.changed_model(args)
     t_end = values.end_time(model, args.t_end)
@@ -97,8 +112,11 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _write(solution: Solution, args: argparse.Namespace, session: Session) -> None:
     if args.csv:
-        solution.to_csv(args.csv)
+        solution.to_csv(args.csv, args.points)
         session.wrote(args.csv)
+    if args.npz:
+        solution.to_npz(args.npz, args.points)
+        session.wrote(args.npz)
     if args.plot:
         from hybridsim.plot import save, time_history
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError, nearest
+from hybridsim.model.units import units_of
 
 if TYPE_CHECKING:
-    from hybridsim.model import Model
     from hybridsim.solution import Solution
 
 # Points of a whole picture, about four for each pixel across; and the fewest of a piece, so that a short
@@ -68,19 +67,6 @@ def unit_of(solution: Solution, name: str) -> str:
             remedy=nearest(name, units, kind="quantities"),
         )
     return units[name]
-
-
-def units_of(model: Model) -> dict[str, str]:
-    """Names of states, outputs, contact forces and discrete states, in that order, with their units."""
-    units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
-    rest = {contact.name: "" for contact in model.contacts} | {d.name: d.unit for d in model.discrete}
-    return units | {name: unit for name, unit in rest.items() if name not in units}
-
-
-def time_unit(model: Model) -> str:
-    """Seconds, if any unit of the model speaks of them; else time has no unit."""
-    units = [*units_of(model).values(), *(parameter.unit for parameter in model.parameters)]
-    return "s" if any(re.search(r"(?<![A-Za-z])s(?![A-Za-z])", unit) for unit in units) else ""
 
 
 def extent(pieces: Sequence[Piece], name: str) -> tuple[float, float]:

@@ -8,31 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure, SubFigure
 
+from hybridsim.colours import INK as INK
+from hybridsim.colours import PALETTE as PALETTE
+from hybridsim.colours import mode_colours as mode_colours
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridsim.model import Model
-
-# Okabe and Ito's palette, told apart with every kind of colour vision; yellow, too pale for a line, is out.
-INK = "#222222"
 FAINT = "#9a9a9a"
 MARK = "#c4c4c4"
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F4F24")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 150
-
-
-def mode_colours(model: Model) -> dict[str, str]:
-    """A colour for each mode by name: ink where a surface holds (stick), the palette in order for others."""
-    components = model.all_components()
-    held = {component.surface.hold for component in components if component.surface}
-    names = dict.fromkeys(mode.name for component in components for mode in component.modes)
-    free = [name for name in names if name not in held]
-    colours = {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(free)}
-    return {name: INK if name in held else colours[name] for name in names}
 
 
 def dress(axes: Axes) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
+from hybridsim.model.units import time_unit, units_of
 from hybridsim.plot import style
-from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, time_unit, unit_of, units_of, window_of
+from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, unit_of, window_of
 from hybridsim.plot.scale import label_axis
 
 if TYPE_CHECKING:

@@ -59,6 +59,9 @@ BAD = {
     "picture of an unknown kind": (["run", "dfcs", "--plot", "out.doc"], ["out.doc", ".png"]),
     "picture without an ending": (["run", "dfcs", "--plot", "out"], ["out", ".png"]),
     "picture in no folder": (["run", "dfcs", "--plot", "nowhere/out.png"], ["nowhere"]),
+    "points of no table": (["run", "dfcs", "--points", "9"], ["--points", "--csv"]),
+    "one point": (["run", "dfcs", "--csv", "x.csv", "--points", "1"], ["--points 1", "at least 2"]),
+    "arrays into a table": (["run", "dfcs", "--npz", "x.csv"], ["--npz", ".csv", ".npz"]),
     "table into a folder": (["run", "dfcs", "--csv", "."], ["--csv", "folder"]),
     "unknown integrator to compare": (
         ["compare", "dfcs", "--integrators", "cvode-bfd"],

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -68,6 +69,17 @@ def test_run_writes_what_was_asked_for(hybridsim: Callable, tmp_path: Path) -> N
         rows = list(csv.DictReader(file))
     assert {"t", "x", "v", "f"} <= set(rows[0])
     assert float(rows[-1]["t"]) == pytest.approx(2 * 2 * 3.141592653589793 / (0.6 * (1e5 / 0.2) ** 0.5))
+
+
+def test_run_writes_tables_of_equal_steps(hybridsim: Callable, tmp_path: Path) -> None:
+    argv = ("--csv", "out.csv", "--npz", "out.npz", "--points", "11")
+    code, _, err = hybridsim("run", "dfcs", "--t-end", "2T", *argv)
+    assert code == 0
+    assert err.splitlines() == ["hybridsim: wrote out.csv", "hybridsim: wrote out.npz"]
+    assert len((tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()) == 12
+    with np.load(tmp_path / "out.npz") as data:
+        assert np.diff(data["t"]) == pytest.approx(np.full(10, data["t"][-1] / 10))
+        assert len(data["x"]) == 11 and len(data["events/t"]) > 1
 
 
 @pytest.mark.parametrize("suffix", ["pdf", "svg"])

@@ -1,0 +1,22 @@
+"""The colours of modes, the same in pictures and in notebooks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+# Okabe and Ito's palette, told apart with every kind of colour vision; yellow, too pale for a line, is out.
+INK = "#222222"
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F4F24")
+
+
+def mode_colours(model: Model) -> dict[str, str]:
+    """A colour for each mode by name: ink where a surface holds (stick), the palette in order for others."""
+    components = model.all_components()
+    held = {component.surface.hold for component in components if component.surface}
+    names = dict.fromkeys(mode.name for component in components for mode in component.modes)
+    free = [name for name in names if name not in held]
+    colours = {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(free)}
+    return {name: INK if name in held else colours[name] for name in names}
