@@ -33,6 +33,18 @@ def test_the_ten_lines_run(tmp_path: Path) -> None:
     assert "mode changes" in done.stdout
 
 
+def test_the_page_on_python_prints_what_it_says(tmp_path: Path) -> None:
+    """Its examples in order; behind each print stands, as a comment, what it prints."""
+    code = "\n".join(blocks(ROOT / "docs" / "reference" / "python.md", "python"))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    said = re.findall(r"^ *print\(.*\)  # (.+)$", code, re.MULTILINE)
+    assert len(said) == code.count("print(") > 20
+    assert done.stdout.splitlines() == said
+
+
 def test_the_model_shown_is_the_model_shipped() -> None:
     (shown,) = blocks(README, "toml")
     model, shipped = hs.Model.from_toml(shown), hs.load("dfcs")
