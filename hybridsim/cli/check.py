@@ -1,21 +1,22 @@
-"""`hybridsim check MODEL`: read a model, report every fault, and print the automaton that it expands to."""
+"""`hybridsim check MODEL`: report every fault and every oddity, and print the automaton that the model expands to."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.automaton import lines_of
-from hybridsim.cli.output import print_json
+from hybridsim.cli.output import complain, print_json
 from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
     from hybridsim.engine.report import Report
     from hybridsim.expr import Expression
     from hybridsim.model import Mode, Model
+    from hybridsim.model.hygiene import Caution
 
 
 def add_to(commands: Any) -> None:
@@ -23,7 +24,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help="check a model and print its automaton",
-        description="Read a model, report every fault, and print the automaton that it expands to.",
+        description="Read a model, report every fault, warn about what is odd (guards that never fire, pulses that a "
+        "step may pass over, missing units), and print the automaton that it expands to.",
     )
     values.add_model_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -31,19 +33,23 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Print the expanded automaton; a bad model has already been refused on loading."""
+    """Print the expanded automaton, and warnings; a bad model has already been refused on loading."""
     from hybridsim.engine.report import describe
+    from hybridsim.model.hygiene import warnings_of
 
     model = values.changed_model(args)
     report = describe(model)
+    cautions = warnings_of(model)
     if args.json:
-        print_json(_record(model, report))
+        print_json(_record(model, report, cautions))
     else:
         print("\n".join(lines_of(model, report)))
+    for caution in cautions:
+        complain(f"warning: {caution}")
     return 0
 
 
-def _record(model: Model, report: Report) -> dict[str, Any]:
+def _record(model: Model, report: Report, cautions: Iterable[Caution]) -> dict[str, Any]:
     return {
         "name": model.name,
         "title": model.title,
@@ -57,6 +63,17 @@ def _record(model: Model, report: Report) -> dict[str, Any]:
             for component in model.all_components()
         },
         "engine": asdict(report),
+        "warnings": [_caution_record(caution) for caution in cautions],
+    }
+
+
+def _caution_record(caution: Caution) -> dict[str, Any]:
+    place = caution.place
+    return {
+        "message": caution.message,
+        "file": place.file if place else None,
+        "line": place.line if place else None,
+        "remedy": caution.remedy,
     }
 
 

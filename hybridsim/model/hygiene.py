@@ -1,0 +1,204 @@
+"""What a model may say and hardly means: guards that cannot fire, pulses that a step may pass over, missing units."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import HybridsimError, Place
+from hybridsim.expr import Expression
+from hybridsim.expr.grammar import TIME
+from hybridsim.model.one_sided import names_of, never_negative, number_of
+from hybridsim.model.pulses import pulse_in
+
+if TYPE_CHECKING:
+    from hybridsim.model.component import Component, Mode
+    from hybridsim.model.model import Model
+
+
+@dataclass(frozen=True)
+class Caution:
+    """A remark on a valid model: what is odd, where it is written, what to do about it."""
+
+    message: str
+    place: Place | None
+    remedy: str
+
+    def __str__(self) -> str:
+        return str(HybridsimError(self.message, place=self.place, remedy=self.remedy))
+
+
+def warnings_of(model: Model) -> tuple[Caution, ...]:
+    """Cautions about a valid model, those about guards first.
+
+    A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
+    lasts; one whose quantities have no units where all others have; a pulse in plain t. Nothing is reported that the
+    form of an expression does not show. The guards of contacts are made by the program and not looked at.
+    """
+    return (*_of_signs(model), *_of_units(model), *_of_pulses(model))
+
+
+class _Reading:
+    """What names stand for while a component is in a mode, and what can change meanwhile."""
+
+    def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
+        self.numbers = model.parameter_values()
+        self._trees = {name: expr.tree for name, expr in model.definitions}
+        self._trees |= {name: expr.tree for name, expr in (mode.set if mode else {}).items()}
+        others = [part for part in model.all_components() if part is not component]
+        self._moving = {TIME, *(signal.name for signal in model.inputs)}
+        self._moving |= {name for other in others for name in other.variables}
+        if mode is None:
+            self._moving |= set(model.variables())
+        self._moving |= _reset_names(model, component)
+        for state in model.states:
+            own = mode.der.get(state.name, state.der) if mode else state.der
+            rates = [own, *(m.der[state.name] for o in others for m in o.modes if state.name in m.der)]
+            if any(number_of(rate.tree, self.numbers, self.lookup) != 0 for rate in rates):
+                self._moving.add(state.name)
+
+    def lookup(self, name: str) -> ast.expr | None:
+        """The tree behind a name."""
+        return self._trees.get(name)
+
+    def changes(self, expr: Expression) -> bool:
+        """Whether anything that an expression depends on can change while the mode lasts."""
+        open_, seen = set(names_of(expr.tree)), set()
+        while open_:
+            name = open_.pop()
+            seen.add(name)
+            if name in self._moving:
+                return True
+            tree = self.lookup(name)
+            if tree is not None:
+                open_ |= names_of(tree) - seen
+        return False
+
+    def one_sided(self, expr: Expression) -> tuple[str, str] | None:
+        """("negative" or "positive", the reason) for an expression that is never so; None where that does not show."""
+        reason = never_negative(expr.tree, self.numbers, self.lookup)
+        if reason:
+            return "negative", reason
+        if isinstance(expr.tree, ast.UnaryOp) and isinstance(expr.tree.op, ast.USub):
+            reason = never_negative(expr.tree.operand, self.numbers, self.lookup)
+        return ("positive", f"minus {reason}") if reason else None
+
+
+def _reset_names(model: Model, own: Component | None) -> set[str]:
+    """States and discrete states that resets change, those of a component's own choices left out: they end its mode."""
+    resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
+    for component in model.components:
+        if component is not own:
+            resets += [c.reset for mode in component.modes for guard in mode.guards for c in guard.then]
+    return {name for reset in resets for name in reset}
+
+
+@dataclass(frozen=True)
+class _Watched:
+    """A guard or a monitor: what to call it, its expression and place, what its names stand for."""
+
+    what: str
+    expr: Expression
+    place: Place | None
+    reading: _Reading
+    is_guard: bool
+
+
+def _watched(model: Model) -> Iterator[_Watched]:
+    for component in model.components:
+        for mode in component.modes:
+            reading = _Reading(model, component, mode)
+            for guard in mode.guards:
+                what = (
+                    f"guard {guard.name} of mode {mode.name}, component {component.name}: '{guard.expr.text}'"
+                )
+                yield _Watched(what, guard.expr, guard.expr.place or guard.place, reading, True)
+    reading = _Reading(model)
+    for monitor in model.monitors:
+        what = f"monitor {monitor.name}: '{monitor.expr.text}'"
+        yield _Watched(what, monitor.expr, monitor.expr.place or monitor.place, reading, False)
+
+
+def _of_signs(model: Model) -> Iterator[Caution]:
+    """Guards and monitors that are constant, or of one sign."""
+    for item in _watched(model):
+        meant = "where the mode is to end" if item.is_guard else "where the monitor is to fire"
+        remedy = f"write a quantity that changes its sign {meant}."
+        if not item.reading.changes(item.expr):
+            so = "while the mode lasts: it fires at once or never" if item.is_guard else "and never fires"
+            yield Caution(f"{item.what} is constant {so}", item.place, remedy)
+        elif found := item.reading.one_sided(item.expr):
+            sign, reason = found
+            fires = (
+                "fires as soon as it is not zero" if item.is_guard and sign == "positive" else "never fires"
+            )
+            yield Caution(f"{item.what} is {reason}, never {sign}, so it {fires}", item.place, remedy)
+
+
+def _of_units(model: Model) -> Iterator[Caution]:
+    """Guards and monitors whose quantities have no units, where those of the others, and all other states, have.
+
+    Discrete states are left out: they count, as often as not.
+    """
+    units = {state.name: state.unit for state in model.states}
+    units |= {parameter.name: parameter.unit for parameter in model.parameters}
+    units |= {part.name: part.unit or "1" for part in model.discrete}
+    watched = [(item, _quantities(item.expr, item.reading, units)) for item in _watched(model)]
+    bare = [(item, names) for item, names in watched if names and not any(units[name] for name in names)]
+    measured = [item for item, names in watched if any(units[name] for name in names)]
+    named = {name for _, names in bare for name in names}
+    others = [state for state in model.states if state.name not in named]
+    if not (measured or len(bare) == 1) or not others or not all(state.unit for state in others):
+        return
+    for item, names in bare:
+        listed = ", ".join(sorted(names))
+        yield Caution(
+            f"{item.what} has no units ({listed}), unlike everything else that moves or is watched",
+            item.place,
+            f'give {listed} a unit (unit = "1" where it has none), or correct the names.',
+        )
+
+
+def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -> set[str]:
+    """States, discrete states and parameters that an expression depends on, as far as it names them."""
+    open_, seen = set(names_of(expr.tree)), set()
+    while open_:
+        name = open_.pop()
+        seen.add(name)
+        tree = reading.lookup(name)
+        if tree is not None:
+            open_ |= names_of(tree) - seen
+    return seen & units.keys()
+
+
+def _of_pulses(model: Model) -> Iterator[Caution]:
+    lookup = _Reading(model).lookup
+    found: set[str] = set()
+    for what, expr in _followed(model):
+        pulse = pulse_in(expr.tree, lookup)
+        if pulse is None or (text := ast.unparse(pulse)) in found:
+            continue
+        found.add(text)
+        yield Caution(
+            f"{what}: '{text}' is a pulse or a step in plain t, which an integrator's step may pass over",
+            expr.place,
+            "give it as an input (a table or a wave, whose knots are stepped to), or run with max_step at its width.",
+        )
+
+
+def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
+    """Every expression that is integrated or watched."""
+    for state in model.states:
+        yield f"state {state.name}", state.der
+    for contact in model.contacts:
+        yield f"contact {contact.name}", contact.velocity
+        yield f"contact {contact.name}", contact.normal
+    for component in model.components:
+        for mode in component.modes:
+            where = f"mode {mode.name} of component {component.name}"
+            yield from ((where, expr) for expr in (*mode.der.values(), *mode.set.values()))
+            yield from ((f"guard {guard.name} of {where}", guard.expr) for guard in mode.guards)
+    for monitor in model.monitors:
+        yield f"monitor {monitor.name}", monitor.expr

@@ -1,0 +1,98 @@
+"""Whether an expression can be negative at all, as far as its form shows: squares, absolute values and the like."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+
+from hybridsim.expr.grammar import CONSTANTS
+from hybridsim.expr.walk import NoValue, value_of
+
+Lookup = Callable[[str], ast.expr | None]
+"""The tree behind the name of a definition or a variable; None for any other name."""
+
+_POSITIVE_CALLS = {
+    "exp": "an exponential",
+    "sqrt": "a root",
+    "cosh": "a hyperbolic cosine",
+    "abs": "an absolute value",
+}
+
+
+def never_negative(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> str | None:
+    """Why an expression is never negative, in words such as "a square"; None where its form does not show it.
+
+    Parameters
+    ----------
+    numbers : values of the parameters.
+    """
+    constant = number_of(node, numbers, lookup)
+    if constant is not None:
+        return f"{constant:g}" if constant >= 0 else None
+
+    def both(a: ast.expr, b: ast.expr) -> list[str] | None:
+        found = [never_negative(part, numbers, lookup) for part in (a, b)]
+        return [reason for reason in found if reason] if all(found) else None
+
+    match node:
+        case ast.Name(id=name) if (tree := lookup(name)) is not None:
+            return never_negative(tree, numbers, lookup)
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return never_negative(operand, numbers, lookup)
+        case ast.BinOp(op=ast.Pow(), right=exponent):
+            power = number_of(exponent, numbers, lookup)
+            if power is None or power % 2:
+                return None
+            return "a square" if power == 2 else "an even power"
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            if ast.dump(left) == ast.dump(right):
+                return "a square"
+            return _factors(both(left, right), [left, right], numbers, lookup)
+        case ast.BinOp(left=left, op=ast.Div(), right=right):
+            return _factors(both(left, right), [left, right], numbers, lookup)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return "a sum of what is never negative" if both(left, right) else None
+        case ast.IfExp(body=body, orelse=orelse):
+            return "never negative on either side of its condition" if both(body, orelse) else None
+        case ast.Call(func=ast.Name(id="max"), args=args):
+            reasons = [never_negative(argument, numbers, lookup) for argument in args]
+            return "a maximum with what is never negative" if any(reasons) else None
+        case ast.Call(func=ast.Name(id=name)):
+            return _POSITIVE_CALLS.get(name)
+    return None
+
+
+def _factors(
+    reasons: list[str] | None, parts: list[ast.expr], numbers: Mapping[str, float], lookup: Lookup
+) -> str | None:
+    """The reason for a product: that of its only factor that varies, or of them all."""
+    if not reasons:
+        return None
+    varying = [r for r, part in zip(reasons, parts, strict=True) if number_of(part, numbers, lookup) is None]
+    return varying[0] if len(varying) == 1 else "a product of what is never negative"
+
+
+def number_of(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> float | None:
+    """The value of an expression of parameters and numbers; None for any other."""
+    values: dict[str, float] = {}
+    for name in names_of(node):
+        if name in numbers:
+            values[name] = numbers[name]
+        elif (tree := lookup(name)) is not None and (value := number_of(tree, numbers, lookup)) is not None:
+            values[name] = value
+        else:
+            return None
+    try:
+        return float(value_of(node, values))
+    except NoValue:
+        return None
+
+
+def names_of(node: ast.expr) -> set[str]:
+    """Names of quantities in a tree, functions and constants left out."""
+    called = {id(part.func) for part in ast.walk(node) if isinstance(part, ast.Call)}
+    return {
+        part.id
+        for part in ast.walk(node)
+        if isinstance(part, ast.Name) and id(part) not in called and part.id not in CONSTANTS
+    }

@@ -1,0 +1,41 @@
+"""`check` warns on stderr and in JSON, and still succeeds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+ODD = """schema = 1
+name = "odd"
+[states]
+x = { start = 0, der = "1" }
+[modes.a]
+initial = true
+guards.g = { expr = "(x - 1)**2", then = "b" }
+[modes.b]
+"""
+
+
+def test_a_warning_names_file_line_and_remedy(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(ODD)
+    code, out, err = hybridsim("check", "odd.toml")
+    assert code == 0
+    assert "mode a" in out
+    assert err.startswith("hybridsim: warning: odd.toml:7: guard g of mode a")
+    assert "never fires" in err and "write a quantity" in err
+
+
+def test_warnings_as_json(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(ODD)
+    code, out, _ = hybridsim("check", "odd.toml", "--json")
+    (warning,) = json.loads(out)["warnings"]
+    assert code == 0
+    assert (warning["file"], warning["line"]) == ("odd.toml", 7)
+    assert "never fires" in warning["message"] and warning["remedy"]
+
+
+def test_a_sound_model_leaves_stderr_empty(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("check", "dfcs", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["warnings"] == []
