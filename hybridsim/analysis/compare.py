@@ -11,6 +11,7 @@ from hybridsim.analysis.comparison import Comparison
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.analysis.race import Budget, Entry, race
 from hybridsim.analysis.reference import find_reference
+from hybridsim.analysis.regularised import regularised_series
 from hybridsim.analysis.series import Series, choose_series
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError
@@ -32,6 +33,8 @@ def compare(
     x0: Mapping[str, Any] | None = None,
     repeat: int = 3,
     reference: Any = None,
+    regularized: str | Sequence[str] | None = None,
+    v0: Sequence[float] | None = None,
     budget: float = BUDGET,
     progress: Progress | None = None,
 ) -> Comparison:
@@ -53,6 +56,11 @@ def compare(
     reference : what the errors are relative to: None for a closed form where one is known, else two accurate
         runs of different kind; "closed form", "multiple precision" or "runs" to insist; a Solution; or a function
         t -> states.
+    regularized : kinds of `Model.regularized`: runs these forms beside the set-valued law, over several v0 each, by
+        `cvode-bdf` and `dop853` at rtol 1e-9 if nothing else is given. Their errors are those of the form: against
+        the set-valued reference.
+    v0 : widths of these forms, in the unit of the relative velocity; from 1e-1 to 1e-4 of its nominal size if not
+        given.
     budget : seconds that all of it may take. What does not fit is not run, and its row says so: first the
         repetitions go, then the settings that take longest.
     progress : called as progress(done, total, what is next).
@@ -71,7 +79,15 @@ def compare(
     model = model.with_(**(params or {})).with_start(**(x0 or {})).validate()
     period = forcing_period(model)
     span = _span(t_span, period)
-    series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
+    if regularized is not None:
+        kinds = (regularized,) if isinstance(regularized, str) else tuple(regularized)
+        series = regularised_series(model, kinds, v0, _names(integrators), rtols)
+    elif v0 is not None:
+        raise UsageError(
+            "v0 is given without regularized", remedy="say which forms, such as regularized=['tanh']"
+        )
+    else:
+        series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
     bench = Bench(model, span, period)
     spending = Budget(budget)
     steps_to_do = Steps(1 + (1 + repeat) * sum(len(line.values) for line in series), progress)
@@ -80,6 +96,15 @@ def compare(
     (rows,) = race([Entry(bench, against, series)], repeat, spending, steps_to_do)
     steps_to_do.finish()
     return bench.comparison(against, rows, repeat)
+
+
+def _names(integrators: Sequence[Any] | None) -> Sequence[str] | None:
+    for item in integrators or ():
+        if not isinstance(item, str):
+            raise UsageError(
+                f"integrators holds {item!r}", remedy="with regularized, give names of integrators"
+            )
+    return integrators
 
 
 def _span(t_span: tuple[float, float] | None, period: float | None) -> tuple[float, float]:

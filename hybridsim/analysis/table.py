@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.analysis.regularised import exponents
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.analysis.timing import ENOUGH
 
@@ -114,6 +115,17 @@ def _graph_notes(comparison: Comparison) -> list[str]:
     return [f"Graph: Hausdorff distance of the completed graphs, in {unit} and amplitudes, to 1 %."]
 
 
+def _form_notes(comparison: Comparison) -> list[str]:
+    fitted = exponents(comparison)
+    if not fitted:
+        return []
+    lines = ["Against the set-valued law, as v0 falls (work in evaluations):"]
+    for label, powers in fitted.items():
+        error, work = (f"{power:.2f}" if power is not None else "?" for power in powers)
+        lines.append(f"  {label}: error ~ v0^{error}, work ~ v0^{work}")
+    return lines
+
+
 def _notes(comparison: Comparison) -> list[str]:
     unit = "periods T" if comparison.period else "the model's unit of time"
     facts = comparison.provenance
@@ -122,6 +134,7 @@ def _notes(comparison: Comparison) -> list[str]:
         "State errors: the largest of all states, relative to each one's amplitude in the reference.",
         f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
         *_graph_notes(comparison),
+        *_form_notes(comparison),
         *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
         f"Wall time of a call: median of {comparison.repeat} after a warm-up, in turns over all rows; fewer",
         f"of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",

@@ -48,6 +48,18 @@ def add_to(commands: Any) -> None:
         "--steps", metavar="N,N", type=values.counts, help="steps a period of the fixed-step integrators"
     )
     parser.add_argument(
+        "--regularized",
+        metavar="KIND,KIND",
+        type=values.names,
+        help="compare these regularised forms (tanh, arctan, karnopp) with the set-valued law",
+    )
+    parser.add_argument(
+        "--v0",
+        metavar="V,V",
+        type=values.positives,
+        help="their widths, in the unit of the velocity (default: 1e-1 to 1e-4 of its nominal size)",
+    )
+    parser.add_argument(
         "--repeat",
         metavar="N",
         type=values.count,
@@ -97,17 +109,21 @@ def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> i
             rtols=args.rtol,
             steps=args.steps,
             repeat=args.repeat,
+            regularized=args.regularized,
+            v0=args.v0,
             **({} if args.budget is None else {"budget": args.budget}),
             progress=lambda done, total, what: progress(done / total, what),
         )
-    from hybridsim.plot import work_precision
+    from hybridsim.plot import regularisation, work_precision
 
-    _write(comparison, args.json, folder, "chart.png", work_precision, session)
+    draw = regularisation if args.regularized else work_precision
+    _write(comparison, args.json, folder, "chart.png", draw, session)
     return 0
 
 
 def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
     given = {"MODEL": args.model, "-p": args.param, "--x0": args.x0, "--t-end": args.t_end}
+    given |= {"--regularized": args.regularized, "--v0": args.v0}
     for option, value in given.items():
         if value:
             raise UsageError(

@@ -2,6 +2,7 @@
 
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
+from hybridsim.plot.regularisation import regularisation
 from hybridsim.plot.style import save
 from hybridsim.plot.suite_page import suite_page
 from hybridsim.plot.time_history import TimeHistoryAxes, time_history
@@ -11,6 +12,7 @@ __all__ = [
     "TimeHistoryAxes",
     "friction_loop",
     "phase_portrait",
+    "regularisation",
     "save",
     "suite_page",
     "time_history",

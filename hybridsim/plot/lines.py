@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 
 SIZE = 6.5
 
+# Of regularised forms and the law that they stand for; their integrators differ in their dashes.
+_SET_VALUED = "set-valued"
+_FORMS = {
+    _SET_VALUED: style.INK,
+    "tanh": style.PALETTE[0],
+    "arctan": style.PALETTE[1],
+    "karnopp": style.PALETTE[2],
+}
 # The hue of each family, from Okabe and Ito's palette: of the published methods, of SciPy's explicit ones, its other
 # ones, SUNDIALS, and of all that is none of these. A name belongs to the first prefix that it has.
 _FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -51,12 +59,14 @@ def looks(rows: Iterable[Row]) -> dict[str, Look]:
     """Label -> look, in the order of the rows.
 
     Methods of one family share a hue and differ in lightness and marker; two lines of one method (our events and
-    its own, as published and refined) differ in their dashes.
+    its own, as published and refined) or of one regularised form differ in their dashes.
     """
+    rows = list(rows)
+    whole = _SET_VALUED if any(row.form for row in rows) else ""
     methods: dict[str, list[str]] = {}
     names: dict[str, str] = {}
     for row in rows:
-        name = f"{row.form} {row.integrator}".strip()
+        name = row.form or whole or row.integrator
         names.setdefault(row.label, name)
         labels = methods.setdefault(name, [])
         if row.label not in labels:
@@ -75,7 +85,7 @@ def looks(rows: Iterable[Row]) -> dict[str, Look]:
 
 
 def _hue(name: str) -> str:
-    return next(hue for hue, prefixes in _FAMILIES if name.startswith(prefixes))
+    return _FORMS.get(name) or next(hue for hue, prefixes in _FAMILIES if name.startswith(prefixes))
 
 
 def _shade(hue: str, place: int, count: int) -> str:

@@ -47,7 +47,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     quantities = comparison.quantities
     if axes is None:
         figure = style.figure(4.1 * len(quantities) + 1.8, 5.4)
-        figure.suptitle(_headline(comparison), fontsize=10, x=0.01, ha="left")
+        figure.suptitle(headline(comparison), fontsize=10, x=0.01, ha="left")
         panels = tuple(figure.subplots(1, len(quantities), squeeze=False)[0])
     else:
         panels = tuple(axes)
@@ -71,7 +71,8 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     return panels
 
 
-def _headline(comparison: Comparison) -> str:
+def headline(comparison: Comparison) -> str:
+    """Model, length of the run and reference, in two lines."""
     t0, t1 = comparison.t_span
     long = f"{(t1 - t0) / comparison.period:.4g} periods" if comparison.period else f"t = {t0:g} to {t1:g}"
     return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
@@ -89,7 +90,7 @@ def draw_panel(
             chosen[label],
             [point for _, point in found],
             [(min(row.cost.wall_times), max(row.cost.wall_times)) for row, _ in found if row.cost],
-            [_verdict(row) for row, _ in found],
+            [verdict_of(row) for row, _ in found],
             size,
         )
     style.dress(panel)
@@ -117,7 +118,8 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, floa
     return row.cost.wall_time, max(reading.value, _ZERO)
 
 
-def _verdict(row: Row) -> bool | None:
+def verdict_of(row: Row) -> bool | None:
+    """Whether the modes of a run are right; None where it has none to judge."""
     return row.errors.sequence.right if row.errors and row.errors.sequence is not None else None
 
 
@@ -146,7 +148,7 @@ def handles(
     for label, look in chosen.items():
         lost = sum(row.label == label and row.errors is None for row in rows)
         found.append(look.handle(style.literal(label) + (f" ({lost} without result)" if lost else ""), size))
-    verdicts = {_verdict(row) for row in rows if row.errors is not None}
+    verdicts = {verdict_of(row) for row in rows if row.errors is not None}
     for verdict, fill, text in (
         (False, "none", "hollow: wrong modes"),
         (None, "left", "half filled: no modes to judge"),

@@ -1,0 +1,71 @@
+"""What a regularised friction law costs and what it is worth: error and wall time against its width v0."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+
+from hybridsim.analysis.regularised import exponents
+from hybridsim.plot import style
+from hybridsim.plot.lines import draw_line, looks
+from hybridsim.plot.work_precision import handles, headline, verdict_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis import Comparison
+    from hybridsim.analysis.rows import Row
+
+
+def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
+    """Draw two panels over v0: the largest error of the states over the run, and the wall time.
+
+    The legend gives the exponents of error and work (evaluations) as v0 falls. Level lines are the set-valued law.
+    """
+    figure = style.figure(12.5, 5.0)
+    figure.suptitle(headline(comparison), fontsize=10, x=0.01, ha="left")
+    errors, times = figure.subplots(1, 2)
+    chosen = looks(comparison.rows)
+    for label in comparison.labels:
+        rows = [row for row in comparison.rows if row.label == label and row.cost and row.errors]
+        over_v0 = [row for row in rows if row.form]
+        for panel, quantity in ((errors, _error), (times, _time)):
+            points = [(row.setting[1], quantity(row)) for row in over_v0]
+            draw_line(
+                panel, chosen[label], points, [(x, x) for x, _ in points], [verdict_of(r) for r in over_v0]
+            )
+            for row in rows:
+                if not row.form:
+                    panel.axhline(quantity(row), color=chosen[label].colour, linestyle=chosen[label].dashes)
+    for panel, title in ((errors, "State error, whole run / amplitude"), (times, "Wall time")):
+        style.dress(panel)
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_title(title, fontsize=10, loc="left")
+        panel.set_xlabel("$v_0$, in the unit of the velocity", fontsize=9)
+        panel.yaxis.set_minor_formatter(NullFormatter())
+    errors.yaxis.set_major_locator(LogLocator(numticks=9))
+    times.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=20))
+    times.yaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
+    found = handles(comparison.rows, [], chosen)
+    fitted = exponents(comparison)
+    for handle, label in zip(found, chosen, strict=False):
+        if label in fitted:
+            power, work = (f"{p:.2f}" if p is not None else "?" for p in fitted[label])
+            handle.set_label(f"{handle.get_label()}\nerror ~ $v_0^{{{power}}}$, work ~ $v_0^{{{work}}}$")
+        else:
+            handle.set(marker="None")
+    times.legend(
+        handles=found, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=9, handlelength=3,
+        labelspacing=0.7,
+    )  # fmt: skip
+    return errors, times
+
+
+def _error(row: Row) -> float:
+    return row.errors.state if row.errors else 0.0
+
+
+def _time(row: Row) -> float:
+    return row.cost.wall_time if row.cost else 0.0
