@@ -19,7 +19,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Occurrence, Task, Trajectory
 
-# Local time rounds angles that grow in time: after this many turns, by 1e-13. A stretch without events begins anew then.
+# Local time rounds angles that grow in time, by 1e-13 after this many turns: a stretch without events begins anew then.
 _TURNS = 100
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
+from hybridsim.engine.lean_tape import LeanTape, lean
 from hybridsim.engine.modules import compiled
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
@@ -169,6 +170,7 @@ class System:
                 self.owner[list(numbers)] = c
         self._registers = _Registers(data["tape"], self.layout)
         self._tapes: dict[bytes, np.ndarray] = {}
+        self._lean: dict[bytes, LeanTape] = {}
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
 
     # -- values ---------------------------------------------------------------------------------------------
@@ -289,11 +291,21 @@ class System:
     def _tape(self, z: np.ndarray) -> np.ndarray:
         key = z.tobytes()
         if key not in self._tapes:
-            rows: list[tuple[int, ...]] = []
-            for component, branches in self.code.data["tape"]["parts"]:
-                rows += branches[0 if component < 0 else z[component]]
-            self._tapes[key] = np.array(rows, dtype=np.int64).reshape(-1, 5)
+            self._tapes[key] = np.array(self._rows(z), dtype=np.int64).reshape(-1, 5)
         return self._tapes[key]
+
+    def _rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+        rows: list[tuple[int, ...]] = []
+        for component, branches in self.code.data["tape"]["parts"]:
+            rows += branches[0 if component < 0 else z[component]]
+        return rows
+
+    def lean_tape(self, z: np.ndarray) -> LeanTape:
+        """The tape of the modes z for series of any order."""
+        key = z.tobytes()
+        if key not in self._lean:
+            self._lean[key] = lean(self.code.data["tape"], self._rows(z), np.flatnonzero(self.active(z)))
+        return self._lean[key]
 
     def series(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float

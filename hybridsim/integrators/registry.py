@@ -16,6 +16,7 @@ from hybridsim.integrators.base import Integrator
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
+    "taylor:Taylor",
     "scipy_solvers:ScipyDOP853",
     "scipy_solvers:ScipyRK45",
     "scipy_solvers:ScipyRK23",

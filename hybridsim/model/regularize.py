@@ -60,8 +60,9 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
 
 
 def _free_name(model: Model, wish: str) -> str:
-    taken = {part.name for part in (*model.parameters, *model.states, *model.discrete, *model.inputs)}
-    taken |= {name for name, _ in model.definitions} | set(model.variables())
+    taken = {p.name for p in model.parameters} | {i.name for i in model.inputs} | set(model.variables())
+    taken |= {s.name for s in model.states} | {d.name for d in model.discrete}
+    taken |= {name for name, _ in model.definitions}
     while wish in taken:
         wish += "_"
     return wish

@@ -1,0 +1,143 @@
+"""The tape of one vector of modes made lean: copies gone, what is constant in time worked out once a segment.
+
+Taylor coefficients of any order are wanted at every step, without error bounds. So the rows of a tape (see
+`hybridsim.engine.tape`) are sorted by what they depend on: a row over constants has one coefficient and runs once;
+a product with a constant, and the sine of an angle that grows linearly, cost one multiplication an order instead of a
+convolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.tape import (
+    ABS,
+    ADD,
+    COPY,
+    DIV,
+    EXP,
+    MUL,
+    NEG,
+    NOT,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+
+# Operations of the lean tape beyond those of the tape: on a series a and a constant b.
+ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
+
+CONSTANT, LINEAR, SERIES = range(3)  # what a register is in time
+_PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
+_ONE = (
+    COPY,
+    NEG,
+    ABS,
+    SIGN,
+    NOT,
+    EXP,
+    SQRT,
+    SINCOS,
+    SINHCOSH,
+    TANGENT,
+)  # of one register; the rest are of two
+_KEEP_LINEAR = (ADD, SUB, NEG)
+
+
+@dataclass(frozen=True)
+class LeanTape:
+    """Rows (operation, a, b, c, out) over the registers of the tape they come from.
+
+    Parameters
+    ----------
+    constant_rows : run once a segment, at order 0.
+    rows : run at every order.
+    derivatives, guards, monitors : registers of the results.
+    """
+
+    constant_rows: np.ndarray
+    rows: np.ndarray
+    derivatives: np.ndarray
+    guards: np.ndarray
+    monitors: np.ndarray
+
+
+def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable[int]) -> LeanTape:
+    """The lean form of the rows of one vector of modes, with its active guards."""
+    kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
+    same: dict[int, int] = {}  # a copy -> what it is a copy of
+    constant_rows: list[tuple[int, ...]] = []
+    series_rows: list[tuple[int, ...]] = []
+    for op, *given, out in rows:
+        count = _registers(op)
+        a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(given))
+        if op == COPY:
+            same[out] = a
+            continue
+        kinds = [kind.get(r, CONSTANT) for r in (a, b, c)[:count]]
+        kind[out] = _kind(op, kinds)
+        if op in _PAIRED:
+            kind[out + 1] = kind[out]
+        if kind[out] == CONSTANT:
+            constant_rows.append((op, a, b, c, out))
+        else:
+            series_rows.append((*_special(op, a, b, c, kinds), out))
+
+    def registers(key: str) -> np.ndarray:
+        return np.array([same.get(r, r) for r in tape[key]], dtype=np.int64)
+
+    guards, derivatives, monitors = registers("guards"), registers("derivatives"), registers("monitors")
+    wanted = {*derivatives, *monitors, *(guards[g] for g in active)}
+    needed = _needed(series_rows, wanted)
+    constants = _needed(constant_rows, wanted | {r for row in needed for r in row[1:4]})
+    return LeanTape(_array(constants), _array(needed), derivatives, guards, monitors)
+
+
+def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
+    return np.array(rows, dtype=np.int64).reshape(-1, 5)
+
+
+def _registers(op: int) -> int:
+    """How many of a, b, c are registers; the others are flags of the operation."""
+    return 1 if op in _ONE else 3 if op == SELECT else 2
+
+
+def _kind(op: int, kinds: list[int]) -> int:
+    highest = max(kinds)
+    if highest == LINEAR:
+        scaled = (op == MUL and min(kinds) == CONSTANT) or (op == DIV and kinds[1] == CONSTANT)
+        return LINEAR if scaled or op in _KEEP_LINEAR else SERIES
+    return highest
+
+
+def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
+    """The cheaper operation where one operand is constant or an angle is linear."""
+    if op == SINCOS and kinds[0] == LINEAR:
+        return SINCOS_LINEAR, a, b, c
+    if len(kinds) == 2 and kinds[1] == CONSTANT:
+        cheap = {ADD: ADD_CONSTANT, SUB: SUB_CONSTANT, MUL: SCALE, DIV: DIVIDE_BY}
+        return cheap.get(op, op), a, b, c
+    if len(kinds) == 2 and kinds[0] == CONSTANT:
+        cheap = {ADD: ADD_CONSTANT, SUB: CONSTANT_SUB, MUL: SCALE}
+        return (cheap[op], b, a, c) if op in cheap else (op, a, b, c)
+    return op, a, b, c
+
+
+def _needed(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
+    """The rows that the wanted registers depend on, in order."""
+    wanted = set(wanted)
+    kept = []
+    for row in reversed(rows):
+        out = row[4]
+        if out in wanted or (row[0] in (*_PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
+            kept.append(row)
+            wanted |= set(row[1:4])  # flags among them only keep a row too many
+    return kept[::-1]

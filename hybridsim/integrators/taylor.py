@@ -1,0 +1,117 @@
+"""Taylor series of the flow, of an order that the tolerance asks for; its dense output is the series itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.series import SeriesRun
+from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.taylor import polynomials
+from hybridsim.integrators.base import Integrator
+
+_SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
+_SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
+_DEFECT = (
+    100.0  # of a step, in units of the tolerance: in the slope the last term of order p is p times as large
+)
+_RETRIES = 30
+
+
+class TaylorStepper:
+    """Steps the series through one segment."""
+
+    def __init__(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+    ) -> None:
+        self.flow, self.bound, self.tolerances = flow, bound, tolerances
+        self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
+        self.s, self.x = 0.0, x0
+        self.longest = first_step or math.inf
+
+    def step(self) -> Step:
+        """The next step, as long as the series reaches."""
+        direction = math.copysign(1.0, self.bound)
+        left = abs(self.bound - self.s)
+        longest = min(left, self.tolerances.max_step, self.longest)
+        self.longest = math.inf
+        self.flow.counters.rhs_evaluations += 1
+        h, coefficients = self.series.expand(self.s, self.x, longest)
+        for _ in range(_RETRIES):
+            last = h >= left
+            x1 = coefficients @ (direction * min(h, left)) ** np.arange(coefficients.shape[1])
+            if math.isnan(h) or self._holds(coefficients, x1, direction * h):
+                break
+            self.flow.counters.rejected += 1
+            h *= _SHORTER
+        if not h >= _SMALLEST * math.ulp(self.s):
+            raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
+        s0, x0, self.x = self.s, self.x, x1
+        self.s = self.bound if last else s0 + direction * h
+        return Step(s0, self.s, x0, x1, _dense(s0, coefficients))
+
+    def _holds(self, coefficients: np.ndarray, x1: np.ndarray, d: float) -> bool:
+        """Whether the series still satisfies the equation at the end of the step.
+
+        The terms of a series tell nothing of what is beyond rounding where it starts: a saturated tanh, the other
+        branch of a root.
+        """
+        powers = np.arange(1, coefficients.shape[1])
+        slope = coefficients[:, 1:] @ (powers * d ** (powers - 1))
+        defect = abs(d) * np.abs(slope - self.flow.rhs(self.s + d, x1))
+        self.flow.counters.rhs_evaluations += 1
+        scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(self.x), np.abs(x1))
+        change = np.abs(coefficients[:, 1:]) @ np.abs(d) ** powers
+        return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
+
+    def restep(self, step: Step, s: float) -> Step:
+        """Not needed: the series is as accurate inside the step as at its end."""
+        raise NotImplementedError("the dense output of a Taylor series is the series")
+
+
+def _dense(s0: float, coefficients: np.ndarray) -> Dense:
+    def dense(s: np.ndarray) -> np.ndarray:
+        out = np.empty((len(s), coefficients.shape[0]))
+        polynomials(coefficients, np.asarray(s - s0, dtype=float), out)
+        return out
+
+    return dense
+
+
+@dataclass(frozen=True)
+class Taylor(Integrator):
+    """Taylor series by recurrences over the operations of the model, order and step chosen by the tolerance.
+
+    The order is -ln(rtol)/2 + 1, the step the one at which the last two terms reach the tolerance: near the least
+    work for an accuracy. Guards have series of their own, and the step ends where these stop to be accurate.
+
+    When to choose it: tight tolerances, 1e-9 and below, and whenever events matter more than anything.
+    """
+
+    name: ClassVar[str] = "taylor"
+    title: ClassVar[str] = "Taylor series by automatic differentiation"
+    order: ClassVar[str] = "by the tolerance"
+    reference: ClassVar[str] = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
+    when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
+    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    dense_is_accurate: ClassVar[bool] = True
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return TaylorStepper(flow, x0, s_bound, tolerances, first_step)
