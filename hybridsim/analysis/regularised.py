@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.series import Series
-from hybridsim.analysis.trajectory import ExactEvent, Trajectory
+from hybridsim.analysis.trajectory import EventLike, ExactEvent, Trajectory
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model.regularize import KINDS
 
@@ -87,7 +87,7 @@ def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
         for name, mode in run.initial_modes.items()
         if not (name in contacts and mode == _SMOOTH)
     }
-    events = []
+    events: list[EventLike] = []
     for event in run.events:
         if event.kind == "transition" and event.component in contacts:
             source, target = (_BREAKING.get(mode, mode) for mode in (event.source, event.target))

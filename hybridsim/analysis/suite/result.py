@@ -81,15 +81,15 @@ class SuiteComparison:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was not run, or not as often as was asked, and why; and what is doubtful about a reference."""
-        left_out: dict[tuple[str, str], list[str]] = {}
+        left_out: dict[str, dict[str, list[str]]] = {}
         for result in self.results:
             for row in result.comparison.rows:
                 if row.status in (NOT_STARTED, STOPPED):
-                    where = f"{result.scene.name} {setting(row)}"
-                    left_out.setdefault((row.label, row.status), []).append(where)
+                    left_out.setdefault(row.label, {}).setdefault(result.scene.name, []).append(setting(row))
         notes = [
-            f"{label}: {status}, because of the time it would take: {', '.join(places)}"
-            for (label, status), places in left_out.items()
+            f"{label}, left out because of the time it takes: "
+            + "; ".join(f"{scene} at {', '.join(settings)}" for scene, settings in places.items())
+            for label, places in left_out.items()
         ]
         for result in self.results:
             notes += [f"{result.scene.name}: {warning}" for warning in result.comparison.warnings]

@@ -62,9 +62,10 @@ SCENES: tuple[Scene, ...] = (
         "Near grazing: stops that barely happen",
         "dfcs",
         "At 0.2 of resonance the body swings within each half period, and its velocity comes back to almost zero. In "
-        "the closed form it would go on to -5.2e-4, -1.0e-4 and -1.2e-5 of its largest value in the first three half "
-        "periods, which makes short stops, and stays above +7e-6 in the later ones, which makes none. So the modes "
-        "are right only where the velocity is right to some 1e-5 and both zeros of a pair are seen.",
+        "the closed form it would go on to -5.2e-4, -1.0e-4 and -1.2e-5 of its largest value in the first three "
+        "half periods after the first, which makes short stops, and turns above +7e-6 in the later ones, which makes "
+        "none. So the modes are right only where the velocity is right to some 1e-5 and both zeros of a pair are "
+        "seen.",
         {"F0": 62.035, "N": 40, "omega": "0.2*sqrt(k/m)"},
         periods=4,
         needs=("multiple-roots",),

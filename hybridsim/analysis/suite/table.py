@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hybridsim.analysis.suite.verdict import COMMON
+from hybridsim.analysis.suite.verdict import COMMON, USELESS
 from hybridsim.analysis.table import differences, milliseconds, setting, versions
 
 if TYPE_CHECKING:
@@ -30,7 +30,11 @@ def _who_is_right(suite: SuiteComparison) -> list[str]:
         f"Who is right, at rtol {COMMON['rtol']:.0e}, or with {COMMON['steps_per_period']:g} steps a period "
         "where the step is fixed"
     )
-    return [title, *_aligned(rows)]
+    return [
+        title,
+        *_aligned(rows),
+        f"off: the modes are right, a state is not to {USELESS:.0%} of its amplitude",
+    ]
 
 
 def _cheapest(suite: SuiteComparison) -> list[str]:
@@ -47,20 +51,18 @@ def _cheapest(suite: SuiteComparison) -> list[str]:
 
 
 def _references(suite: SuiteComparison) -> list[str]:
-    lines = ["References"]
+    rows = [["", "reference", "held against", "differs by"]]
     for result in suite.results:
         found = result.comparison
-        if found.difference is None:
-            second = "no second one"
-        else:
-            second = f"{found.second_reference} differs by: {differences(found)}"
-        lines.append(f"  {result.scene.name}: {found.reference}; {second}")
-    return lines
+        second = found.second_reference or "nothing"
+        difference = differences(found) if found.difference else "-"
+        rows.append([f"  {result.scene.name}", found.reference, second, difference])
+    return ["References", *_aligned(rows)]
 
 
 def _notes(suite: SuiteComparison) -> list[str]:
     return [
-        "State errors: the largest of all states, relative to each one's amplitude in the reference.",
+        "State errors: the largest of all states over the run, relative to each one's amplitude in the reference.",
         "Event times are in periods of the forcing where there is one, else in the model's unit of time.",
         f"Wall times: median of up to {suite.repeat}, in turns over all runs of all scenes.",
         f"It took {suite.seconds:.0f} s of {suite.budget:g} s.",

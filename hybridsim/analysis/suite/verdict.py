@@ -12,12 +12,15 @@ from hybridsim.analysis.suite.scenes import Scene
 # The setting at which all are judged: tight enough that an error of the method does not hide in the tolerance,
 # loose enough for each of them to keep; of a fixed step, the one that its authors took.
 COMMON = {"rtol": 1e-8, "steps_per_period": 1200.0}
+# Of an amplitude: states farther off are of no use to anybody, however right the modes.
+USELESS = 0.1
 
 
 class Verdict(Enum):
     """What became of a run."""
 
     RIGHT = "right"
+    OFF = "off"
     WRONG = "wrong modes"
     LACKS = "lacks"
     FAILED = "failed"
@@ -31,14 +34,15 @@ class Verdict(Enum):
 def verdict(scene: Scene, rows: Sequence[Row]) -> Verdict:
     """The verdict over a line, at the setting that is nearest to the common one.
 
-    "lacks": the modes are wrong, and the integrator says itself that it lacks what the scene needs.
+    "off": the modes are right, and a state is wrong by more than a tenth of its amplitude. "lacks": the modes are
+    wrong, and the integrator says itself that it lacks what the scene needs.
     """
     row = min(
         rows, key=lambda row: abs(math.log(row.setting[1] / COMMON.get(row.setting[0], row.setting[1])))
     )
     if row.errors is not None:
         if not row.errors.wrong_modes:
-            return Verdict.RIGHT
+            return Verdict.RIGHT if row.errors.state <= USELESS else Verdict.OFF
         return Verdict.LACKS if set(scene.needs) & _lacking(row.integrator) else Verdict.WRONG
     if row.status in (NOT_STARTED, STOPPED):
         return Verdict.TOO_SLOW
