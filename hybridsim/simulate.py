@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.errors import ModelError, UsageError, nearest
-from hybridsim.model import Model, load
+from hybridsim import arguments
+from hybridsim.errors import ModelError, UsageError
+from hybridsim.model import Model
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
     from hybridsim.solution import Solution
-
-# The smallest rtol that means anything: a hundred units in the last place, as SciPy has it.
-SMALLEST_RTOL = 100 * 2.0**-52
 
 
 def simulate(
@@ -30,7 +28,7 @@ def simulate(
     x0: Mapping[str, float] | Sequence[float] | None = None,
     z0: Mapping[str, str] | None = None,
     integrator: str = "auto",
-    rtol: float = 1e-9,
+    rtol: float | None = None,
     atol: float | Mapping[str, float] | Sequence[float] | None = None,
     max_step: float = math.inf,
     first_step: float | None = None,
@@ -48,9 +46,10 @@ def simulate(
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.
     z0 : initial modes by component; where a surface decides, the engine finds the mode from x0.
     integrator : a name from `list_integrators`; "auto" takes the default work-horse, ``dop853``.
-    rtol, atol : error control. atol is a number, one for each state, or by name; its default is
-        rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1.
-    max_step, first_step : bounds of the step, in the unit of t.
+    rtol, atol : error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its default
+        is rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1.
+    max_step, first_step : bounds of the step, in the unit of t. An integrator with a fixed step refuses them, and rtol
+        and atol.
     t_eval : times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
         changes the run.
     progress : called with the finished fraction of the span, from time to time.
@@ -71,19 +70,18 @@ def simulate(
     >>> sol.status
     'finished'
     """
-    if not isinstance(model, Model):
-        model = load(model)
-    if params:
-        model = model.with_(**params)
-    x0_states, model = _start(model, x0)
+    model = arguments.chosen_model(model, params)
+    x0_states, model = arguments.start_values(model, x0)
     model.validate()
-    span = _span(t_span)
+    span = arguments.time_span(t_span)
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.system import System
     from hybridsim.integrators.registry import make_integrator
 
     announce_compilation()
-    method = make_integrator("dop853" if integrator == "auto" else integrator, options)
+    method = make_integrator(arguments.integrator_name(integrator), options)
+    longest = None if isinstance(max_step, float) and max_step == math.inf else max_step
+    arguments.refuse_unused(method, rtol=rtol, atol=atol, max_step=longest, first_step=first_step)
     began = time.perf_counter()
     system = System(model)
     for name in system.hot_functions():
@@ -96,8 +94,8 @@ def simulate(
         method,
         span,
         x0_states,
-        _modes(system, z0),
-        progress,
+        arguments.initial_modes(system, z0),
+        arguments.callback(progress),
         compile_time,
         t_eval,
         rtol,
@@ -117,7 +115,7 @@ def _run(
     progress: Callable[[float], None] | None,
     compile_time: float,
     t_eval: Sequence[float] | None,
-    rtol: float,
+    rtol: float | None,
     atol: Any,
     max_step: float,
     first_step: float | None,
@@ -127,129 +125,21 @@ def _run(
     from hybridsim.solution import Solution
 
     start = system.start_state(x0)
+    relative = arguments.relative_tolerance(rtol)
     tolerances = Tolerances(
-        _rtol(rtol),
-        _atol(model, atol, rtol, start),
-        _step(max_step, "max_step"),
-        None if first_step is None else _step(first_step, "first_step"),
+        relative,
+        arguments.absolute_tolerances(model, atol, relative, start),
+        arguments.step_bound(max_step, "max_step"),
+        None if first_step is None else arguments.step_bound(first_step, "first_step"),
     )
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
-    grid = None if t_eval is None else _grid(t_eval, span)
+    grid = arguments.time_grid(t_eval, span)
     _refuse_driving(system, span[0], start, discrete, z0)
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
     return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span)
-
-
-def _start(model: Model, x0: Mapping[str, float] | Sequence[float] | None) -> tuple[dict[str, float], Model]:
-    names = [s.name for s in model.states]
-    if x0 is None:
-        return {}, model
-    if not isinstance(x0, Mapping):
-        values = [float(v) for v in x0]
-        if len(values) != len(names):
-            raise UsageError(
-                f"x0 has {len(values)} values and model {model.name} has {len(names)} states ({', '.join(names)})",
-                remedy="give one value for each state, or a mapping from names to values",
-            )
-        x0 = dict(zip(names, values, strict=True))
-    discrete = [d.name for d in model.discrete]
-    for name, value in x0.items():
-        if name not in names + discrete:
-            raise UsageError(
-                f"x0 names {name!r}, which is no state of model {model.name}",
-                remedy=nearest(name, names + discrete, kind="states"),
-            )
-        if not math.isfinite(float(value)):
-            raise UsageError(f"x0 of {name} is {value!r}", remedy="give a finite number")
-    changed = {n: v for n, v in x0.items() if n in discrete}
-    return {n: float(v) for n, v in x0.items() if n in names}, model.with_start(
-        **changed
-    ) if changed else model
-
-
-def _span(t_span: tuple[float, float]) -> tuple[float, float]:
-    try:
-        t0, t1 = (float(t) for t in t_span)
-    except (TypeError, ValueError):
-        raise UsageError(f"t_span is {t_span!r}", remedy="give two numbers, (t0, t1)") from None
-    if not (math.isfinite(t0) and math.isfinite(t1)):
-        raise UsageError(
-            f"t_span is {t_span!r}", remedy="give two finite numbers; a monitor can end a run early"
-        )
-    return t0, t1
-
-
-def _rtol(rtol: float) -> float:
-    if not (SMALLEST_RTOL <= rtol < 1.0):
-        raise UsageError(f"rtol is {rtol!r}", remedy=f"give a number from {SMALLEST_RTOL:.2g} to below 1")
-    return float(rtol)
-
-
-def _step(value: float, name: str) -> float:
-    if not value > 0.0:
-        raise UsageError(f"{name} is {value!r}", remedy="give a positive number")
-    return float(value)
-
-
-def _atol(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
-    names = [s.name for s in model.states]
-    sizes = [s.nominal or abs(x) or 1.0 for s, x in zip(model.states, start, strict=True)]
-    default = 1e-3 * rtol * np.array(sizes, dtype=float)
-    if atol is None:
-        return default
-    if isinstance(atol, Mapping):
-        for name, value in atol.items():
-            if name not in names:
-                raise UsageError(
-                    f"atol names {name!r}, which is no state of model {model.name}",
-                    remedy=nearest(name, names, kind="states"),
-                )
-            default[names.index(name)] = value
-        atol = default
-    values = (
-        np.broadcast_to(np.asarray(atol, dtype=float), default.shape)
-        if np.ndim(atol) == 0
-        else np.array(atol)
-    )
-    if values.shape != default.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(
-            f"atol is {atol!r}", remedy=f"give a number >= 0, or one for each of {', '.join(names)}"
-        )
-    return values.astype(float)
-
-
-def _modes(system: System, z0: Mapping[str, str] | None) -> np.ndarray:
-    z = np.array([a.initial for a in system.automata], dtype=np.int64)
-    for name, mode in (z0 or {}).items():
-        components = [a.name for a in system.automata]
-        if name not in components:
-            raise UsageError(
-                f"z0 names {name!r}, which is no component of model {system.model.name}",
-                remedy=nearest(name, components, kind="components"),
-            )
-        automaton = system.automata[components.index(name)]
-        if mode not in automaton.modes:
-            raise UsageError(
-                f"z0 of {name} is {mode!r}, which is no mode of it",
-                remedy=nearest(mode, automaton.modes, kind="modes"),
-            )
-        z[components.index(name)] = automaton.modes.index(mode)
-    return z
-
-
-def _grid(t_eval: Sequence[float], span: tuple[float, float]) -> np.ndarray:
-    grid = np.asarray(t_eval, dtype=float)
-    low, high = min(span), max(span)
-    if (
-        grid.ndim != 1
-        or not np.isfinite(grid).all()
-        or (len(grid) and (grid.min() < low or grid.max() > high))
-    ):
-        raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
-    return grid
 
 
 def _refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:

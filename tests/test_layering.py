@@ -25,6 +25,7 @@ FLOORS = (
     "colours",
     "notebook",
     "solution",
+    "arguments",
     "simulate",
     "ivp",
     "analysis",
@@ -41,7 +42,17 @@ LIBRARIES = {
     "scipy": {"engine", "integrators", "solution", "analysis"},
     "pandas": {"tables", "solution"},
     "xarray": {"tables", "solution"},
-    "numpy": {"engine", "integrators", "tables", "solution", "simulate", "ivp", "analysis", "plot"},
+    "numpy": {
+        "engine",
+        "integrators",
+        "tables",
+        "solution",
+        "arguments",
+        "simulate",
+        "ivp",
+        "analysis",
+        "plot",
+    },
     "matplotlib": {"plot"},
 }
 

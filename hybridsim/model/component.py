@@ -19,6 +19,7 @@ class Choice(Declared):
     reset: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
+        self._texts("to")
         self._expressions("when")
         self._maps("reset")
 
@@ -42,12 +43,14 @@ class Guard(Declared):
     fatal: str | None = None
 
     def __post_init__(self) -> None:
+        self._texts("name", "fatal")
         self._expressions("expr")
         choices = tuple(
             Choice(choice, place=self.place) if isinstance(choice, str) else choice
             for choice in as_tuple(self.then)
         )
         object.__setattr__(self, "then", choices)
+        self._parts("then", Choice)
         object.__setattr__(self, "fatal", self.fatal or None)
 
 
@@ -61,7 +64,8 @@ class Mode(Declared):
     set: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
-        self._tuples("guards")
+        self._texts("name")
+        self._parts("guards", Guard)
         self._maps("der", "set")
 
 
@@ -87,6 +91,7 @@ class Surface(Declared):
     jump_below: Expression
 
     def __post_init__(self) -> None:
+        self._texts("unknown", "above", "below", "hold")
         self._expressions("function", "jump_above", "jump_below")
 
 
@@ -106,7 +111,10 @@ class Component(Declared):
     surface: Surface | None = None
 
     def __post_init__(self) -> None:
-        self._tuples("modes")
+        self._texts("name", "initial")
+        self._parts("modes", Mode)
+        if not (self.surface is None or isinstance(self.surface, Surface)):
+            raise self._fault(f"surface is {self.surface!r}", "give hs.Surface(...)")
         if self.initial is None and self.surface is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
 

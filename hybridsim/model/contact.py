@@ -42,6 +42,7 @@ class Contact(Declared):
     arguments: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("velocity", "normal")
         self._maps("arguments")
         law: object = self.law
@@ -49,6 +50,8 @@ class Contact(Declared):
             from hybridsim.model.library import load_law
 
             object.__setattr__(self, "law", load_law(law))
+        elif not isinstance(law, FrictionLaw):
+            raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
 
     def component(self, constants: Collection[str] = ()) -> Component:
         """The automaton: three modes on the surface velocity = 0.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field
 from typing import Any
 
-from hybridsim.errors import ModelError, Place
+from hybridsim.errors import ModelError, Place, UsageError
 from hybridsim.expr import parse
 from hybridsim.model.frozen_map import FrozenMap
 
@@ -21,23 +21,56 @@ class Declared:
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
 
+    def _texts(self, *fields: str) -> None:
+        """See to it that names and words are texts; None stays None where it is the default."""
+        for name in fields:
+            value = getattr(self, name)
+            if not (isinstance(value, str) or (value is None and self._has_default(name))):
+                raise self._fault(f"{name} is {value!r}", "give a text")
+
     def _expressions(self, *fields: str) -> None:
-        """Parse what was given as text or number; None stays None."""
+        """Parse what was given as text or number; None stays None where it is the default."""
         for name in fields:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, parse(value, self.place))
+            elif not self._has_default(name):
+                raise self._fault(f"{name} is None", "give a number or an expression")
 
     def _maps(self, *fields: str) -> None:
         """Freeze mappings of expressions; a value of None stays None."""
         for name in fields:
-            items = dict(getattr(self, name))
+            items = getattr(self, name)
+            if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
+                raise self._fault(f"{name} is {items!r}", "give a mapping from names to expressions")
             parsed = {key: None if text is None else parse(text, self.place) for key, text in items.items()}
             object.__setattr__(self, name, FrozenMap(parsed))
 
-    def _tuples(self, *fields: str) -> None:
+    def _parts(self, field: str, kind: type[Declared]) -> None:
+        """Make a tuple of parts of one kind; a single one becomes a tuple of one."""
+        parts = as_tuple(getattr(self, field))
+        for part in parts:
+            if not isinstance(part, kind):
+                raise self._fault(f"{field} holds {part!r}", f"give hs.{kind.__name__}(...) objects")
+        object.__setattr__(self, field, parts)
+
+    def _numbers(self, *fields: str) -> None:
+        """Make tuples of numbers."""
         for name in fields:
-            object.__setattr__(self, name, as_tuple(getattr(self, name)))
+            given = getattr(self, name)
+            try:
+                object.__setattr__(self, name, tuple(float(number) for number in as_tuple(given)))
+            except (TypeError, ValueError):
+                raise self._fault(f"{name} is {given!r}", "give numbers") from None
+
+    def _has_default(self, field: str) -> bool:
+        return self.__dataclass_fields__[field].default is not MISSING
+
+    def _fault(self, message: str, remedy: str) -> UsageError:
+        """What is wrong with an argument of the constructor."""
+        name = getattr(self, "name", None)
+        who = f"{type(self).__name__} {name}" if isinstance(name, str) else type(self).__name__
+        return UsageError(f"{who}: {message}", place=self.place, remedy=remedy)
 
     def error(self, message: str, remedy: str | None = None) -> ModelError:
         """An error about this part, at its place."""

@@ -58,6 +58,7 @@ class Input(Declared):
     duration: Expression | None = None
 
     def __post_init__(self) -> None:
+        self._texts("name", "kind", "interpolation", "shape")
         defaults = dict(_DEFAULTS.get(self.kind, {}))
         if self.shape == "square":
             defaults["duty"] = 0.5
@@ -65,8 +66,7 @@ class Input(Declared):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
         self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
-        for name in ("times", "values"):
-            object.__setattr__(self, name, tuple(float(number) for number in getattr(self, name)))
+        self._numbers("times", "values")
 
     @property
     def expressions(self) -> dict[str, Expression]:

@@ -41,6 +41,7 @@ class FrictionLaw(Declared):
     source: str = ""
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("slip", "stick")
         given: object = self.parameters
         if not isinstance(given, Mapping):

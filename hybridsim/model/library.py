@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from hybridsim.errors import ModelError, Place, nearest
+from hybridsim.errors import ModelError, Place, UsageError, nearest
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.model import Model
 
@@ -34,6 +34,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     ModelError: no such model (the nearest names are listed) or file; the file is empty, too large, no text,
     no TOML; or all its faults in one.
     """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise UsageError(f"the model is {name_or_path!r}", remedy="give a Model, a name or a path")
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)
@@ -74,6 +76,8 @@ def load_law(name: str) -> FrictionLaw:
     from hybridsim.model.toml_laws import read_laws
     from hybridsim.model.toml_read import open_text
 
+    if not isinstance(name, str):
+        raise UsageError(f"the law is {name!r}", remedy="give the name of a law")
     if name not in list_laws():
         raise ModelError(f"there is no law '{name}'", remedy=nearest(name, list_laws(), kind="laws"))
     path = models_folder() / "laws" / f"{name}.toml"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 from hybridsim.errors import ModelError, UsageError, nearest
@@ -16,6 +17,18 @@ from hybridsim.model.inputs import Input
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.schedule import Schedule
+
+_PARTS: dict[str, type[Declared]] = {
+    "states": State,
+    "parameters": Parameter,
+    "discrete": Discrete,
+    "components": Component,
+    "contacts": Contact,
+    "inputs": Input,
+    "monitors": Monitor,
+    "schedules": Schedule,
+    "outputs": Output,
+}
 
 
 @dataclass(frozen=True)
@@ -63,10 +76,16 @@ class Model(Declared):
         self._named("parameters", Parameter)
         self._named("discrete", Discrete)
         self._named("outputs", Output)
-        self._tuples("states", "parameters", "discrete", "components", "contacts", "inputs")
-        self._tuples("monitors", "schedules", "outputs")
+        self._texts("name")
+        for field, kind in _PARTS.items():
+            self._parts(field, kind)
         pairs = self.definitions.items() if isinstance(self.definitions, Mapping) else self.definitions
-        object.__setattr__(self, "definitions", tuple((name, parse(text)) for name, text in pairs))
+        try:
+            definitions = tuple((name, parse(text)) for name, text in pairs)
+        except (TypeError, ValueError):
+            remedy = "give a mapping from names to expressions, or pairs of the two"
+            raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
+        object.__setattr__(self, "definitions", definitions)
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
         given = getattr(self, field)
@@ -209,6 +228,8 @@ class Model(Declared):
         """Read and validate a model from TOML text; ``path`` names the file and finds its tables."""
         from hybridsim.model.toml_read import read_model
 
+        if not isinstance(text, str):
+            raise UsageError(f"the model's text is {text!r}", remedy="give TOML, or load a file by its path")
         return read_model(text, path)
 
 
@@ -220,9 +241,11 @@ def _content(model: Model) -> tuple[object, ...]:
     return (model.name, *parts, model.title, model.source, model.description, model.look)
 
 
-def _known(changes: Iterable[str], names: Iterable[str], kind: str, model: str) -> None:
+def _known(changes: Mapping[str, Any], names: Iterable[str], kind: str, model: str) -> None:
     allowed = as_tuple(names)
-    for name in changes:
+    for name, value in changes.items():
+        if not isinstance(value, Expression | str | Real):
+            raise UsageError(f"{kind} {name} is {value!r}", remedy="give a number or an expression")
         if name not in allowed:
             raise UsageError(
                 f"the model '{model}' has no {kind} '{name}'",

@@ -30,5 +30,6 @@ class Monitor(Declared):
     reset: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
+        self._texts("name", "direction", "action")
         self._expressions("expr")
         self._maps("reset")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 
 from hybridsim.expr import Expression
 from hybridsim.model.declared import Declared
@@ -20,6 +21,7 @@ class Parameter(Declared):
     title: str = ""
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("value")
 
 
@@ -43,7 +45,11 @@ class State(Declared):
     nominal: float | None = None
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("start", "der")
+        nominal: object = self.nominal
+        if not (nominal is None or isinstance(nominal, Real)):
+            raise self._fault(f"nominal is {self.nominal!r}", "give a number, or leave it out")
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,7 @@ class Discrete(Declared):
     unit: str = ""
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("start")
 
 
@@ -72,5 +79,6 @@ class Output(Declared):
     modes: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
+        self._texts("name")
         self._expressions("expr")
         self._maps("modes")

@@ -34,6 +34,7 @@ class Schedule(Declared):
     terminate: bool = False
 
     def __post_init__(self) -> None:
+        self._texts("name")
         object.__setattr__(self, "times", tuple(parse(time, self.place) for time in as_tuple(self.times)))
         if self.start is None and self.period is not None:
             object.__setattr__(self, "start", parse(0))

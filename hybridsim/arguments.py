@@ -1,0 +1,204 @@
+"""What `simulate` is given, checked: every fault is a UsageError that names the argument, its value and the remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import Model, load
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+    from hybridsim.integrators.base import Integrator
+
+# The smallest rtol that means anything: a hundred units in the last place, as SciPy has it.
+SMALLEST_RTOL = 100 * 2.0**-52
+RTOL = 1e-9
+
+
+def number(value: Any, what: str, remedy: str = "give a number") -> float:
+    """A real number as a double; a text, a truth value or a sequence is none."""
+    if not isinstance(value, str | bytes | bool | np.bool_):
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise UsageError(f"{what} is {value!r}", remedy=remedy)
+
+
+def is_row(value: Any) -> bool:
+    """Whether a value has items in a row: a text, a mapping and an array of no dimension have none."""
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+
+
+def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
+    """Real numbers in one dimension."""
+    if not is_row(value):
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    return np.array([number(item, f"a value of {what}", remedy) for item in value], dtype=float)
+
+
+def chosen_model(model: Any, params: Any) -> Model:
+    """The model itself, or loaded by its name or path, with parameters changed."""
+    if not isinstance(model, Model):
+        model = load(model)
+    if params is None:
+        return model
+    if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):
+        raise UsageError(
+            f"params is {params!r}", remedy="give a mapping from names of parameters to values, {'F0': 30.0}"
+        )
+    return model.with_(**params)
+
+
+def time_span(t_span: Any) -> tuple[float, float]:
+    """(t0, t1), both finite."""
+    remedy = "give two numbers, (t0, t1)"
+    if not is_row(t_span):
+        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
+    ends = [number(t, "a time of t_span", remedy) for t in t_span]
+    if len(ends) != 2:
+        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
+    if not all(map(math.isfinite, ends)):
+        remedy = "give two finite numbers; a monitor can end a run early"
+        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
+    return ends[0], ends[1]
+
+
+def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
+    """Initial values of states by name, and the model with those of its discrete states changed."""
+    names = [s.name for s in model.states]
+    if x0 is None:
+        return {}, model
+    if not isinstance(x0, Mapping):
+        each = f"give one number for each of {', '.join(names)}, or a mapping from names to numbers"
+        values = numbers(x0, "x0", each)
+        if len(values) != len(names):
+            raise UsageError(
+                f"x0 has {len(values)} values and model {model.name} has {len(names)} states ({', '.join(names)})",
+                remedy="give one value for each state, or a mapping from names to values",
+            )
+        x0 = dict(zip(names, values, strict=True))
+    discrete = [d.name for d in model.discrete]
+    found: dict[str, float] = {}
+    for name, value in x0.items():
+        if name not in names + discrete:
+            raise UsageError(
+                f"x0 names {name!r}, which is no state of model {model.name}",
+                remedy=nearest(str(name), names + discrete, kind="states"),
+            )
+        found[name] = number(
+            value, f"x0 of {name}", f"give a number; an expression goes to model.with_start({name}=...)"
+        )
+        if not math.isfinite(found[name]):
+            raise UsageError(f"x0 of {name} is {value!r}", remedy="give a finite number")
+    changed = {n: v for n, v in found.items() if n in discrete}
+    return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
+
+
+def integrator_name(integrator: Any) -> str:
+    """The name of an integrator, "auto" resolved."""
+    if not isinstance(integrator, str):
+        raise UsageError(
+            f"integrator is {integrator!r}", remedy="give a name; hs.list_integrators() has them all"
+        )
+    return "dop853" if integrator == "auto" else integrator
+
+
+def refuse_unused(method: Integrator, **given: Any) -> None:
+    """Refuse error control that a method with a fixed step would ignore; None is not given."""
+    unused = [name for name, value in given.items() if value is not None]
+    if unused and "adaptive" in method.lacks:
+        raise UsageError(
+            f"{method.name} makes no use of {', '.join(unused)}: {method.lacks['adaptive']}",
+            remedy=f"set its own options ('hybridsim integrators {method.name}' lists them), or take another one",
+        )
+
+
+def callback(progress: Any) -> Callable[[float], None] | None:
+    """A function of the finished fraction, or None."""
+    if progress is not None and not callable(progress):
+        raise UsageError(f"progress is {progress!r}", remedy="give a function of the finished fraction")
+    called: Callable[[float], None] | None = progress
+    return called
+
+
+def relative_tolerance(rtol: Any) -> float:
+    """rtol, from what double precision can keep to below 1."""
+    remedy = f"give a number from {SMALLEST_RTOL:.2g} to below 1"
+    value = RTOL if rtol is None else number(rtol, "rtol", remedy)
+    if not (SMALLEST_RTOL <= value < 1.0):
+        raise UsageError(f"rtol is {rtol!r}", remedy=remedy)
+    return value
+
+
+def step_bound(value: Any, name: str) -> float:
+    """A bound of the step, above zero."""
+    bound = number(value, name, "give a positive number")
+    if not bound > 0.0:
+        raise UsageError(f"{name} is {value!r}", remedy="give a positive number")
+    return bound
+
+
+def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
+    """atol for each state: as given, else rtol * 1e-3 * nominal size."""
+    names = [s.name for s in model.states]
+    sizes = [s.nominal or abs(x) or 1.0 for s, x in zip(model.states, start, strict=True)]
+    values = 1e-3 * rtol * np.array(sizes, dtype=float)
+    remedy = f"give a number >= 0, or one for each of {', '.join(names)}"
+    if isinstance(atol, Mapping):
+        for name, value in atol.items():
+            if name not in names:
+                raise UsageError(
+                    f"atol names {name!r}, which is no state of model {model.name}",
+                    remedy=nearest(str(name), names, kind="states"),
+                )
+            values[names.index(name)] = number(value, f"atol of {name}")
+    elif is_row(atol):
+        values = numbers(atol, "atol", remedy)
+    elif atol is not None:
+        values[:] = number(atol, "atol", remedy)
+    if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
+        raise UsageError(f"atol is {atol!r}", remedy=remedy)
+    return values
+
+
+def initial_modes(system: System, z0: Any) -> np.ndarray:
+    """Number of the first mode of each component, -1 where a surface decides."""
+    z = np.array([a.initial for a in system.automata], dtype=np.int64)
+    if z0 is None:
+        return z
+    components = [a.name for a in system.automata]
+    if not isinstance(z0, Mapping):
+        raise UsageError(f"z0 is {z0!r}", remedy="give a mapping from names of components to names of modes")
+    for name, mode in z0.items():
+        if name not in components:
+            raise UsageError(
+                f"z0 names {name!r}, which is no component of model {system.model.name}",
+                remedy=nearest(str(name), components, kind="components"),
+            )
+        automaton = system.automata[components.index(name)]
+        if mode not in automaton.modes:
+            raise UsageError(
+                f"z0 of {name} is {mode!r}, which is no mode of it",
+                remedy=nearest(str(mode), automaton.modes, kind="modes"),
+            )
+        z[components.index(name)] = automaton.modes.index(mode)
+    return z
+
+
+def time_grid(t_eval: Sequence[float] | None, span: tuple[float, float]) -> np.ndarray | None:
+    """Times within the span."""
+    if t_eval is None:
+        return None
+    grid = numbers(t_eval, "t_eval", "give times from t0 to t1")
+    low, high = min(span), max(span)
+    if not np.isfinite(grid).all() or (len(grid) and (grid.min() < low or grid.max() > high)):
+        raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
+    return grid

@@ -1,0 +1,60 @@
+"""Parts built in Python from what they cannot be built from: a UsageError names the part and the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.errors import UsageError
+
+X = hs.State("x", 0, "1")
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: hs.Model("a", states={"x": "v"}), "Model a: states holds {'x': 'v'}"),
+        (lambda: hs.Model("a", states=5), "Model a: states holds 5"),
+        (lambda: hs.Model("a", states=None), "Model a: states holds None"),
+        (lambda: hs.Model(5, states=[X]), "Model: name is 5"),
+        (lambda: hs.Model("a", [X], parameters=["k"]), "Model a: parameters holds 'k'"),
+        (lambda: hs.Model("a", [X], parameters={"k": None}), "Parameter k: value is None"),
+        (lambda: hs.Model("a", [X], contacts=[X]), "Model a: contacts holds State"),
+        (lambda: hs.Model("a", [X], components=[hs.Mode("m")]), "Model a: components holds Mode"),
+        (lambda: hs.Model("a", [X], definitions=5), "Model a: definitions is 5"),
+        (lambda: hs.Model("a", [X], definitions=[5]), r"Model a: definitions is \[5\]"),
+        (lambda: hs.Model("a", [X], outputs={"y": None}), "Output y: expr is None"),
+        (lambda: hs.State(["x"], 0, "1"), r"State: name is \['x'\]"),
+        (lambda: hs.State("x", None, "1"), "State x: start is None"),
+        (lambda: hs.State("x", 0, "1", nominal="a"), "State x: nominal is 'a'"),
+        (lambda: hs.Mode("m", guards={"g": "x"}), "Mode m: guards holds {'g': 'x'}"),
+        (lambda: hs.Mode("m", der=5), "Mode m: der is 5"),
+        (lambda: hs.Mode("m", set=["u"]), r"Mode m: set is \['u'\]"),
+        (lambda: hs.Guard("g", "x", then=5), "Guard g: then holds 5"),
+        (lambda: hs.Choice("b", reset="x"), "Choice: reset is 'x'"),
+        (lambda: hs.Component("c", modes="m"), "Component c: modes holds 'm'"),
+        (lambda: hs.Component("c", [hs.Mode("m")], surface="x"), "Component c: surface is 'x'"),
+        (lambda: hs.Contact("f", "v", "N", 5), "Contact f: law is 5"),
+        (lambda: hs.Contact("f", None, "N", "coulomb"), "Contact f: velocity is None"),
+        (lambda: hs.Contact("f", "v", "N", "coulomb", arguments=5), "Contact f: arguments is 5"),
+        (lambda: hs.FrictionLaw("l", "N", "N", parameters=5), "FrictionLaw l: parameters is"),
+        (lambda: hs.Input("u", "table", times="a", values=[1]), "Input u: times is 'a'"),
+        (lambda: hs.Input("u", "table", times=[0], values=["b"]), r"Input u: values is \['b'\]"),
+        (lambda: hs.Input("u", 5), "Input u: kind is 5"),
+        (lambda: hs.Monitor("m", "x", direction=5), "Monitor m: direction is 5"),
+        (lambda: hs.Monitor("m", "x", reset=5), "Monitor m: reset is 5"),
+        (lambda: hs.Schedule("s", times=1, reset=3), "Schedule s: reset is 3"),
+        (lambda: hs.Output("o", "x", modes=5), "Output o: modes is 5"),
+        (lambda: hs.load("dfcs").with_(N=None), "parameter N is None"),
+        (lambda: hs.load("dfcs").with_start(x=[1]), r"state x is \[1\]"),
+        (lambda: hs.load(5), "model is 5"),
+        (lambda: hs.load_law(5), "law is 5"),
+        (lambda: hs.Model.from_toml(5), "text is 5"),
+    ],
+)
+def test_what_cannot_be_is_named(make: Callable[[], object], says: str) -> None:
+    with pytest.raises(UsageError, match=says) as caught:
+        make()
+    assert caught.value.remedy

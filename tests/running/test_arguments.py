@@ -1,0 +1,94 @@
+"""What `simulate` refuses: every fault names the argument, its value and the remedy."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.errors import UsageError
+
+SPAN = (0.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "says", "remedy"),
+    [
+        ({"atol": "a"}, "atol is 'a'", "one for each of x, v"),
+        ({"atol": {"x": "a"}}, "atol of x is 'a'", "number"),
+        ({"atol": [1, "b"]}, "atol is 'b'", "number"),
+        ({"atol": [[1], [1, 2]]}, r"atol is \[1\]", "number"),
+        ({"atol": [1e-9]}, "atol is", "one for each of x, v"),
+        ({"atol": -1}, "atol is -1", ">= 0"),
+        ({"rtol": "x"}, "rtol is 'x'", "below 1"),
+        ({"rtol": True}, "rtol is True", "below 1"),
+        ({"rtol": 1j}, "rtol is 1j", "below 1"),
+        ({"rtol": 0}, "rtol is 0", "below 1"),
+        ({"max_step": "1"}, "max_step is '1'", "positive number"),
+        ({"max_step": None}, "max_step is None", "positive number"),
+        ({"max_step": np.ones(2)}, "max_step is array", "positive number"),
+        ({"first_step": "a"}, "first_step is 'a'", "positive number"),
+        ({"first_step": -1}, "first_step is -1", "positive number"),
+        ({"x0": 5}, "x0 is 5", "mapping"),
+        ({"x0": "ab"}, "x0 is 'ab'", "mapping"),
+        ({"x0": [1, "a"]}, "x0 is 'a'", "number"),
+        ({"x0": {"x": "1"}}, "x0 of x is '1'", r"with_start\(x="),
+        ({"x0": {"x": math.nan}}, "x0 of x is nan", "finite"),
+        ({"x0": {5: 1}}, "x0 names 5", "known states"),
+        ({"z0": 5}, "z0 is 5", "mapping"),
+        ({"z0": {"f": 5}}, "z0 of f is 5", "slip"),
+        ({"z0": {5: "stick"}}, "z0 names 5", "known components"),
+        ({"params": 5}, "params is 5", "mapping"),
+        ({"params": "N=3"}, "params is 'N=3'", "mapping"),
+        ({"params": {"N": None}}, "parameter N is None", "number or an expression"),
+        ({"params": {5: 1}}, "params is {5: 1}", "mapping"),
+        ({"integrator": None}, "integrator is None", "list_integrators"),
+        ({"t_eval": "a"}, "t_eval is 'a'", "times from t0 to t1"),
+        ({"t_eval": 5}, "t_eval is 5", "times from t0 to t1"),
+        ({"t_eval": [[0, 1]]}, r"t_eval is \[0, 1\]", "times from t0 to t1"),
+        ({"progress": 5}, "progress is 5", "function"),
+        ({"t_span": 5}, "t_span is 5", "two numbers"),
+        ({"t_span": None}, "t_span is None", "two numbers"),
+        ({"t_span": "12"}, "t_span is '12'", "two numbers"),
+        ({"t_span": (0, "a")}, "t_span is 'a'", "two numbers"),
+        ({"t_span": (0, 1, 2)}, r"t_span is \(0, 1, 2\)", "two numbers"),
+        ({"t_span": (0, math.inf)}, "t_span is", "finite"),
+        ({"model": 5}, "model is 5", "name or a path"),
+        ({"model": None}, "model is None", "name or a path"),
+    ],
+)
+def test_a_bad_argument_is_named(given: dict[str, Any], says: str, remedy: str) -> None:
+    arguments = {"model": "dfcs", "t_span": SPAN} | given
+    with pytest.raises(UsageError, match=says) as caught:
+        hs.simulate(**arguments)
+    assert caught.match(remedy)
+
+
+def test_numbers_of_all_kinds_are_numbers() -> None:
+    plain = hs.simulate(
+        "dfcs", SPAN, rtol=1e-6, atol=[1e-9, 1e-9], x0=[0, 0], max_step=0.001, first_step=2.0**-20
+    )
+    other = hs.simulate(
+        "dfcs",
+        np.array(SPAN),
+        rtol=np.float64(1e-6),
+        atol=np.array([1e-9, 1e-9]),
+        x0=(Fraction(0), np.int64(0)),
+        max_step=np.array(0.001),
+        first_step=np.float32(2.0**-20),
+        params={"N": np.float64(40)},
+    )
+    assert (plain.y == other.y).all()
+
+
+@pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
+@pytest.mark.parametrize("given", [{"rtol": 1e-9}, {"atol": 1e-9}, {"max_step": 1e-4}, {"first_step": 1e-4}])
+def test_a_fixed_step_refuses_error_control(integrator: str, given: dict[str, float]) -> None:
+    (name,) = given
+    with pytest.raises(UsageError, match=f"{integrator} makes no use of {name}: its step is fixed"):
+        hs.simulate("dfcs", SPAN, integrator=integrator, **given)
+    assert hs.simulate("dfcs", SPAN, integrator=integrator).success
