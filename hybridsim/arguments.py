@@ -112,7 +112,7 @@ def integrator_name(integrator: Any) -> str:
 
 
 def refuse_unused(method: Integrator, **given: Any) -> None:
-    """Refuse error control that a method with a fixed step would ignore; None is not given."""
+    """Refuse tolerances that a method with a fixed step would ignore; None is not given."""
     unused = [name for name, value in given.items() if value is not None]
     if unused and "adaptive" in method.lacks:
         raise UsageError(

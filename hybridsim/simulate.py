@@ -47,9 +47,9 @@ def simulate(
     z0 : initial modes by component; where a surface decides, the engine finds the mode from x0.
     integrator : a name from `list_integrators`; "auto" takes the default work-horse, ``dop853``.
     rtol, atol : error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its default
-        is rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1.
-    max_step, first_step : bounds of the step, in the unit of t. An integrator with a fixed step refuses them, and rtol
-        and atol.
+        is rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1. An integrator with a
+        fixed step refuses both.
+    max_step, first_step : bounds of the step, in the unit of t.
     t_eval : times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
         changes the run.
     progress : called with the finished fraction of the span, from time to time.
@@ -80,8 +80,7 @@ def simulate(
 
     announce_compilation()
     method = make_integrator(arguments.integrator_name(integrator), options)
-    longest = None if isinstance(max_step, float) and max_step == math.inf else max_step
-    arguments.refuse_unused(method, rtol=rtol, atol=atol, max_step=longest, first_step=first_step)
+    arguments.refuse_unused(method, rtol=rtol, atol=atol)
     began = time.perf_counter()
     system = System(model)
     for name in system.hot_functions():

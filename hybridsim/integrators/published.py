@@ -378,6 +378,15 @@ def _step(
     return period / steps_per_period
 
 
+def _refuse_longer(step: float, max_step: float, name: str) -> None:
+    """A fixed step is not shortened behind the user's back."""
+    if step > max_step:
+        raise UsageError(
+            f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
+            remedy="set step or steps_per_period",
+        )
+
+
 @dataclass(frozen=True)
 class Rk4Dichotomy(Integrator):
     """The published method: classic RK4 with step T/h0; a step in which the velocity changes sign is halved.
@@ -435,6 +444,7 @@ class Rk4Dichotomy(Integrator):
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""
         step = _step(system, self.step, self.period, self.steps_per_period, self.name)
+        _refuse_longer(step, task.tolerances.max_step, self.name)
         settings = _Settings(
             step,
             ZONE,
@@ -483,6 +493,7 @@ class Rk4Sign(Integrator):
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""
         step = _step(system, self.step, self.period, self.steps_per_period, self.name)
+        _refuse_longer(step, task.tolerances.max_step, self.name)
         settings = _Settings(step, SIGN, self.friction == "stage", False, False, False, False, 0.0, 16)
         return FixedStepRun(system, task, settings, progress).run()
 
