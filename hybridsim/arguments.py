@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,12 +121,11 @@ def refuse_unused(method: Integrator, **given: Any) -> None:
         )
 
 
-def callback(progress: Any) -> Callable[[float], None] | None:
-    """A function of the finished fraction, or None."""
+def callback(progress: Any) -> Any:
+    """A function to be told of progress, or None."""
     if progress is not None and not callable(progress):
-        raise UsageError(f"progress is {progress!r}", remedy="give a function of the finished fraction")
-    called: Callable[[float], None] | None = progress
-    return called
+        raise UsageError(f"progress is {progress!r}", remedy="give a function")
+    return progress
 
 
 def relative_tolerance(rtol: Any) -> float:

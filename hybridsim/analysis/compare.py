@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
+from hybridsim.analysis import wanted
 from hybridsim.analysis.bench import Bench
 from hybridsim.analysis.comparison import Comparison
 from hybridsim.analysis.progress import Progress, Steps
@@ -13,9 +14,10 @@ from hybridsim.analysis.race import Budget, Entry, race
 from hybridsim.analysis.reference import find_reference
 from hybridsim.analysis.regularised import regularised_series
 from hybridsim.analysis.series import Series, choose_series
+from hybridsim.arguments import callback, chosen_model, time_span
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError
-from hybridsim.model import Model, load
+from hybridsim.model import Model
 
 PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
 TIME = 10.0  # of a model without a period: a few swings of a mechanism of about 1 Hz
@@ -71,17 +73,16 @@ def compare(
     >>> comparison = hs.compare("dfcs", integrators=["scipy-dop853", "cvode-bdf"])  # doctest: +SKIP
     >>> print(comparison.table())  # doctest: +SKIP
     """
-    if repeat < 1:
-        raise UsageError(f"repeat = {repeat}", remedy="give a whole number above zero")
-    if not budget > 0:
-        raise UsageError(f"budget = {budget!r}", remedy="give a number of seconds above zero")
-    model = load(model) if not isinstance(model, Model) else model
-    model = model.with_(**(params or {})).with_start(**(x0 or {})).validate()
+    repeat, budget = wanted.whole(repeat, "repeat"), wanted.positive(budget, "budget")
+    rtols, steps = wanted.positives(rtols, "rtols"), wanted.wholes(steps, "steps")
+    v0 = wanted.positives(v0, "v0")
+    model = chosen_model(model, params).with_start(**wanted.mapping(x0, "x0")).validate()
     period = forcing_period(model)
     span = _span(t_span, period)
     if regularized is not None:
-        kinds = (regularized,) if isinstance(regularized, str) else tuple(regularized)
-        series = regularised_series(model, kinds, v0, _names(integrators), rtols)
+        kinds = wanted.words(regularized, "regularized")
+        names = None if integrators is None else wanted.words(integrators, "integrators")
+        series = regularised_series(model, kinds, v0, names, rtols)
     elif v0 is not None:
         raise UsageError(
             "v0 is given without regularized", remedy="say which forms, such as regularized=['tanh']"
@@ -90,7 +91,7 @@ def compare(
         series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
     bench = Bench(model, span, period)
     spending = Budget(budget)
-    steps_to_do = Steps(1 + (1 + repeat) * sum(len(line.values) for line in series), progress)
+    steps_to_do = Steps(1 + (1 + repeat) * sum(len(line.values) for line in series), callback(progress))
     steps_to_do("reference")
     against = find_reference(model, span, period, bench.simulate, reference)
     (rows,) = race([Entry(bench, against, series)], repeat, spending, steps_to_do)
@@ -98,19 +99,10 @@ def compare(
     return bench.comparison(against, rows, repeat)
 
 
-def _names(integrators: Sequence[Any] | None) -> Sequence[str] | None:
-    for item in integrators or ():
-        if not isinstance(item, str):
-            raise UsageError(
-                f"integrators holds {item!r}", remedy="with regularized, give names of integrators"
-            )
-    return integrators
-
-
 def _span(t_span: tuple[float, float] | None, period: float | None) -> tuple[float, float]:
     if t_span is None:
         return 0.0, PERIODS * period if period else TIME
-    t0, t1 = map(float, t_span)
+    t0, t1 = time_span(t_span)
     if not t1 > t0:
         raise UsageError(f"t_span = ({t0:g}, {t1:g})", remedy="comparisons run forward: give t1 > t0")
     return t0, t1

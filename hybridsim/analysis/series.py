@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from hybridsim.analysis.wanted import named_options, row_of_integrators
 from hybridsim.errors import UsageError
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -79,8 +80,6 @@ def choose_series(
     steps : steps a period of those that do not.
     untimed_span : length of the run where the model has no period; its tenth then stands for one.
     """
-    if isinstance(wanted, str):
-        wanted = [wanted]
     line = functools.partial(_line, rtols=rtols, steps=steps, untimed_span=untimed_span)
     chosen: list[Series] = []
     if wanted is None:
@@ -91,12 +90,8 @@ def choose_series(
                 line(integrator.name, options, label) for options, label in _shown_unasked(integrator.name)
             ]
     else:
-        for item in wanted:
-            if isinstance(item, Series):
-                chosen.append(item)
-            else:
-                name, options = (item, {}) if isinstance(item, str) else item
-                chosen.append(line(name, options))
+        for item in row_of_integrators(wanted):
+            chosen.append(item if isinstance(item, Series) else line(*named_options(item)))
     if not chosen:
         raise UsageError("no integrators to compare", remedy="name some, see hybridsim.list_integrators()")
     labels = [series.label for series in chosen]

@@ -199,7 +199,7 @@ def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
     "keywords, message",
     [
         ({"t_span": (1, 0)}, "t_span"),
-        ({"repeat": 0}, "repeat = 0"),
+        ({"repeat": 0}, "repeat is 0"),
         ({"integrators": []}, "no integrators"),
         ({"integrators": ["scipy-rk4"]}, "scipy-rk4"),
         ({"integrators": ["scipy-rk45", "scipy-rk45"]}, "two lines"),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from hybridsim.analysis import wanted
 from hybridsim.analysis.bench import Bench
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.analysis.race import Budget, Entry, race
@@ -14,6 +15,7 @@ from hybridsim.analysis.reference import CLOSED_FORM, MULTIPLE_PRECISION, RUNS, 
 from hybridsim.analysis.series import Series, choose_series
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
+from hybridsim.arguments import callback
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import load
@@ -59,10 +61,8 @@ def compare_suite(
     >>> suite = hs.compare_suite(scenes=["P1", "belt"], budget=60)  # doctest: +SKIP
     >>> print(suite.table())  # doctest: +SKIP
     """
-    if repeat < 1:
-        raise UsageError(f"repeat = {repeat}", remedy="give a whole number above zero")
-    if not budget > 0:
-        raise UsageError(f"budget = {budget!r}", remedy="give a number of seconds above zero")
+    repeat, budget = wanted.whole(repeat, "repeat"), wanted.positive(budget, "budget")
+    rtols, steps = wanted.positives(rtols, "rtols"), wanted.wholes(steps, "steps")
     spending = Budget(_RUNNING * budget)
     chosen = _chosen(scenes)
     benches = [_bench(scene) for scene in chosen]
@@ -71,7 +71,7 @@ def compare_suite(
         for bench in benches
     ]
     runs = sum(len(line.values) for series in lines for line in series)
-    step = Steps(len(chosen) + (1 + repeat) * runs, progress)
+    step = Steps(len(chosen) + (1 + repeat) * runs, callback(progress))
     entries = []
     for scene, bench, series in zip(chosen, benches, lines, strict=True):
         step(f"reference of {scene.name}")
@@ -89,6 +89,7 @@ def compare_suite(
 def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
     if names is None:
         return SCENES
+    names = wanted.words(names, "scenes")
     for name in names:
         if name not in scene_names():
             raise UsageError(

@@ -1,0 +1,78 @@
+"""What a comparison is asked for, checked: every fault is a UsageError that names the argument and its value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hybridsim.arguments import is_row, number
+from hybridsim.errors import UsageError
+
+
+def positive(value: Any, what: str) -> float:
+    """A number above zero."""
+    remedy = "give a number above zero"
+    found = number(value, what, remedy)
+    if not found > 0:
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    return found
+
+
+def whole(value: Any, what: str) -> int:
+    """A whole number above zero."""
+    remedy = "give a whole number above zero"
+    found = number(value, what, remedy)
+    if not (found >= 1 and found.is_integer()):
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    return int(found)
+
+
+def positives(values: Any, what: str) -> tuple[float, ...] | None:
+    """Numbers above zero; None stays None."""
+    return None if values is None else tuple(positive(value, what) for value in _row(values, what))
+
+
+def wholes(values: Any, what: str) -> tuple[int, ...] | None:
+    """Whole numbers above zero; None stays None."""
+    return None if values is None else tuple(whole(value, what) for value in _row(values, what))
+
+
+def mapping(value: Any, what: str) -> Mapping[str, Any]:
+    """A mapping from names; None is an empty one."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise UsageError(f"{what} is {value!r}", remedy="give a mapping from names to values")
+    return value
+
+
+def words(values: Any, what: str) -> tuple[str, ...]:
+    """Names; a single one becomes a tuple of one."""
+    found = (values,) if isinstance(values, str) else tuple(_row(values, what, "give names"))
+    for value in found:
+        if not isinstance(value, str):
+            raise UsageError(f"{what} holds {value!r}", remedy="give names")
+    return found
+
+
+def named_options(item: Any) -> tuple[str, Mapping[str, Any]]:
+    """The name of an integrator and its options, from a name or a pair."""
+    if isinstance(item, str):
+        return item, {}
+    if isinstance(item, tuple | list) and len(item) == 2 and isinstance(item[0], str):
+        return item[0], mapping(item[1], f"options of {item[0]}")
+    raise UsageError(
+        f"integrators holds {item!r}",
+        remedy="give names, pairs of a name and a mapping of options, or Series objects",
+    )
+
+
+def row_of_integrators(value: Any) -> tuple[Any, ...]:
+    """The items of a choice of integrators; a single name becomes a tuple of one."""
+    return (value,) if isinstance(value, str) else tuple(_row(value, "integrators", "give a list of names"))
+
+
+def _row(values: Any, what: str, remedy: str = "give a list of numbers") -> Any:
+    if not is_row(values):
+        raise UsageError(f"{what} is {values!r}", remedy=remedy)
+    return values
