@@ -152,9 +152,11 @@ def _refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarr
     for c, effect in effects.items():
         if effect >= 0.0:
             name = system.automata[c].name
+            place = system.model.all_components()[c].place
             raise ModelError(
                 f"contact {name}: the force {name} acts along its relative velocity, not against it "
                 f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
+                place=place,
                 remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
             )
 

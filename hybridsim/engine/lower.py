@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.program import Assign, Item, Switch, ordered
-from hybridsim.errors import ModelError
+from hybridsim.errors import ModelError, Place
 from hybridsim.expr.symbolic import to_sympy
 
 if TYPE_CHECKING:
@@ -177,11 +177,22 @@ class Lowering:
         for c, s in surfaces.items():
             wrong = [n for n in s.free_symbols - allowed if n.name.startswith("v_")]
             if wrong:
+                names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
                 raise ModelError(
-                    f"{self.components[c].name}: its relative velocity uses "
-                    f"{', '.join(n.name.removeprefix('v_') for n in wrong)}, which depends on a mode",
+                    f"{self.components[c].name}: its relative velocity '{self._velocity(c)}' uses {names}, which "
+                    "depends on a mode",
+                    place=self._place(c),
                     remedy="write it over states, inputs, parameters and t",
                 )
+
+    def _velocity(self, c: int) -> str:
+        """A surface's function as it was written."""
+        return " ".join(str(self.components[c].surface.function.text).split())
+
+    def _place(self, c: int) -> Place | None:
+        """Where a surface's function was written."""
+        component = self.components[c]
+        return component.surface.function.place or component.place
 
     def _choose_pins(self, surfaces: dict[int, Any], der: list[Any]) -> dict[int, int]:
         """One state for each surface, with a constant coefficient in it, no two alike, no circle."""
@@ -196,7 +207,8 @@ class Lowering:
                     found.append((0 if abs(slope) == 1 else 1, i))
             if not found:
                 raise ModelError(
-                    f"{self.components[c].name}: its relative velocity {s} is linear in no state",
+                    f"{self.components[c].name}: its relative velocity '{self._velocity(c)}' is linear in no state",
+                    place=self._place(c),
                     remedy="introduce the relative velocity as a state of its own",
                 )
             choices[c] = [i for _, i in sorted(found)]
@@ -206,6 +218,7 @@ class Lowering:
                 "the relative velocities of "
                 + ", ".join(self.components[c].name for c in surfaces)
                 + " are not independent: holding all of them at zero leaves no state for each",
+                place=self._place(next(iter(surfaces))),
                 remedy="merge contacts that share one relative velocity",
             )
         return chosen
@@ -289,6 +302,7 @@ class Lowering:
                     raise ModelError(
                         f"{unknown[d].name.removeprefix('v_')} enters the motion of "
                         f"{self.components[c].name} nonlinearly: it cannot be solved for",
+                        place=self._place(c),
                         remedy="let the force enter the derivative of the velocity linearly",
                     )
             rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
@@ -296,7 +310,8 @@ class Lowering:
             if effect[c, c] == 0:
                 raise ModelError(
                     f"{unknown[c].name.removeprefix('v_')} does not act on its own relative velocity "
-                    f"({self.components[c].name}): it can never hold it",
+                    f"'{self._velocity(c)}' ({self.components[c].name}): it can never hold it",
+                    place=self._place(c),
                     remedy=f"use {unknown[c].name.removeprefix('v_')} in the derivative of the velocity state",
                 )
         clusters = self._clusters(order, effect)
@@ -415,6 +430,7 @@ class Lowering:
                 raise ModelError(
                     f"the derivative of {state} is changed by modes of both "
                     f"{' and '.join(self.components[c].name for c in overriding)}",
+                    place=self.components[overriding[-1]].place,
                     remedy="let one component change it",
                 )
             component = self.components[overriding[0]]

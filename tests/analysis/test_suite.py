@@ -194,8 +194,8 @@ def test_a_reference_that_takes_too_long_is_replaced_and_that_is_said() -> None:
     [
         ({"scenes": ["P3"]}, "no scene 'P3'"),
         ({"scenes": []}, "no scenes"),
-        ({"budget": 0.0}, "budget = 0.0"),
-        ({"repeat": 0}, "repeat = 0"),
+        ({"budget": 0.0}, "budget is 0.0"),
+        ({"repeat": 0}, "repeat is 0"),
         ({"integrators": ["cvode-bfd"]}, "cvode-bfd"),
     ],
 )
