@@ -10,6 +10,7 @@ from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
 _TERMS = 10
+_FEW = 4  # intervals after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
 _SAME_FACTOR = 1e-3
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
@@ -24,6 +25,17 @@ class Accumulation:
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
         self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
+
+    def is_under_way(self) -> bool:
+        """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
+        gaps = list(self.intervals)[-_FEW:]
+        if len(gaps) < _FEW or min(gaps) <= 0.0:
+            return False
+        factors = [b / a for a, b in pairwise(gaps)]
+        factor = factors[-1]
+        return factor < 1.0 - _SAME_FACTOR and all(
+            abs(f - factor) <= 2.0 * _SAME_FACTOR * factor for f in factors
+        )
 
     def limit(self, instant: Instant) -> float | None:
         """Note an event; the limit time once the rest of the series is below the resolution, else None."""

@@ -233,20 +233,27 @@ class Emitter:
         return found
 
     def _choose(self) -> str:
-        lines = ["def choose(component, mode, guard, t, x, p, z):"]
+        """The number of the choice that is taken; component, mode and index of the guard stand behind z."""
+        count = len(self.program.components)
+        lines = ["def choose(t, x, p, z, out):", "    out[0] = -1.0"]
         for (c, m, g), conditions in self.program.conditions.items():
             if not conditions:
                 continue
-            lines.append(f"    if component == {c} and mode == {m} and guard == {g}:")
+            place = f"z[{count}] == {c} and z[{count + 1}] == {m} and z[{count + 2}] == {g}"
+            lines.append(f"    if {place}:")
             lines += ["    " + line for line in self._prelude(e for e in conditions if e is not None)]
             for k, e in enumerate(conditions):
                 if e is None:
-                    lines.append(f"        return {k}")
+                    lines += [f"        out[0] = {k}.0", "        return 0"]
                     break
-                lines += [f"        if {self._text(e)}:", f"            return {k}"]
+                lines += [
+                    f"        if {self._text(e)}:",
+                    f"            out[0] = {k}.0",
+                    "            return 0",
+                ]
             else:
-                lines.append("        return -1")
-        return "\n".join([*lines, "    return -1"])
+                lines.append("        return 0")
+        return "\n".join([*lines, "    return 0"])
 
     def resets(self) -> list[tuple[str, Any]]:
         """(what, mapping) of every reset of the model: of choices, monitors and schedules, in this order."""
@@ -261,13 +268,14 @@ class Emitter:
         return [(key, reset) for key, reset in found if reset]
 
     def _reset(self) -> str:
-        model, layout = self.program.model, self.program.layout
-        place = {s.name: f"x_plus[{i}]" for i, s in enumerate(model.states)}
-        place |= {d.name: f"p_plus[{layout.discrete_at + i}]" for i, d in enumerate(model.discrete)}
-        lines = ["def reset(number, t, x, p, z, x_plus, p_plus):"]
+        """Write what a reset sets into out, states first, then discrete states; its number stands behind the modes."""
+        model, count = self.program.model, len(self.program.components)
+        names = [*(s.name for s in model.states), *(d.name for d in model.discrete)]
+        place = {name: f"out[{i}]" for i, name in enumerate(names)}
+        lines = ["def reset(t, x, p, z, out):"]
         for number, (_, mapping) in enumerate(self.resets()):
             converted = {n: self.lowering.convert(e) for n, e in mapping.items()}
-            lines.append(f"    if number == {number}:")
+            lines.append(f"    if z[{count}] == {number}:")
             lines += ["    " + line for line in self._prelude(converted.values())]
             lines += [f"        {place[n]} = {self._text(e)}" for n, e in converted.items()]
         return "\n".join([*lines, "    return 0"])

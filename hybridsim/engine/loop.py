@@ -11,6 +11,7 @@ from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.leaper import Leaper
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Outcome, Settling, Situation
 from hybridsim.engine.stepping import Method, StepFailure, Watch
@@ -38,16 +39,23 @@ class ModeLoop:
             int, int
         ] = {}  # monitors whose resets an event set off, and their direction
         self.adopted: Instant | None = None  # the last instant at which an event was settled
-        self.renewal = (
-            _TURNS * 2.0 * math.pi / fastest
-            if (fastest := max(map(abs, system.rates), default=0.0))
-            else math.inf
-        )
+        fastest = max(map(abs, system.rates), default=0.0)
+        self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf
+        self.outcome: Outcome  # what holds at the origin, and the run-time vector there
+        self.p: np.ndarray
         self.accumulation = Accumulation(1e-3 * task.tolerances.rtol * abs(task.t1 - task.t0))
+        self.leaper = self._leaper()
         self.progress: Callable[[Instant], None] | None = None
         if progress is not None:
             span = task.t1 - task.t0
             self.progress = lambda instant: progress((float(instant) - task.t0) / span)
+
+    def _leaper(self) -> Leaper | None:
+        """The compiled loop, where method and model allow it."""
+        model = self.system.model
+        if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors or model.inputs:
+            return None
+        return Leaper(self.system, self.task.tolerances, self.renewal)
 
     def run(self) -> Trajectory:
         """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
@@ -79,6 +87,10 @@ class ModeLoop:
         while not stop and self.origin != self.end:
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
+            if self.leaper is not None and not self.accumulation.is_under_way():
+                arrived, stop = self._leap(self.leaper, target, appointment)
+                if arrived or stop:
+                    continue
             if abs(target.minus(self.origin)) > self.renewal:
                 target = self.origin.plus(self.renewal if self.forward else -self.renewal)
                 appointment = Appointment(target, (), is_renewal=True)
@@ -92,6 +104,27 @@ class ModeLoop:
             instant = target if at_target else self.origin.plus(arrival.s)
             stop = self._settle(instant, arrival, appointment if at_target else None, segment)
             step_size = segment.last_step if self.outcome.continuous else None
+
+    def _leap(self, leaper: Leaper, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
+        """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
+        done = len(self.record.occurrences)
+        origin, outcome, arrived = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
+        self.origin, self.outcome = origin, outcome
+        if self.progress:
+            self.progress(origin)
+        for occurrence in self.record.occurrences[done:]:
+            self.adopted = occurrence.instant
+            if self._accumulated(occurrence.instant):
+                return arrived, True
+        if not arrived:
+            self.p = self.system.vector(origin, self.system.discrete(outcome.p), self.forward)
+            return False, False
+        if appointment is None:
+            return True, True
+        self.timetable.kept(target)
+        x = outcome.x
+        settled = self._settle_appointment(target, x, appointment.schedules, outcome.x_error)
+        return True, self._adopt(target, settled, x, appointment.schedules, ())
 
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
@@ -186,7 +219,7 @@ class ModeLoop:
             if not appointment.is_renewal:
                 self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
-            outcome = self._settle_appointment(instant, x_minus, schedules, segment)
+            outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
         return self._accumulated(instant)
@@ -235,12 +268,12 @@ class ModeLoop:
         return after if wanted == after else 0
 
     def _settle_appointment(
-        self, instant: Instant, x_minus: np.ndarray, schedules: tuple[int, ...], segment: SegmentRun
+        self, instant: Instant, x_minus: np.ndarray, schedules: tuple[int, ...], error: np.ndarray
     ) -> Outcome:
         """Settle a scheduled instant, inputs as they are from then on."""
         system, z = self.system, self.outcome.z
-        p = system.vector(instant, system.discrete(self.p), self.forward)
-        error = segment.rounding()
+        p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
+        error = error.copy()
         error[[system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and z[c] == a.hold]] = (
             0.0
         )

@@ -157,6 +157,10 @@ class Method(Protocol):
     def dense_is_accurate(self) -> bool:
         """Whether the dense output is as accurate as the method."""
 
+    @property
+    def leaps(self) -> bool:
+        """Whether the compiled loop takes its steps where it can."""
+
     def start(
         self,
         flow: Flow,

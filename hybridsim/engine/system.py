@@ -215,6 +215,11 @@ class System:
         """Address of a compiled function, for kernels."""
         return self.code.address(name)
 
+    @property
+    def registers(self) -> _Registers:
+        """Where the tape's inputs and results are."""
+        return self._registers
+
     def _plain(self, name: str, p: np.ndarray, size: int) -> np.ndarray:
         out = np.zeros(size)
         getattr(self.code.module, name)(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
@@ -256,14 +261,19 @@ class System:
 
     def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
         """Number of the first choice of a guard whose condition holds; -1 if none."""
-        return self.code.module.choose(component, mode, guard, s, x, p, z)
+        out = np.zeros(1)
+        self.code.module.choose(s, x, p, np.array([*z, component, mode, guard]), out)
+        return int(out[0])
 
     def apply_reset(
         self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
     ) -> None:
         """Write the values that one reset sets; everything is evaluated at (s, x, p, z)."""
         if key in self.resets:
-            self.code.module.reset(self.resets[key][0], s, x, p, z, x_plus, p_plus)
+            at = self.layout.discrete_slice
+            out = np.concatenate([x_plus, p_plus[at]])
+            self.code.module.reset(s, x, p, np.array([*z, self.resets[key][0]]), out)
+            x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
 
     # -- series ---------------------------------------------------------------------------------------------
 
@@ -288,7 +298,8 @@ class System:
         mask[numbers[numbers >= 0]] = True
         return mask
 
-    def _tape(self, z: np.ndarray) -> np.ndarray:
+    def full_tape(self, z: np.ndarray) -> np.ndarray:
+        """The rows of the tape of the modes z."""
         key = z.tobytes()
         if key not in self._tapes:
             self._tapes[key] = np.array(self._rows(z), dtype=np.int64).reshape(-1, 5)
@@ -313,5 +324,5 @@ class System:
         """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
         place = self._registers
         V, E = np.empty((place.count, ORDER + 1)), np.empty((place.count, ORDER + 1))
-        run_series(self._tape(z), place.inputs, s, s_error, x, x_error, p, V, E)
+        run_series(self.full_tape(z), place.inputs, s, s_error, x, x_error, p, V, E)
         return Series(V, E, place)

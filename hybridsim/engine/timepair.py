@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from hybridsim.engine.jit import kernel
+
 _SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
 # 2*pi to 107 + 53 bits as an unevaluated sum of three doubles
 _TWO_PI = (6.283185307179586, 2.4492935982947064e-16, -5.989539619436679e-33)
@@ -33,6 +35,7 @@ class Instant(NamedTuple):
         return float(self.high + self.low)  # a NumPy double would be refused here
 
 
+@kernel
 def two_sum(a: float, b: float) -> tuple[float, float]:
     """Rounded sum and its exact error."""
     s = a + b
@@ -40,6 +43,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
     return s, (a - (s - v)) + (b - v)
 
 
+@kernel
 def two_product(a: float, b: float) -> tuple[float, float]:
     """Rounded product and its exact error (barring overflow and underflow)."""
     product = a * b
@@ -66,19 +70,26 @@ def multiple(start: float, k: int, period: float) -> Instant:
 
 
 def phase(instant: Instant, rate: float, offset: float) -> float:
-    """(rate*instant + offset) modulo 2 pi, for an angle of any number of turns.
+    """(rate*instant + offset) modulo 2 pi, for an angle of any number of turns; see `phase_of`."""
+    return float(phase_of(instant.high, instant.low, rate, offset))
+
+
+@kernel
+def phase_of(high: float, low: float, rate: float, offset: float) -> float:
+    """(rate*(high + low) + offset) modulo 2 pi, for an angle of any number of turns.
 
     In [-pi, pi], or beyond an end of it by as much as the rounding of the whole angle where that is half a turn.
     The product and the reduction are carried in two doubles: after 1e6 turns the angle is still
     good to one ulp, where a plain ``rate*t`` would have lost six digits.
     """
-    angle = times(instant, rate)
-    high, error = two_sum(angle.high, offset)
-    angle = Instant(*two_sum(high, error + angle.low))
-    if not math.isfinite(angle.high):
+    product, error = two_product(high, rate)
+    angle, rest = two_sum(product, error + low * rate)
+    total, error = two_sum(angle, offset)
+    angle, rest = two_sum(total, error + rest)
+    if not math.isfinite(angle):
         return math.nan
-    turns = float(round(angle.high / _TWO_PI[0]))
+    turns = float(round(angle / _TWO_PI[0]))
     a, a_error = two_product(turns, _TWO_PI[0])
     b, b_error = two_product(turns, _TWO_PI[1])
-    high, error = two_sum(angle.high, -a)
-    return high + (((error + angle.low) - a_error) - b - b_error - turns * _TWO_PI[2])
+    left, error = two_sum(angle, -a)
+    return left + (((error + rest) - a_error) - b - b_error - turns * _TWO_PI[2])

@@ -61,6 +61,7 @@ class Integrator(ABC):
     when: ClassVar[str]
     lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
     dense_is_accurate: ClassVar[bool] = False
+    leaps: ClassVar[bool] = False  # whether the engine's compiled loop takes this method's steps where it can
 
     def start(
         self,

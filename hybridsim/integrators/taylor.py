@@ -103,6 +103,7 @@ class Taylor(Integrator):
     when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
     dense_is_accurate: ClassVar[bool] = True
+    leaps: ClassVar[bool] = True
 
     def start(
         self,

@@ -1,0 +1,281 @@
+"""The compiled mode loop: Taylor steps from event to event, ordinary events settled on the way, no Python between.
+
+A leap goes over whole segments and commits them one by one. It ends at its target time, or before the first segment
+that holds something which is not ordinary; the mode loop then takes that one segment by its general way.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, guard_series, settle_ordinary
+from hybridsim.engine.taylor import advance, expand, reach
+from hybridsim.engine.timepair import phase_of, two_sum
+
+AT_TARGET, STOPPED, FULL = 0, 1, 2
+_DEFECT = 100.0  # as in the taylor integrator
+_SHORTER = 0.25
+_TRIALS = 30
+_SMALLEST = 10.0
+_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
+_ULPS = 64.0  # events closer than this are for the general way to tell apart
+
+
+@kernel
+def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
+    """The run-time vector of a segment whose local time starts at an instant; inputs are left as they are."""
+    origin_at, phases_at = place
+    p[origin_at] = hi + lo
+    for i in range(rates.shape[0]):
+        p[phases_at + i] = phase_of(hi, lo, rates[i], 0.0)
+
+
+@kernel
+def load(
+    constants: Any, values: Any, parameters: Any, sources: Any, tapes: Any, k: int, p: Any, V: Any
+) -> None:
+    """Constants of a segment into their registers."""
+    for i in range(constants.shape[0]):
+        V[constants[i], 0] = values[i]
+    for i in range(parameters.shape[0]):
+        V[parameters[i], 0] = p[sources[i]]
+    advance(tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]], V, 0)
+
+
+@kernel
+def holds(
+    rows: Any,
+    places: Any,
+    order: int,
+    s: float,
+    x0: Any,
+    x1: Any,
+    d: float,
+    rtol: float,
+    atol: Any,
+    V: Any,
+    W: Any,
+) -> bool:
+    """Whether the series V from s still satisfies the equation at s + d, where the state is x1."""
+    time, states, derivatives = places
+    if time >= 0:
+        W[time, 0] = s + d
+    for i in range(states.shape[0]):
+        W[states[i], 0] = x1[i]
+    advance(rows, W, 0)
+    for i in range(states.shape[0]):
+        slope, change, power = 0.0, 0.0, 1.0
+        for k in range(1, order + 1):
+            term = V[states[i], k] * power
+            slope += k * term
+            power *= d
+            change += abs(term * d)
+        scale = atol[i] + rtol * max(abs(x0[i]), abs(x1[i])) + rtol * change
+        if not abs(d * (slope - W[derivatives[i], 0])) <= _DEFECT * scale:
+            return False
+    return True
+
+
+@kernel
+def state_at(states: Any, order: int, d: float, V: Any, x: Any) -> None:
+    """States at a distance d from the origin of the series (Horner)."""
+    for i in range(states.shape[0]):
+        total = V[states[i], order]
+        for k in range(order - 1, -1, -1):
+            total = total * d + V[states[i], k]
+        x[i] = total
+
+
+@kernel
+def earliest_exit(
+    tapes: Any,
+    k: int,
+    order: int,
+    h: float,
+    sides: Any,
+    orders: Any,
+    floors: Any,
+    V: Any,
+    a: Any,
+    b: Any,
+    stack: Any,
+) -> tuple[int, int, float]:
+    """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time)."""
+    found, best = -1, 1.0
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        r = tapes.guards[k, g]
+        power, total = 1.0, 0.0
+        for j in range(order + 1):
+            a[j] = V[r, j] * power
+            total += abs(a[j])
+            power *= h
+        if total == 0.0 and sides[g] >= 0:
+            continue  # zero all along: neither a side nor a change of it
+        if sides[g] <= 0:
+            return OPEN, g, 0.0
+        error = 2.0 * (abs(a[order]) + abs(a[order - 1])) + 8.0 * UNIT * total + floors[g]
+        outcome, theta = first_exit(a[: order + 1], error, orders[g], b, stack)
+        if outcome == OPEN:
+            return OPEN, g, theta * h
+        if outcome == FOUND and (found < 0 or theta < best):
+            found, best = g, theta
+    return (FOUND, found, best * h) if found >= 0 else (NEVER, -1, h)
+
+
+@kernel
+def leap(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    registers: Any,
+    places: Any,
+    control: Any,
+    target: Any,
+    clock: Any,
+    state: Any,
+    work: Any,
+    room: Any,
+    record: Any,
+) -> tuple[int, int, int]:
+    """Go from event to event; returns why it ended and how many steps and segments were committed.
+
+    places: rates, then where in p the origin, the phases and the discrete states are, and how many of these there are.
+    control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
+    the segment, moved on. state: x, x_error, z, p, sides, orders, floors at the start of the segment, moved on. room:
+    scratch arrays. record: what the committed steps, segments and events are written to.
+    """
+    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    rtol, atol, order, max_step, longest = control
+    x, x_error, z, p, sides, orders, floors = state
+    V, W, a, b, stack, y, y1, y_error, u, q, scale, slopes, side_now, order_now, floor_now = room
+    steps, series, segments, clocks, modes, vectors, fires, jumps = record
+    constants, values, parameters, sources, _phases, time, states, _derivatives = inputs
+    n, n_steps, n_segments = x.shape[0], 0, 0
+    last_gap, last_ratio, steady = math.inf, math.inf, 0
+    while True:
+        k, first_step = find_modes(tapes.modes, z), n_steps
+        bound = (target[0] - clock[0]) + (target[1] - clock[1])
+        if not bound > 0.0:
+            return AT_TARGET, n_steps, n_segments
+        if k < 0:
+            return STOPPED, n_steps, n_segments
+        if n_segments >= segments.shape[0]:
+            return FULL, n_steps, n_segments
+        set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
+        rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+        flow_places = (time, states, tapes.derivatives[k])
+        load(constants, values, parameters, sources, tapes, k, p, V)
+        load(constants, values, parameters, sources, tapes, k, p, W)
+        count = tapes.active_start[k + 1] - tapes.active_start[k]
+        watched = np.empty(count, dtype=np.int64)
+        for i in range(count):
+            watched[i] = tapes.guards[k, tapes.active[tapes.active_start[k] + i]]
+        side_now[:], order_now[:], floor_now[:] = sides, orders, floors
+        s, fired, y[:] = 0.0, -1, x
+        for i in range(n):
+            scale[i] = abs(x[i])
+        while fired < 0 and s < bound:
+            if n_steps >= steps.shape[0]:
+                return FULL, first_step, n_segments
+            if s > longest:
+                return STOPPED, first_step, n_segments
+            expand(rows, flow_places, order, s, y, V)
+            left = bound - s
+            h = reach(V, states, watched, order, rtol, atol, min(left, max_step))
+            if not h > _SMALLEST * 2.0**-52 * s:
+                return STOPPED, first_step, n_segments
+            outcome, g, d = earliest_exit(tapes, k, order, h, side_now, order_now, floor_now, V, a, b, stack)
+            if outcome == OPEN:
+                return STOPPED, first_step, n_segments
+            state_at(states, order, d, V, y1)
+            trials = 0
+            while not holds(rows, flow_places, order, s, y, y1, d, rtol, atol, V, W):
+                d, outcome, trials = _SHORTER * d, NEVER, trials + 1
+                if trials > _TRIALS:
+                    return STOPPED, first_step, n_segments
+                state_at(states, order, d, V, y1)
+            steps[n_steps, 0], steps[n_steps, 1] = s, d
+            for i in range(n):
+                series[n_steps, i] = V[states[i]]
+            n_steps += 1
+            s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
+            if outcome == FOUND:
+                fired = g
+            y[:] = y1
+            for i in range(n):
+                scale[i] = max(scale[i], abs(y1[i]))
+            side_now[:], order_now[:], floor_now[:] = 1, 0, 0.0
+        if holding(automata, z):
+            call(functions.project, s, y, p, z, y1)
+            y[:] = y1
+        gap = s
+        segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
+        modes[n_segments], vectors[n_segments], fires[n_segments] = z, p, fired
+        jumps[n_segments, 0], jumps[n_segments, 1] = y, y
+        if fired < 0:
+            x[:] = y
+            for i in range(n):
+                x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
+            clock[0], clock[1] = target[0], target[1]
+            return AT_TARGET, n_steps, n_segments + 1
+        ratio = gap / last_gap
+        steady = steady + 1 if ratio < _SHRINKING and abs(ratio - last_ratio) <= _STEADY * ratio else 0
+        last_gap, last_ratio = gap, ratio
+        if steady > 2 or gap <= _ULPS * 2.0**-52 * abs(clock[0]):
+            return STOPPED, first_step, n_segments
+        y_error[:] = 0.0
+        s_error = 2.0 * 2.0**-52 * s
+        guard_series(tapes, inputs, registers, k, Before(s, 0.0, y, y_error, p, z), y, y_error, z, work)
+        value, slope = work.values[fired, 0], work.values[fired, 1]
+        if slope != 0.0 and math.isfinite(value / slope):
+            s_error = max(s_error, abs(value / slope))
+        call(functions.flow, s, y, p, z, slopes)
+        for i in range(n):
+            y_error[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
+        for c in range(z.shape[0]):
+            if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
+                y_error[automata.pin[c]] = UNIT * abs(y[automata.pin[c]])
+        at = Before(s, s_error, y, y_error, p, z)
+        outcome, _ = settle_ordinary(
+            functions,
+            automata,
+            tapes,
+            inputs,
+            registers,
+            at,
+            fired,
+            n_discrete,
+            discrete_at,
+            y1,
+            slopes,
+            u,
+            q,
+            work,
+        )
+        if outcome != SETTLED:
+            return STOPPED, first_step, n_segments
+        jumps[n_segments, 1] = y1
+        n_segments += 1
+        x[:], x_error[:], z[:], p[:] = y1, slopes, u, q
+        for g in range(sides.shape[0]):
+            sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
+            floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
+        high, low = two_sum(clock[0], s)
+        clock[0], clock[1] = two_sum(high, low + clock[1])
+
+
+@kernel
+def holding(automata: Any, z: Any) -> bool:
+    """Whether any component holds its surface."""
+    for c in range(z.shape[0]):
+        if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
+            return True
+    return False

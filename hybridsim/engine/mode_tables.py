@@ -1,0 +1,131 @@
+"""A model's automata as arrays, and the tapes of every vector of modes that a run has met, for compiled loops."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.system import System
+
+
+class Automata(NamedTuple):
+    """What does not change: components, their guards, clusters, choices. -1 stands for none.
+
+    guards_of (C, M, W); hold, above, pin, surface (C,); owner, place (G,): component of a guard, index in its mode;
+    cluster_start (C + 1,), cluster (members): the cluster of each component; target, reset (C, M, W, T) of choices;
+    reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index).
+    """
+
+    guards_of: np.ndarray
+    hold: np.ndarray
+    above: np.ndarray
+    pin: np.ndarray
+    surface: np.ndarray
+    owner: np.ndarray
+    place: np.ndarray
+    cluster_start: np.ndarray
+    cluster: np.ndarray
+    target: np.ndarray
+    reset: np.ndarray
+    reset_start: np.ndarray
+    reset_slot: np.ndarray
+
+
+class Tapes(NamedTuple):
+    """One row or one slice for each vector of modes: modes, lean rows, constant rows, rows with bounds, guards."""
+
+    modes: np.ndarray
+    lean_start: np.ndarray
+    lean: np.ndarray
+    constant_start: np.ndarray
+    constant: np.ndarray
+    full_start: np.ndarray
+    full: np.ndarray
+    active_start: np.ndarray
+    active: np.ndarray
+    derivatives: np.ndarray
+    guards: np.ndarray
+
+
+def automata_of(system: System) -> Automata:
+    """The arrays of a system's automata."""
+    automata, n = system.automata, system.n
+    count = len(automata)
+    modes = max((len(a.modes) for a in automata), default=1)
+    widest = max((len(g) for a in automata for g in a.guards), default=0) or 1
+    choices = max((len(t) for a in automata for m in a.targets for t in m), default=0) or 1
+    guards_of = np.full((count, modes, widest), -1, dtype=np.int64)
+    target = np.full((count, modes, widest, choices), -1, dtype=np.int64)
+    reset = np.full_like(target, -1)
+    place = np.zeros(system.guard_count, dtype=np.int64)
+    for c, automaton in enumerate(automata):
+        for m, guards in enumerate(automaton.guards):
+            guards_of[c, m, : len(guards)] = guards
+            for j, g in enumerate(guards):
+                place[g] = j
+                for k, to in enumerate(automaton.targets[m][j]):
+                    target[c, m, j, k] = to
+                    reset[c, m, j, k] = system.resets.get(("choice", c, m, j, k), (-1, ()))[0]
+    slots = {name: i for i, name in enumerate(system.names)}
+    slots |= {d.name: n + i for i, d in enumerate(system.model.discrete)}
+    reset_slots = [[slots[name] for name in targets] for _, targets in system.resets.values()]
+    cluster_of: list[list[int]] = [[] for _ in automata]
+    for members in system.clusters:
+        for c in members:
+            cluster_of[c] = list(members)
+    order = {c: k for k, c in enumerate(system.surface_of)}
+    return Automata(
+        guards_of,
+        np.array([a.hold for a in automata], dtype=np.int64),
+        np.array([a.above for a in automata], dtype=np.int64),
+        np.array([system.pins.get(c, -1) for c in range(count)], dtype=np.int64),
+        np.array([order.get(c, -1) for c in range(count)], dtype=np.int64),
+        system.owner,
+        place,
+        *_flat(cluster_of),
+        target,
+        reset,
+        *_flat(reset_slots),
+    )
+
+
+def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Where each of several lists begins, and all of them in a row."""
+    starts = np.cumsum([0, *(len(part) for part in lists)])
+    return starts.astype(np.int64), np.array([i for part in lists for i in part], dtype=np.int64)
+
+
+class TapeShelf:
+    """The tapes of the modes met so far; grows when a run comes to a new vector of modes."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self._met: list[np.ndarray] = []
+        self.tapes = self._stacked()
+
+    def add(self, z: np.ndarray) -> None:
+        """Put the tapes of a vector of modes on the shelf."""
+        if not any((met == z).all() for met in self._met):
+            self._met.append(z.copy())
+            self.tapes = self._stacked()
+
+    def _stacked(self) -> Tapes:
+        system, met = self.system, self._met
+        lean = [system.lean_tape(z) for z in met]
+        modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
+        active = [list(np.flatnonzero(system.active(z))) for z in met]
+        return Tapes(
+            modes,
+            *_rows([tape.rows for tape in lean]),
+            *_rows([tape.constant_rows for tape in lean]),
+            *_rows([system.full_tape(z) for z in met]),
+            *_flat(active),
+            np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
+            np.array([tape.guards for tape in lean], dtype=np.int64).reshape(len(met), system.guard_count),
+        )
+
+
+def _rows(tapes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    starts = np.cumsum([0, *(len(rows) for rows in tapes)]).astype(np.int64)
+    return starts, np.concatenate([np.zeros((0, 5), dtype=np.int64), *tapes])

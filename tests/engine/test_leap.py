@@ -1,0 +1,145 @@
+"""The compiled mode loop: first exits of polynomials against known roots, leaps against the general way."""
+
+from __future__ import annotations
+
+import math
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from conformance.catalogue import SCENES
+from conformance.judge import load
+from conformance.scene import Scene
+
+import hybridsim as hs
+from hybridsim.engine import loop
+from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit, to_bernstein
+from hybridsim.integrators.taylor import Taylor
+
+PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
+
+
+def exit_of(a: list[float], error: float = 1e-14, order: int = 0) -> tuple[int, float]:
+    values = np.array(a)
+    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a))))
+    return int(outcome), float(theta)
+
+
+def from_roots(roots: list[Fraction], degree: int) -> list[Fraction]:
+    """Coefficients of a product of (1 - theta/root), padded to a degree."""
+    a = [Fraction(1)]
+    for root in roots:
+        shifted = [Fraction(0), *(-c / root for c in a)]
+        a = [x + y for x, y in zip([*a, Fraction(0)], shifted, strict=True)]
+    return a + [Fraction(0)] * (degree + 1 - len(a))
+
+
+def test_bernstein_coefficients() -> None:
+    """Against the sum that defines them, in fractions."""
+    draw = random.Random(1)
+    a = [Fraction(draw.randint(-99, 99)) for _ in range(9)]
+    expected = [
+        sum(Fraction(math.comb(j, k), math.comb(8, k)) * a[k] for k in range(j + 1)) for j in range(9)
+    ]
+    b = np.empty(9)
+    to_bernstein(np.array([float(c) for c in a]), b)
+    assert b == pytest.approx([float(c) for c in expected], rel=1e-13, abs=1e-12)
+
+
+def test_first_roots_of_random_polynomials() -> None:
+    """Up to five roots in and around the step, pairs among them; the first one inside is where the sign goes."""
+    draw = random.Random(2)
+    missed = 0
+    for _ in range(3000):
+        roots = sorted(Fraction(draw.uniform(0.02, 1.7)) for _ in range(draw.randint(0, 5)))
+        if len(roots) > 1 and draw.random() < 0.3:
+            roots[1] = roots[0] + Fraction(draw.choice([1e-2, 1e-4, 1e-6]))
+        roots.sort()
+        a = from_roots(roots, 8)
+        inside = [root for root in roots if root < 1]
+        outcome, theta = exit_of([float(c) for c in a], error=1e-15)
+        if not inside:
+            assert outcome in (NEVER, OPEN)
+            missed += outcome == OPEN
+        elif outcome == FOUND:
+            # an ill-conditioned root moves by the rounding of the coefficients over the slope there
+            slope = abs(float(sum(k * a[k] * inside[0] ** (k - 1) for k in range(1, 9))))
+            size = sum(abs(float(c)) for c in a)
+            assert theta == pytest.approx(float(inside[0]), abs=1e-13 + 4e-15 * size / slope)
+        else:
+            assert outcome == OPEN  # a pair closer than the bound: said, not missed
+            missed += 1
+    assert missed < 150
+
+
+def test_a_zero_by_decree_is_not_found_again() -> None:
+    """p = theta**2 (1 - theta/0.4) begins at zero, whatever rounding made of its first coefficients."""
+    a = [1e-17, -2e-17, 1.0, -2.5, 0.0]
+    assert exit_of(a, order=2) == (FOUND, pytest.approx(0.4, rel=1e-14))
+    assert exit_of([1e-17, -2e-17, 1.0, 0.5, 0.0], order=2)[0] == NEVER
+    assert exit_of([-1e-17, 1.0, -1.0 + 1e-3, 0.0], order=1)[0] == NEVER
+
+
+def test_a_touch_is_said() -> None:
+    outcome, theta = exit_of([0.25, -1.0, 1.0, 0.0, 0.0])  # (theta - 1/2)**2
+    assert outcome == OPEN
+    assert theta == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.fixture
+def general(monkeypatch: pytest.MonkeyPatch):
+    """Runs with every segment taken the general way."""
+
+    def run(*args, **options):
+        with monkeypatch.context() as patch:
+            patch.setattr(Taylor, "leaps", False)
+            return hs.simulate(*args, **options, integrator="taylor")
+
+    return run
+
+
+@pytest.mark.parametrize("scene", [s for s in SCENES if "stiff" not in s.needs], ids=lambda scene: scene.name)
+def test_leaps_and_the_general_way(scene: Scene, general) -> None:
+    """The same events to the order, times and states to rounding."""
+    settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}
+    leapt = hs.simulate(load(scene), scene.span, integrator="taylor", **settings)
+    stepped = general(load(scene), scene.span, **settings)
+    assert leapt.status == stepped.status
+    assert [(e.kind, e.component, e.guard, e.source, e.target) for e in leapt.events] == [
+        (e.kind, e.component, e.guard, e.source, e.target) for e in stepped.events
+    ]
+    times = [[e.t for e in sol.events] for sol in (leapt, stepped)]
+    assert times[0] == pytest.approx(times[1], rel=1e-9, abs=1e-9 * scene.unit)
+    grid = np.linspace(*sorted((scene.span[0], min(leapt.t_end, stepped.t_end))), 201)
+    size = np.max(np.abs(stepped(grid)), axis=1, initial=0.0)[:, None]
+    assert np.max(np.abs(leapt(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-7
+    assert list(leapt.modes) == list(stepped.modes)
+    assert [i.mode for c in leapt.modes.values() for i in c] == [
+        i.mode for c in stepped.modes.values() for i in c
+    ]
+
+
+def test_the_reference_model_is_one_leap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """401 events in a hundred periods, not one of them by the general way."""
+    taken = []
+    segment_run = loop.SegmentRun
+    monkeypatch.setattr(loop, "SegmentRun", lambda *args: taken.append(args) or segment_run(*args))
+    sol = hs.simulate("dfcs", (0, 100 * PERIOD), integrator="taylor", rtol=1e-12)
+    assert len(sol.events) == 401
+    assert not taken
+
+
+def test_more_steps_and_segments_than_there_is_room_for() -> None:
+    """Leaps follow each other where the room of one is full."""
+    sol = hs.simulate("dfcs", (0, 600 * PERIOD), integrator="taylor", rtol=1e-12)
+    assert len(sol.events) == 2401
+    times = np.array([e.t for e in sol.events[-400:]])
+    assert np.diff(times[::4]) == pytest.approx(np.full(99, PERIOD), rel=1e-9)
+
+
+def test_output_is_exact_in_stick() -> None:
+    sol = hs.simulate("belt", (0, 100), integrator="taylor", rtol=1e-12)
+    for interval in sol.modes["f"]:
+        if interval.mode == "stick":
+            assert (sol(np.linspace(interval.t0, np.nextafter(interval.t1, 0), 50))[1] == 0.2).all()
