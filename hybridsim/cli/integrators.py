@@ -1,13 +1,17 @@
-"""`hybridsim integrators`: what can run a model, when to choose which, and what each one lacks."""
+"""`hybridsim integrators [NAME]`: what can run a model, when to choose which, what each one lacks, its options."""
 
 from __future__ import annotations
 
 import argparse
 import textwrap
-from typing import Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli.output import print_json, print_table
 from hybridsim.cli.session import Session
+
+if TYPE_CHECKING:
+    from hybridsim.integrators.options import Option
 
 
 def add_to(commands: Any) -> None:
@@ -15,18 +19,20 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "integrators",
         help="list the integrators and when to choose which",
-        description="List what can run a model, when to choose which, and what each one lacks.",
+        description="List what can run a model, when to choose which, and what each one lacks; of one, its options.",
     )
+    parser.add_argument("name", metavar="NAME", nargs="?", help="one integrator: with its options")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List every integrator: its own and those that other packages registered."""
-    import hybridsim
+    """List every integrator, its own and those that other packages registered, or one with its options."""
+    from hybridsim.integrators import integrator_class, list_integrators
     from hybridsim.integrators.base import CAPABILITIES
+    from hybridsim.integrators.options import options_of
 
-    found = hybridsim.list_integrators()
+    found = (integrator_class(args.name),) if args.name else list_integrators()
     if args.json:
         print_json(
             [
@@ -37,6 +43,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
                     "when": each.when,
                     "lacks": dict(each.lacks),
                     "reference": each.reference,
+                    "options": [asdict(option) for option in options_of(each)],
                 }
                 for each in found
             ]
@@ -47,13 +54,34 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         [(each.name, *("-" if c in each.lacks else "yes" for c in CAPABILITIES)) for each in found],
     )
     for each in found:
+        options = options_of(each)
         print()
         print(f"{each.name}: {each.title} (order {each.order})")
         _paragraph(f"choose it: {each.when}")
         for capability, reason in each.lacks.items():
             _paragraph(f"lacks {capability}: {reason}")
         _paragraph(f"reference: {each.reference}")
+        if args.name:
+            _options(options)
+        elif options:
+            _paragraph(f"options: {', '.join(option.name for option in options)}")
     return 0
+
+
+def _options(options: tuple[Option, ...]) -> None:
+    if not options:
+        print("\nIt has no options of its own.")
+    for option in options:
+        default = option.default
+        shown = (
+            ""
+            if default is None
+            else f"; default {default:g}"
+            if isinstance(default, float)
+            else f"; default {default}"
+        )
+        print(f"\n--option {option.name}=... ({option.kind}{shown})")
+        _paragraph(option.text)
 
 
 def _paragraph(text: str) -> None:

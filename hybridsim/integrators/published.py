@@ -397,7 +397,9 @@ class Rk4Dichotomy(Integrator):
 
     Parameters
     ----------
-    steps_per_period : h0 (1200 in the paper). period : T, by default the forcing's. step : instead of T/h0.
+    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
+    period : that period T, if not the forcing's own.
+    step : the step itself, instead of T/h0.
     eps_v : half width of the zero-velocity interval (8e-4 m/s), in the unit of the relative velocity.
     max_bisections : halvings at most (16).
     stick_velocity : "kept" as Eq. 4 reads, then the body creeps with up to eps_v while it sticks; or "zero".
@@ -465,7 +467,9 @@ class Rk4Sign(Integrator):
 
     Parameters
     ----------
-    steps_per_period, period, step : as for `rk4-dichotomy`.
+    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
+    period : that period T, if not the forcing's own.
+    step : the step itself, instead of T/h0.
     friction : "stage": the sign is taken at every stage; "step": at the start of each step.
 
     When to choose it: never for an answer; to see what chatter through a stick costs. Its modes are that chatter.

@@ -6,12 +6,11 @@ from dataclasses import fields
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from numbers import Integral, Real
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.options import fits, in_words
 
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
@@ -81,26 +80,6 @@ def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
             raise UsageError(f"{name} has no option {option!r}", remedy=remedy)
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():
-        if not _fits(value, kinds[option]):
-            raise UsageError(f"{name}: {option} is {value!r}", remedy=f"give {_in_words(kinds[option])}")
+        if not fits(value, kinds[option]):
+            raise UsageError(f"{name}: {option} is {value!r}", remedy=f"give {in_words(kinds[option])}")
     return cls(**options)
-
-
-def _fits(value: object, kind: Any) -> bool:
-    """Whether a value may stand where the annotation of an option says `kind`; a whole number is a number too."""
-    if get_origin(kind) is Literal:
-        return value in get_args(kind)
-    if get_origin(kind) in (Union, UnionType):
-        return any(_fits(value, part) for part in get_args(kind))
-    if kind in (int, float):
-        return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
-    return isinstance(value, kind) if isinstance(kind, type) else True
-
-
-def _in_words(kind: Any) -> str:
-    if get_origin(kind) is Literal:
-        return "one of " + ", ".join(map(str, get_args(kind)))
-    if get_origin(kind) in (Union, UnionType):
-        return " or ".join(_in_words(part) for part in get_args(kind))
-    words = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", NoneType: "None"}
-    return words.get(kind, str(kind))

@@ -225,3 +225,22 @@ def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: 
 def test_default_spans_are_those_of_the_library() -> None:
     library = importlib.import_module("hybridsim.analysis.compare")
     assert (values.COMPARED_PERIODS, values.DEFAULT_SECONDS) == (library.PERIODS, library.TIME)
+
+
+def test_one_integrator_with_its_options(hybridsim: Callable) -> None:
+    code, out, _ = hybridsim("integrators", "rk4-dichotomy")
+    assert code == 0
+    assert "--option steps_per_period=... (a number; default 1200)" in out
+    assert "--option stick_velocity=... (one of kept, zero; default kept)" in out
+    assert "cvode" not in out
+    _, listed, _ = hybridsim("integrators", "rk4-dichotomy", "--json")
+    (record,) = json.loads(listed)
+    option = record["options"][4]
+    assert (option["name"], option["kind"], option["default"]) == ("max_bisections", "a whole number", 16)
+    assert "no options" in hybridsim("integrators", "cvode-bdf").out
+
+
+def test_an_unknown_integrator_is_bad_usage(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("integrators", "cvode-bfd")
+    assert (code, out) == (2, "")
+    assert "did you mean 'cvode-bdf'" in err
