@@ -10,7 +10,7 @@ from typing import Any
 
 from hybridsim.model import Model
 
-_PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae")
+_PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 
 
 def provenance(model: Model) -> dict[str, Any]:

@@ -121,7 +121,7 @@ def _multiple_precision(
     from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
 
     motion = multiple_precision_trajectory(model, t_span, digits=DIGITS, progress=progress)
-    return Reference(f"Taylor series with {DIGITS} digits", yardstick(motion), None)
+    return Reference(f"Taylor series in multiple precision, {DIGITS} digits", yardstick(motion), None)
 
 
 def _checked(reference: Reference, run: Run) -> Reference:

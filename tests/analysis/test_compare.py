@@ -75,6 +75,18 @@ def test_a_reference_of_the_caller() -> None:
     assert by_function.rows[0].errors.event_time is None
 
 
+def test_a_reference_in_multiple_precision() -> None:
+    """The slider of static-kinetic is pulled off at t = mu_s N/(k v_pull) = 4: both know it to the last digit."""
+    result = hs.compare(
+        "static-kinetic", t_span=(0, 4.5), integrators=["dop853"], rtols=[1e-9], repeat=1,
+        reference="multiple precision",
+    )  # fmt: skip
+    assert result.reference == "Taylor series in multiple precision, 32 digits"
+    assert result.second_reference == "run with dop853 at rtol 1e-13"
+    assert result.difference.event_time < 1e-13 and result.difference.state < 1e-11
+    assert 0 < result.rows[0].errors.state < 1e-7
+
+
 def test_parameters_and_start_are_part_of_the_question() -> None:
     changed = hs.compare(
         "dfcs", t_span=SPAN, integrators=["scipy-dop853"], rtols=[1e-8], repeat=1,

@@ -37,7 +37,7 @@ SCENES: tuple[Scene, ...] = (
         "dfcs",
         "The published point (He et al. 2026, Table 1 with F0 = 30 N): the body sticks twice in each period.",
         {"F0": 30, "N": 40, "omega": "0.6*sqrt(k/m)"},
-        periods=10,
+        periods=8,
     ),
     Scene(
         "P2",
@@ -46,7 +46,7 @@ SCENES: tuple[Scene, ...] = (
         "The published point with F0 = 22 N: the force exceeds the limit of 20 N by little, so stick fills most of a "
         "period, and a release is a small difference of large forces.",
         {"F0": 22, "N": 40, "omega": "0.64*sqrt(k/m)"},
-        periods=10,
+        periods=8,
     ),
     Scene(
         "no-stop",
@@ -55,7 +55,7 @@ SCENES: tuple[Scene, ...] = (
         "Forced hard above resonance, the body turns round without a stop: each zero of the velocity is a crossing, "
         "and nothing erases an error of the past.",
         {"F0": 60, "N": 40, "omega": "1.4*sqrt(k/m)"},
-        periods=12,
+        periods=10,
     ),
     Scene(
         "grazing",
@@ -75,7 +75,7 @@ SCENES: tuple[Scene, ...] = (
         "Belt: friction falls with speed",
         "belt",
         "A limit cycle without any forcing, of a force that is not linear: one stick and one slip in each cycle.",
-        t_end=50.0,
+        t_end=40.0,
     ),
     Scene(
         "static-kinetic",
@@ -98,14 +98,14 @@ SCENES: tuple[Scene, ...] = (
         "Stribeck law: not linear in slip",
         "dfcs-stribeck",
         "The reference model with friction that falls with speed: no closed form, and a jump at each release.",
-        periods=8,
+        periods=6,
     ),
     Scene(
         "base-isolation",
         "Base-isolated storey, measured record",
         "base-isolation",
         "Four states under an input with a thousand knots: each knot ends a step, so a long one is worth nothing.",
-        t_end=6.0,
+        t_end=4.0,
     ),
 )
 
