@@ -48,7 +48,8 @@ def compare(
     Parameters
     ----------
     model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
-    t_span : (t0, t1), t1 > t0; (0, 20 T) if not given, (0, 10) where the model has no forcing period T.
+    t_span : (t0, t1), t1 > t0. If not given, from 0 over the model's own duration, else 20 T, else 10 where it has no
+        forcing period T.
     integrators : names, (name, options) or `Series`; all registered ones if not given.
     rtols : tolerances of the integrators that adapt their step.
     steps : steps a period of those that do not; without a period, a tenth of the run counts as one.
@@ -78,7 +79,7 @@ def compare(
     v0 = wanted.positives(v0, "v0")
     model = chosen_model(model, params).with_start(**wanted.mapping(x0, "x0")).validate()
     period = forcing_period(model)
-    span = _span(t_span, period)
+    span = _span(t_span, model.duration_value(), period)
     if regularized is not None:
         kinds = wanted.words(regularized, "regularized")
         names = None if integrators is None else wanted.words(integrators, "integrators")
@@ -99,8 +100,12 @@ def compare(
     return bench.comparison(against, rows, repeat)
 
 
-def _span(t_span: tuple[float, float] | None, period: float | None) -> tuple[float, float]:
+def _span(
+    t_span: tuple[float, float] | None, duration: float | None, period: float | None
+) -> tuple[float, float]:
     if t_span is None:
+        if duration is not None:
+            return 0.0, duration
         return 0.0, PERIODS * period if period else TIME
     t0, t1 = time_span(t_span)
     if not t1 > t0:

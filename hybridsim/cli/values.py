@@ -99,7 +99,8 @@ def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PE
         "--t-end",
         metavar="TIME",
         help="end of the run: a time, an expression of the parameters, or '100T' for 100 periods of forcing "
-        f"(default: {periods}T; without a period the end of the longest table or chirp, else {DEFAULT_SECONDS:g})",
+        f"(default: the model's own duration, else {periods}T; without a period the end of the longest table or chirp, "
+        f"else {DEFAULT_SECONDS:g})",
     )
 
 
@@ -145,6 +146,9 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
     from hybridsim.engine.period import forcing_period
 
     if text is None:
+        duration = model.duration_value()
+        if duration is not None:
+            return duration
         period = forcing_period(model)
         return default_periods * period if period is not None else _record_end(model) or DEFAULT_SECONDS
     periods = _PERIODS.fullmatch(text)

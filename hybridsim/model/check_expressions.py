@@ -33,6 +33,8 @@ def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:
     model = scope.model
     for parameter in model.parameters:
         yield f"parameter {parameter.name}", parameter.value
+    if model.duration is not None:
+        yield "duration", model.duration
     for state in model.states:
         yield f"state {state.name}, start", state.start
     for discrete in model.discrete:

@@ -23,6 +23,9 @@ def check_values(scope: Scope) -> None:
     except ModelError as fault:
         scope.errors.append(fault)
         return
+    if model.duration is not None:
+        declared = Declared(place=model.duration.place)
+        _positive(scope, declared, f"model {model.name}", "duration", model.duration, values)
     for discrete in model.discrete:
         _value(scope, discrete.start, values)
     for state in model.states:

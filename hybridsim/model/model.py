@@ -46,6 +46,8 @@ class Model(Declared):
     definitions : named intermediate expressions, a dict or pairs; they may use one another and what
         components set.
     title, source, description, look : what it is, where it comes from, more, and what to look at.
+    duration : how long a run shows what there is to see, in the unit of t: an expression of parameters, the default of
+        ``hybridsim run`` and of comparisons. None leaves it to them.
     path : the file it was read from.
 
     Examples
@@ -70,6 +72,7 @@ class Model(Declared):
     source: str = ""
     description: str = ""
     look: str = ""
+    duration: Expression | None = None
     path: str | None = None
 
     def __post_init__(self) -> None:
@@ -77,6 +80,7 @@ class Model(Declared):
         self._named("discrete", Discrete)
         self._named("outputs", Output)
         self._texts("name")
+        self._expressions("duration")
         for field, kind in _PARTS.items():
             self._parts(field, kind)
         pairs = self.definitions.items() if isinstance(self.definitions, Mapping) else self.definitions
@@ -173,6 +177,10 @@ class Model(Declared):
         values = self.parameter_values()
         return {part.name: evaluate(part.start, values) for part in self.discrete}
 
+    def duration_value(self) -> float | None:
+        """The model's own duration at the parameters' values; None where it declares none."""
+        return None if self.duration is None else evaluate(self.duration, self.parameter_values())
+
     def all_components(self) -> tuple[Component, ...]:
         """All automata: the contacts expanded, then the components, each in order of declaration."""
         return self._all_components
@@ -238,7 +246,7 @@ def _content(model: Model) -> tuple[object, ...]:
         model.states, model.parameters, model.discrete, model.components, model.contacts, model.inputs,
         model.monitors, model.schedules, model.outputs, model.definitions,
     )  # fmt: skip
-    return (model.name, *parts, model.title, model.source, model.description, model.look)
+    return (model.name, *parts, model.title, model.source, model.description, model.look, model.duration)
 
 
 def _known(changes: Mapping[str, Any], names: Iterable[str], kind: str, model: str) -> None:

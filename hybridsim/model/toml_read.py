@@ -24,7 +24,7 @@ from hybridsim.model.toml_table import Source, Table
 
 SCHEMA = 1
 KEYS = (
-    "schema", "name", "title", "source", "description", "look", "parameters", "states", "discrete",
+    "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
     "definitions", "inputs", "laws", "contacts", "initial", "modes", "components", "monitors", "schedules",
     "clocks", "outputs",
 )  # fmt: skip
@@ -100,6 +100,7 @@ def _model(root: Table, folder: Path) -> Model:
         source=root.text("source"),
         description=root.text("description"),
         look=root.text("look"),
+        duration=root.expression("duration"),
         path=root.source.file,
         place=Place(root.source.file),
     )

@@ -34,6 +34,8 @@ def _lines(model: Model) -> Iterator[str]:
     for field in ("title", "source", "description", "look"):
         if text := getattr(model, field):
             yield f"{field} = {_value(text)}"
+    if model.duration is not None:
+        yield f"duration = {_value(model.duration)}"
     yield from _section(
         "parameters", {p.name: _short("value", p.value, unit=p.unit, title=p.title) for p in model.parameters}
     )

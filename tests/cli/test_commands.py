@@ -244,3 +244,12 @@ def test_an_unknown_integrator_is_bad_usage(hybridsim: Callable) -> None:
     code, out, err = hybridsim("integrators", "cvode-bfd")
     assert (code, out) == (2, "")
     assert "did you mean 'cvode-bdf'" in err
+
+
+def test_run_lasts_as_long_as_the_model_says(hybridsim: Callable) -> None:
+    ends = []
+    for argv in (["bouncing-ball"], ["bouncing-ball", "--t-end", "1"], ["thermostat", "-p", "tau=1"]):
+        code, out, _ = hybridsim("run", *argv, "--json")
+        assert code == 0
+        ends.append(json.loads(out)["t_span"][1])
+    assert ends == [3.0, 1.0, 4.0]
