@@ -83,8 +83,7 @@ def draw_orbit(
     if handles:
         axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
     model = solution.model
-    title = ": ".join(part for part in (model.title or model.name, window.note) if part)
-    axes.set_title(style.literal(title), fontsize=10, loc="left")
+    style.head(axes, model.title or model.name, window.note)
     return axes
 
 

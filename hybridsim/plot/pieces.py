@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _POINTS, _LEAST = 6_000, 9
 # More periods than can be told apart in a picture are not drawn; the last few are, without the transient.
 _MANY, _FEW = 12, 4
+# A number of periods that differs from a whole one by this share is whole: an end given as 100T is rounded.
+_WHOLE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,13 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
     period = forcing_period(solution.model)
     if period is None or end - start <= _MANY * period:
         return Window(start, end)
-    return Window(end - _FEW * period, end, f"last {_FEW} of {(end - start) / period:.4g} periods")
+    return Window(end - _FEW * period, end, f"the last {_FEW} periods of {_short((end - start) / period)}")
+
+
+def _short(periods: float) -> str:
+    """A number of periods: whole where it is, but for rounding, else with one decimal."""
+    whole = round(periods)
+    return f"{whole}" if abs(periods - whole) < _WHOLE * periods else f"{periods:.1f}"
 
 
 def unit_of(solution: Solution, name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,9 @@ MARK = "#c4c4c4"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 150
+_LETTERS = (
+    13.0  # of a title, to the inch: those of the default font at 10 points are some 14, wide ones fewer
+)
 
 
 def dress(axes: Axes) -> None:
@@ -35,6 +39,16 @@ def dress(axes: Axes) -> None:
 def literal(text: str) -> str:
     """Text from a model as it stands: matplotlib would read what is between dollars as mathematics."""
     return text.replace("$", r"\$")
+
+
+def head(axes: Axes, *parts: str) -> None:
+    """Title of axes: each part that is not empty on its own lines, broken where the figure ends or other axes begin."""
+    whole, left = _figure_of(axes), axes.get_position().x0
+    beside = [other.get_position().x0 for other in whole.axes]
+    right = min((x0 for x0 in beside if x0 > axes.get_position().x1), default=1.0)
+    width = max(20, round(whole.get_figwidth() * (right - left) * _LETTERS))
+    lines = [line for part in parts for line in textwrap.wrap(part, width)]
+    axes.set_title(literal("\n".join(lines)), fontsize=10, loc="left")
 
 
 def figure(width: float, height: float) -> Figure:

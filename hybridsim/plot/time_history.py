@@ -77,8 +77,7 @@ def time_history(
     for axis in upper:
         axis.tick_params(labelbottom=False)
     label_axis(lowest.xaxis, "t", time_unit(model), window.t0, window.t1)
-    title = ": ".join(part for part in (model.title or model.name, window.note) if part)
-    history.quantities[0].set_title(style.literal(title), fontsize=10, loc="left")
+    style.head(history.quantities[0], model.title or model.name, window.note)
     return history
 
 

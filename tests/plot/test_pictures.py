@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import matplotlib
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscillator_model
 
 from hybridsim.errors import UsageError
@@ -37,11 +39,28 @@ def test_time_history_draws_the_states_and_outputs() -> None:
 def test_long_runs_show_their_last_periods_and_say_so() -> None:
     axes = time_history(oscillator(100)).quantities[0]
     assert axes.get_xlim() == pytest.approx((96 * PERIOD, 100 * PERIOD))
-    assert axes.get_title(loc="left") == "Dry friction oscillator: last 4 of 100 periods"
+    assert axes.get_title(loc="left") == "Dry friction oscillator\nthe last 4 periods of 100"
     assert len(drawn(axes)) < 10_000
     whole = time_history(oscillator(100), t_span=(0, 1)).quantities[0]
     assert whole.get_xlim() == (0, 1)
     assert whole.get_title(loc="left") == "Dry friction oscillator"
+
+
+@pytest.mark.parametrize("periods", [100, 12.37, 3.5])
+@pytest.mark.parametrize("draw", [phase_portrait, friction_loop, time_history])
+def test_titles_stay_within_the_picture(draw: Callable, periods: float) -> None:
+    title = "A system whose title goes on and on, for as long as a title well may, and longer still than that"
+    model = replace(oscillator_model(), title=title)
+    picture = draw(oscillator(periods, model=model))
+    axes = picture.quantities[0] if draw is time_history else picture
+    title = axes.get_title(loc="left")
+    assert title.replace("\n", " ").startswith(model.title)
+    assert ("the last 4 periods of" in title) == (periods > 12)
+    figure = axes.get_figure(root=True)
+    figure.draw_without_rendering()
+    (text,) = (one for one in axes.findobj(Text) if one.get_text() == title)
+    box = text.get_window_extent()
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
 
 
 def test_a_jump_is_dashed_and_interrupts_the_curve() -> None:
