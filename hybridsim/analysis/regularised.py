@@ -129,6 +129,11 @@ def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float 
     return found
 
 
+def exponent_text(power: float | None) -> str:
+    """An exponent with two decimals."""
+    return "?" if power is None else f"{round(power, 2) + 0.0:.2f}"  # -0.001 is 0.00
+
+
 def _exponent(points: Sequence[tuple[float, float]]) -> float | None:
     chosen = sorted(points)[:_FITTED]
     if len(chosen) < _FITTED or not min(y for _, y in chosen) > 0:

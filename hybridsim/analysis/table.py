@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.analysis.regularised import exponents
+from hybridsim.analysis.regularised import exponent_text, exponents
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.analysis.timing import ENOUGH
 
@@ -121,7 +121,7 @@ def _form_notes(comparison: Comparison) -> list[str]:
         return []
     lines = ["Against the set-valued law, as v0 falls (work in evaluations):"]
     for label, powers in fitted.items():
-        error, work = (f"{power:.2f}" if power is not None else "?" for power in powers)
+        error, work = map(exponent_text, powers)
         lines.append(f"  {label}: error ~ v0^{error}, work ~ v0^{work}")
     return lines
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from hybridsim.analysis.regularised import exponents
+from hybridsim.analysis.regularised import exponent_text, exponents
 from hybridsim.plot import style
 from hybridsim.plot.lines import draw_line, looks
 from hybridsim.plot.work_precision import handles, headline, verdict_of
@@ -52,7 +52,7 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     fitted = exponents(comparison)
     for handle, label in zip(found, chosen, strict=False):
         if label in fitted:
-            power, work = (f"{p:.2f}" if p is not None else "?" for p in fitted[label])
+            power, work = map(exponent_text, fitted[label])
             handle.set_label(f"{handle.get_label()}\nerror ~ $v_0^{{{power}}}$, work ~ $v_0^{{{work}}}$")
         else:
             handle.set(marker="None")
