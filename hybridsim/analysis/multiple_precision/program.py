@@ -1,19 +1,18 @@
 """The motion of one vector of modes as Taylor series, forces that hold a surface solved for on the way.
 
 A holding mode (stick) keeps its surface s(t, x) = 0 with an unknown (the friction force) that enters the rates
-linearly. The n-th coefficient of the unknown enters s_(n+1) through B = J G / (n + 1), with J the slopes of the
-surfaces along the states and G the effect of the unknowns on the rates, both at the start of the series: so it is
-found from a small linear system, order by order. Afterwards one state for each surface is taken from s_(n+1) = 0
-itself, so that a surface such as v - v_belt stays zero exactly.
+linearly. Its n-th coefficient follows from s_(n+1) = 0, a small linear system for each order. Afterwards one state for
+each surface is taken from s_(n+1) = 0 itself, so that a surface such as v - v_belt stays zero exactly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.multiple_precision.expansion import Expansion, Watched, terms_of
+from hybridsim.analysis.multiple_precision.holding import Holding
 from hybridsim.analysis.multiple_precision.nodes import Node, in_order
 from hybridsim.analysis.multiple_precision.precision import Number, Precision
 from hybridsim.analysis.multiple_precision.reading import Reading
@@ -45,18 +44,14 @@ class Program:
         self.modes = reading.modes
         self.states = list(reading.states.values())
         self.unknowns = list(reading.unknowns.values())
-        self.held = [reading.surfaces[name] for name in reading.unknowns]
+        self.holding = Holding(reading, self.context) if reading.unknowns else None
         watched = [node for guards in reading.guards for node in guards] + reading.monitors
         wanted = [*reading.rates, *watched, *reading.surfaces.values()]
         nodes = in_order(wanted)
         self.constants = [node for node in nodes if node.constant]
         self.nodes = [node for node in nodes if not node.constant]
-        self.ahead = [node for node in in_order(self.held) if node.operands and not node.constant]
         self.forced = _depending(self.nodes, self.unknowns)
         self._known = {id(n) for n in (*nodes, reading.time, *self.states, *self.unknowns)}
-        self.effects: list[list[Number]] = []
-        self.slopes: list[list[Number]] = []
-        self.pins: list[int] = []
 
     def begin(self, point: Point) -> None:
         """Set everything up to the values at a point, the unknowns solved for."""
@@ -117,21 +112,19 @@ class Program:
 
     def project(self, point: Point) -> Point:
         """The point with the held surfaces exactly zero: one state each is set."""
-        if not self.held:
+        if self.holding is None:
             return point
         x = list(point.x)
-        for _ in range(
-            3
-        ):  # Newton's method: a surface is linear in the velocities, as a rule, and zero at once
-            self.begin(Point(point.t, tuple(x), point.discrete, point.pieces))
-            for i, change in zip(self.pins, self._pin_changes(0), strict=True):
+        for _ in range(3):  # Newton's method; most surfaces are linear in their velocities, and zero at once
+            self.begin(replace(point, x=tuple(x)))
+            changes = self.holding.pin_changes(self.holding.values())
+            for i, change in zip(self.holding.pins, changes, strict=True):
                 x[i] = x[i] - change
-        return Point(point.t, tuple(x), point.discrete, point.pieces)
+        return replace(point, x=tuple(x))
 
     def coupled(self, index: int) -> set[int]:
         """The held surfaces whose rates the unknown of one of them changes, or the reverse."""
-        product = self._product()
-        return {j for j in range(len(self.held)) if product[index][j] != 0 or product[j][index] != 0}
+        return set() if self.holding is None else self.holding.coupled(index)
 
     # -- orders ---------------------------------------------------------------------------------------------
 
@@ -141,144 +134,60 @@ class Program:
                 node.extend(n)
 
     def _first_coefficients(self) -> None:
-        """Order 0: rates with every unknown zero, then one by one 1; slopes of the surfaces; the unknowns."""
+        """Order 0: rates with every unknown zero, then with one of them 1; from these the unknowns."""
         one, zero = self.context.one, self.context.zero
-        m = len(self.unknowns)
-        columns: list[list[Number]] = []
-        for j in range(-1, m):
+        rates: list[list[Number]] = []
+        for j in (*range(len(self.unknowns)), -1):  # at last with all of them zero
             for k, unknown in enumerate(self.unknowns):
                 unknown.c = [one if k == j else zero]
-            for node in self.forced:
-                node.forget(0)
-            self._extend(self.nodes, 0)
-            columns.append([rate.coefficient(0) for rate in self.reading.rates])
-        self.effects = [
-            [c - base for c, base in zip(column, columns[0], strict=True)] for column in columns[1:]
-        ]
-        if not m:
-            return
-        for unknown in self.unknowns:
-            unknown.c = [zero]
-        for node in self.forced:
-            node.forget(0)
-        self._extend(self.nodes, 0)
-        self._find_slopes()
-        self.pins = self._choose_pins()
-        self._solve(0)
-        for state in self.states:
-            state.forget(1)
-
-    def _find_slopes(self) -> None:
-        """The slope of each held surface along each state, from its first-order coefficient."""
-        zero, one = self.context.zero, self.context.one
-        rows = []
-        for i in range(-1, len(self.states)):
-            for k, state in enumerate(self.states):
-                state.c[1:] = [one if k == i else zero]
-            self._extend(self.ahead, 1)
-            rows.append([surface.coefficient(1) for surface in self.held])
-            for node in self.ahead:
-                node.forget(1)
-        for state in self.states:
-            state.forget(1)
-        self.slopes = [[row[j] - rows[0][j] for row in rows[1:]] for j in range(len(self.held))]
-
-    def _product(self) -> list[list[Number]]:
-        """B = J G: row j, the rate of surface j under each unknown."""
-        return [[self.context.fdot(row, effect) for effect in self.effects] for row in self.slopes]
-
-    def _choose_pins(self) -> list[int]:
-        """For each held surface a state that it can be solved for: elimination with the largest pivots."""
-        rows = [
-            [slope if any(e[i] != 0 for e in self.effects) else 0 * slope for i, slope in enumerate(row)]
-            for row in self.slopes
-        ]
-        pins = [-1] * len(rows)
-        for _ in rows:
-            size, j, i = max(
-                (abs(value), j, i) for j, row in enumerate(rows) if pins[j] < 0 for i, value in enumerate(row)
+            self._again(0)
+            rates.append([rate.coefficient(0) for rate in self.reading.rates])
+        *changed, plain = rates
+        if self.holding is not None:
+            self.holding.begin(
+                [[c - base for c, base in zip(column, plain, strict=True)] for column in changed]
             )
-            if size == 0:
-                name = list(self.reading.unknowns)[j]
-                raise UsageError(
-                    f"the force {name} does not act on the velocity of its own contact",
-                    remedy="let it enter the rate of that velocity",
-                )
-            pins[j] = i
-            for k, row in enumerate(rows):
-                if pins[k] < 0 and row[i] != 0:
-                    factor = row[i] / rows[j][i]
-                    rows[k] = [a - factor * b for a, b in zip(row, rows[j], strict=True)]
-                    rows[k][i] = self.context.zero
-        return pins
+            self._solve(0)
 
-    def _solve(self, n: int) -> None:
-        """Find the n-th coefficients of the unknowns: with them, the surfaces have no coefficient n + 1."""
-        if not self.unknowns:
-            return
-        self._states(n + 1, pinned=False)
-        self._extend(self.ahead, n + 1)
-        residual = [(n + 1) * surface.coefficient(n + 1) for surface in self.held]
-        for node in (*self.ahead, *self.states):
-            node.forget(n + 1)
-        solution = self._linear(self._product(), residual)
-        for unknown, value in zip(self.unknowns, solution, strict=True):
-            unknown.c[n] = -value
+    def _again(self, n: int) -> None:
+        """The n-th coefficients anew of all that depends on the unknowns."""
         for node in self.forced:
             node.forget(n)
         self._extend(self.nodes, n)
+
+    def _solve(self, n: int) -> None:
+        """Find the n-th coefficients of the unknowns: with them, the surfaces have no coefficient n + 1."""
+        if self.holding is None:
+            return
+        rates = self._surface_rates(n)
+        for unknown, value in zip(self.unknowns, self.holding.unknowns_for(rates), strict=True):
+            unknown.c[n] = value
+        self._again(n)
         if n == 0:
-            self._check_linear(residual)
-
-    def _check_linear(self, residual: Sequence[Number]) -> None:
-        self._states(1, pinned=False)
-        self._extend(self.ahead, 1)
-        left = [abs(surface.coefficient(1)) for surface in self.held]
-        for node in (*self.ahead, *self.states):
-            node.forget(1)
-        size = max(abs(value) for value in residual) + max(
-            abs(a * u.c[0]) for row in self._product() for a, u in zip(row, self.unknowns, strict=True)
-        )
-        if max(left) > size * self.context.mpf(10) ** -_LINEAR:
-            names = ", ".join(self.reading.unknowns)
-            raise UsageError(
-                f"the rates are not linear in {names}", remedy="a holding force must enter them linearly"
-            )
-
-    def _linear(self, matrix: list[list[Number]], right: list[Number]) -> list[Number]:
-        if len(right) == 1:
-            if matrix[0][0] == 0:
-                name = next(iter(self.reading.unknowns))
+            size = max(map(abs, rates)) + self.holding.reach_of([unknown.c[0] for unknown in self.unknowns])
+            if max(map(abs, self._surface_rates(0))) > size * self.context.mpf(10) ** -_LINEAR:
+                names = ", ".join(self.holding.names)
                 raise UsageError(
-                    f"the force {name} does not act on the velocity of its own contact",
-                    remedy="let it enter the rate of that velocity",
+                    f"the rates are not linear in {names}", remedy="a holding force must enter them linearly"
                 )
-            return [right[0] / matrix[0][0]]
-        try:
-            return list(self.context.lu_solve(self.context.matrix(matrix), self.context.matrix(right)))
-        except ZeroDivisionError:
-            names = ", ".join(self.reading.unknowns)
-            raise UsageError(
-                f"the holding forces {names} have no unique values", remedy="merge contacts that act as one"
-            ) from None
 
-    def _pin_changes(self, n: int) -> list[Number]:
-        """By how much the pinned states' n-th coefficients are to fall, so that the surfaces' vanish."""
-        values = [surface.coefficient(n) for surface in self.held]
-        if len(values) == 1:
-            return [values[0] / self.slopes[0][self.pins[0]]]
-        return self._linear([[row[i] for i in self.pins] for row in self.slopes], values)
+    def _surface_rates(self, n: int) -> list[Number]:
+        """The n-th coefficients of the held surfaces' rates of change, as the states' rates make them."""
+        assert self.holding is not None
+        for state, rate in zip(self.states, self.reading.rates, strict=True):
+            state.c.append(rate.coefficient(n) / (n + 1))
+        rates = [(n + 1) * value for value in self.holding.coefficients(n + 1)]
+        for state in self.states:
+            state.forget(n + 1)
+        return rates
 
-    def _states(self, n: int, *, pinned: bool = True) -> None:
+    def _states(self, n: int) -> None:
         """Append the n-th coefficients of the states; the pinned ones follow from their surfaces."""
         for state, rate in zip(self.states, self.reading.rates, strict=True):
             state.c.append(rate.coefficient(n - 1) / n)
-        if pinned and self.held:
-            self._extend(self.ahead, n)
-            changes = self._pin_changes(n)
-            for node in self.ahead:
-                node.forget(n)
-            for i, change in zip(self.pins, changes, strict=True):
+        if self.holding is not None:
+            changes = self.holding.pin_changes(self.holding.coefficients(n))
+            for i, change in zip(self.holding.pins, changes, strict=True):
                 self.states[i].c[n] = self.states[i].c[n] - change
 
 
