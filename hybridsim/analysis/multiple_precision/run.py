@@ -12,6 +12,7 @@ from hybridsim.analysis.multiple_precision.expansion import Expansion, Watched, 
 from hybridsim.analysis.multiple_precision.motion import Motion, Piece
 from hybridsim.analysis.multiple_precision.precision import Number, Precision
 from hybridsim.analysis.multiple_precision.program import Point
+from hybridsim.analysis.multiple_precision.programs import Programs
 from hybridsim.analysis.multiple_precision.settling import Rules, Settled
 from hybridsim.analysis.multiple_precision.signals import Signal
 from hybridsim.analysis.trajectory import ExactEvent
@@ -42,7 +43,8 @@ class Run:
         self.model, self.precision, self.progress = model, precision, progress
         self.t0, self.t1 = (number(t) for t in t_span)
         self.signals = [Signal(model, declared, precision) for declared in model.inputs]
-        self.rules = Rules(model, precision, self.signals, self.t1 - self.t0)
+        self.programs = Programs(model, precision, self.signals, self.t1 - self.t0)
+        self.rules = Rules(self.programs)
         self.appointments = Appointments(model, self.signals, precision, self.t0, self.t1)
         self.motion = Motion(precision)
         self.events: list[ExactEvent] = []
@@ -99,8 +101,8 @@ class Run:
 
     def _go_on(self, point: Point) -> None:
         """Begin the next step where nothing was located; a guard may be zero at just this instant."""
-        expansion = self.rules.program(self.now.modes).expand(point)
-        leaving = self.rules.leaving(expansion)
+        expansion = self.programs.program(self.now.modes).expand(point)
+        leaving = self.programs.leaving(expansion)
         if leaving:
             self._crowd(point.t)
             self._adopt(self.rules.settle(point, self.now.modes, leaving))
@@ -121,7 +123,7 @@ class Run:
 
     def _resolved(self, expansion: Expansion, h: Number) -> bool:
         """Whether the states at the end satisfy their equations, and what is watched has its value."""
-        program = self.rules.program(self.now.modes)
+        program = self.programs.program(self.now.modes)
         x = tuple(value_at(state.c, h) for state in expansion.states)
         program.begin(replace(self.now.point, t=self.now.point.t + h, x=x))
         small = self.precision.number(10) ** -self.precision.digits * _DEFECT

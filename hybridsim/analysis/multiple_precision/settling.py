@@ -25,35 +25,22 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.multiple_precision.expansion import Expansion
-from hybridsim.analysis.multiple_precision.precision import Number, Precision
-from hybridsim.analysis.multiple_precision.program import Point, Program
-from hybridsim.analysis.multiple_precision.reading import Reading
-from hybridsim.analysis.multiple_precision.signals import Signal
+from hybridsim.analysis.multiple_precision.program import Point
+from hybridsim.analysis.multiple_precision.programs import Modes, Programs
+from hybridsim.analysis.multiple_precision.transitions import Move, Transitions
 from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.expr import Expression
-    from hybridsim.model import Model
 
-Modes = tuple[str, ...]
 _UNDECIDED = ""  # the mode of a contact before the first decision
 
 _MOST_TOGETHER = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
 _MOST_ROUNDS = 50  # that one instant may take; a cascade of resets is far shorter
-
-
-@dataclass(frozen=True)
-class Move:
-    """A change of one component's mode."""
-
-    component: int
-    source: str
-    target: str
-    guard: str
 
 
 @dataclass
@@ -69,34 +56,14 @@ class Settled:
 class Rules:
     """The decisions of one model."""
 
-    def __init__(
-        self, model: Model, precision: Precision, signals: Sequence[Signal], longest: Number
-    ) -> None:
-        self.model, self.precision, self.signals, self.longest = model, precision, signals, longest
-        self.components = model.all_components()
-        self.states = [state.name for state in model.states]
-        self.discrete = [part.name for part in model.discrete]
-        self._programs: dict[Modes, Program] = {}
-        self._expansions: dict[tuple[Modes, Point], Expansion] = {}
+    def __init__(self, programs: Programs) -> None:
+        self.programs, self.components = programs, programs.components
+        self.transitions = Transitions(programs)
 
     @property
     def first_modes(self) -> Modes:
         """Modes before the first decision."""
         return tuple(component.initial or _UNDECIDED for component in self.components)
-
-    def program(self, modes: Modes) -> Program:
-        """The equations in these modes."""
-        if modes not in self._programs:
-            reading = Reading(self.model, modes, self.precision, self.signals)
-            self._programs[modes] = Program(reading, self.precision, self.longest)
-        return self._programs[modes]
-
-    def expand(self, point: Point, modes: Modes) -> Expansion:
-        """The series from a point on; those of the event at hand are kept."""
-        key = (modes, point)
-        if key not in self._expansions:
-            self._expansions[key] = self.program(modes).expand(point)
-        return self._expansions[key]
 
     def settle(
         self,
@@ -108,20 +75,20 @@ class Rules:
         """Settle an event at x-: the guards (component, number) located at zero, and resets that are due."""
         moves: list[Move] = []
         fired = set(located)
-        self._expansions.clear()
+        self.programs.new_instant()
         if fired:
-            fired.update(self.leaving(self.expand(point, modes)))
+            fired.update(self.programs.leaving(self.programs.expand(point, modes)))
         due = list(resets)
         for _ in range(_MOST_ROUNDS):
             names = {
                 c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)
             }
-            point, modes = self._transit(point, modes, fired, due, moves)
+            point, modes = self.transitions.take(point, modes, fired, due, moves)
             modes, open_ = self._take_sides(point, modes, moves)
             open_ |= {c for c in names if self.components[c].surface}
             point, modes = self._decide(point, modes, open_, names, moves)
-            expansion = self.expand(point, modes)
-            fired, due = set(self.leaving(expansion)), []
+            expansion = self.programs.expand(point, modes)
+            fired, due = set(self.programs.leaving(expansion)), []
             if not fired:
                 return Settled(point, modes, expansion, moves)
         moving = ", ".join(sorted({self.components[move.component].name for move in moves[-8:]}))
@@ -130,76 +97,6 @@ class Rules:
             "surface of a general automaton is not supported by the multiple-precision run",
             remedy="compare against runs",
         )
-
-    def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
-        """Guards that are negative just after; a mode that is left open has none."""
-        return [
-            (c, j)
-            for c, row in enumerate(expansion.guards)
-            for j, guard in enumerate(row)
-            if expansion.side_after(guard)[0] < 0
-        ]
-
-    # -- transitions and resets -----------------------------------------------------------------------------
-
-    def _transit(
-        self,
-        point: Point,
-        modes: Modes,
-        fired: Iterable[tuple[int, int]],
-        resets: list[Mapping[str, Expression]],
-        moves: list[Move],
-    ) -> tuple[Point, Modes]:
-        """Take the declared choices of the guards that fired, and make all resets at once."""
-        after = list(modes)
-        ways: dict[int, tuple[str, Mapping[str, Expression]]] = {}
-        for c, j in sorted(fired):
-            component = self.components[c]
-            guard = component.mode(modes[c]).guards[j]
-            if guard.fatal:
-                raise SimulationError(f"at t = {float(point.t)!r}: {guard.fatal}")
-            if component.surface:
-                continue
-            choice = next(
-                (way for way in guard.then if way.when is None or self._value(way.when, point, modes)), None
-            )
-            if choice is None:
-                raise SimulationError(
-                    f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "
-                    "the conditions of its choices holds"
-                )
-            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset):
-                raise SimulationError(
-                    f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
-                )
-            if after[c] is modes[c]:
-                moves.append(Move(c, modes[c], choice.to, guard.name))
-            after[c] = choice.to
-        values = self._reset_values(point, modes, [*(reset for _, reset in ways.values()), *resets])
-        x = tuple(values.get(name, value) for name, value in zip(self.states, point.x, strict=True))
-        discrete = tuple(
-            values.get(name, value) for name, value in zip(self.discrete, point.discrete, strict=True)
-        )
-        return replace(point, x=x, discrete=discrete), tuple(after)
-
-    def _reset_values(
-        self, point: Point, modes: Modes, resets: list[Mapping[str, Expression]]
-    ) -> dict[str, Number]:
-        values: dict[str, Number] = {}
-        for reset in resets:
-            for name, expr in reset.items():
-                value = self._value(expr, point, modes)
-                if values.setdefault(name, value) != value:
-                    raise SimulationError(
-                        f"two resets at t = {float(point.t)!r} set {name} to {float(values[name])!r} and to "
-                        f"{float(value)!r}"
-                    )
-        return values
-
-    def _value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
-        return self.program(modes).value(expr, point)
-
-    # -- surfaces -------------------------------------------------------------------------------------------
 
     def _surfaces(self) -> list[int]:
         return [c for c, component in enumerate(self.components) if component.surface]
@@ -218,7 +115,7 @@ class Rules:
         order = self._surfaces()
         if not order:
             return modes, set()
-        expansion = self.expand(point, self._decided(modes))
+        expansion = self.programs.expand(point, self._decided(modes))
         after, open_ = list(modes), set()
         for c, watched in zip(order, expansion.surfaces, strict=True):
             surface = self.components[c].surface
@@ -252,7 +149,7 @@ class Rules:
                     f"decides {_MOST_TOGETHER}",
                     remedy="compare against runs",
                 )
-            point = self.program(self._held(self._decided(modes), chosen)).project(point)
+            point = self.programs.program(self._held(self._decided(modes), chosen)).project(point)
             best = self._best(point, modes, chosen)
             for c in chosen:
                 if modes[c] not in (best[c], _UNDECIDED):
@@ -262,13 +159,13 @@ class Rules:
         return point, modes
 
     def _on_surface(self, c: int, point: Point, modes: Modes) -> bool:
-        expansion = self.expand(point, self._decided(modes))
+        expansion = self.programs.expand(point, self._decided(modes))
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
         """A component with all, to be decided or holding, whose forces act on its surface or on each other's."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
-        program = self.program(self._held(self._decided(modes), together))
+        program = self.programs.program(self._held(self._decided(modes), together))
         program.begin(point)
         held = [c for c in self._surfaces() if self._holds(c, program.modes)]
         coupled = {c: {held[j] for j in program.coupled(i)} for i, c in enumerate(held)}
@@ -289,7 +186,7 @@ class Rules:
             for c, mode in zip(chosen, combination, strict=True):
                 candidate[c] = mode
             trial = tuple(candidate)
-            expansion = self.expand(point, trial)
+            expansion = self.programs.expand(point, trial)
             if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
                 kept = sum(trial[c] == modes[c] for c in chosen)
                 held = sum(self._holds(c, trial) for c in chosen)

@@ -1,0 +1,67 @@
+"""The equations of a model in each vector of modes that occurs, and series from the instant at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.multiple_precision.expansion import Expansion
+from hybridsim.analysis.multiple_precision.precision import Number, Precision
+from hybridsim.analysis.multiple_precision.program import Point, Program
+from hybridsim.analysis.multiple_precision.reading import Reading
+from hybridsim.analysis.multiple_precision.signals import Signal
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+    from hybridsim.model import Model
+
+Modes = tuple[str, ...]
+"""Name of the mode of each component."""
+
+
+class Programs:
+    """Makes what is asked for, and keeps it.
+
+    Parameters
+    ----------
+    longest : no series is looked at farther than this.
+    """
+
+    def __init__(
+        self, model: Model, precision: Precision, signals: Sequence[Signal], longest: Number
+    ) -> None:
+        self.model, self.precision, self.signals, self.longest = model, precision, signals, longest
+        self.components = model.all_components()
+        self._programs: dict[Modes, Program] = {}
+        self._expansions: dict[tuple[Modes, Point], Expansion] = {}
+
+    def program(self, modes: Modes) -> Program:
+        """The equations in these modes."""
+        if modes not in self._programs:
+            reading = Reading(self.model, modes, self.precision, self.signals)
+            self._programs[modes] = Program(reading, self.precision, self.longest)
+        return self._programs[modes]
+
+    def new_instant(self) -> None:
+        """Forget the series of the instant before."""
+        self._expansions.clear()
+
+    def expand(self, point: Point, modes: Modes) -> Expansion:
+        """The series from a point on."""
+        key = (modes, point)
+        if key not in self._expansions:
+            self._expansions[key] = self.program(modes).expand(point)
+        return self._expansions[key]
+
+    def value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
+        """The value of an expression at a point."""
+        return self.program(modes).value(expr, point)
+
+    def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
+        """The guards, (component, number), that are negative just after."""
+        return [
+            (c, j)
+            for c, row in enumerate(expansion.guards)
+            for j, guard in enumerate(row)
+            if expansion.side_after(guard)[0] < 0
+        ]

@@ -1,0 +1,93 @@
+"""Transitions that are declared: choices of guards, and resets, all taken at x- and made at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.multiple_precision.precision import Number
+from hybridsim.analysis.multiple_precision.program import Point
+from hybridsim.analysis.multiple_precision.programs import Modes, Programs
+from hybridsim.errors import SimulationError
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+
+
+@dataclass(frozen=True)
+class Move:
+    """A change of one component's mode."""
+
+    component: int
+    source: str
+    target: str
+    guard: str
+
+
+class Transitions:
+    """Rule 1 of `settling`."""
+
+    def __init__(self, programs: Programs) -> None:
+        self.programs = programs
+        self.states = [state.name for state in programs.model.states]
+        self.discrete = [part.name for part in programs.model.discrete]
+
+    def take(
+        self,
+        point: Point,
+        modes: Modes,
+        fired: Iterable[tuple[int, int]],
+        resets: list[Mapping[str, Expression]],
+        moves: list[Move],
+    ) -> tuple[Point, Modes]:
+        """Take the declared choices of the guards that fired, and make all resets at once."""
+        after = list(modes)
+        ways: dict[int, tuple[str, Mapping[str, Expression]]] = {}
+        for c, j in sorted(fired):
+            component = self.programs.components[c]
+            guard = component.mode(modes[c]).guards[j]
+            if guard.fatal:
+                raise SimulationError(f"at t = {float(point.t)!r}: {guard.fatal}")
+            if component.surface:
+                continue
+            choice = next(
+                (
+                    way
+                    for way in guard.then
+                    if way.when is None or self.programs.value(way.when, point, modes)
+                ),
+                None,
+            )
+            if choice is None:
+                raise SimulationError(
+                    f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "
+                    "the conditions of its choices holds"
+                )
+            if c not in ways:
+                moves.append(Move(c, modes[c], choice.to, guard.name))
+            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset):
+                raise SimulationError(
+                    f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
+                )
+            after[c] = choice.to
+        values = self._reset_values(point, modes, [*(reset for _, reset in ways.values()), *resets])
+        x = tuple(values.get(name, value) for name, value in zip(self.states, point.x, strict=True))
+        discrete = tuple(
+            values.get(name, value) for name, value in zip(self.discrete, point.discrete, strict=True)
+        )
+        return replace(point, x=x, discrete=discrete), tuple(after)
+
+    def _reset_values(
+        self, point: Point, modes: Modes, resets: list[Mapping[str, Expression]]
+    ) -> dict[str, Number]:
+        values: dict[str, Number] = {}
+        for reset in resets:
+            for name, expr in reset.items():
+                value = self.programs.value(expr, point, modes)
+                if values.setdefault(name, value) != value:
+                    raise SimulationError(
+                        f"two resets at t = {float(point.t)!r} set {name} to {float(values[name])!r} and to "
+                        f"{float(value)!r}"
+                    )
+        return values
