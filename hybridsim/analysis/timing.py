@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 
 # A run that has been timed for this long in all is not repeated: it has averaged over the machine's moods itself.
 ENOUGH = 2.0
+# A run that is shorter than this has several calls in each of its turns, as many as fill the time but at most five.
+_TURN, _MOST_CALLS = 0.05, 5
 
 
 def timed_in_turns(
@@ -18,7 +20,7 @@ def timed_in_turns(
     expected: Sequence[float] | None = None,
     until: float = math.inf,
 ) -> list[tuple[float, ...]]:
-    """Seconds of each call of each run, round by round: `repeat` calls, fewer of those that take long.
+    """Seconds of each call of each run, round by round: a call in each of `repeat` rounds, fewer of long runs.
 
     The runs have been warmed up before. The collection of garbage is left out, as `timeit` does: it strikes whom
     it happens to strike. What is alive at the start is left alone, so that the collections in between cost little.
@@ -26,28 +28,31 @@ def timed_in_turns(
     Parameters
     ----------
     progress : called with the index of a run before it has its turn, also where the turn is passed over.
-    expected : seconds that each run is likely to take; with it, a round that would not be over in time is shortened
-        by its longest runs.
+    expected : seconds that each run is likely to take; with it, a short run has several calls in its turn, and a
+        round that would not be over in time is shortened by its longest runs.
     until : time of `time.monotonic` at which all has to be over.
     """
     times: list[list[float]] = [[] for _ in runs]
+    likely = [0.0] * len(runs) if expected is None else list(expected)
     collecting = gc.isenabled()
     gc.collect()
     gc.freeze()
     try:
         for _ in range(repeat):
-            turn = set(_fitting(expected or [0.0] * len(runs), until - time.monotonic()))
+            turn = set(_fitting([max(seconds, _TURN) for seconds in likely], until - time.monotonic()))
             for i, run in enumerate(runs):
                 if progress is not None:
                     progress(i)
-                late = expected is not None and time.monotonic() + expected[i] > until
+                late = time.monotonic() + likely[i] > until
                 if i not in turn or late or sum(times[i]) >= ENOUGH:
                     continue
+                calls = 1 if expected is None else min(math.ceil(_TURN / max(likely[i], 1e-9)), _MOST_CALLS)
                 gc.collect()
                 gc.disable()
-                start = time.perf_counter()
-                run()
-                times[i].append(time.perf_counter() - start)
+                for _ in range(calls):
+                    start = time.perf_counter()
+                    run()
+                    times[i].append(time.perf_counter() - start)
     finally:
         gc.unfreeze()
         if collecting:

@@ -41,7 +41,7 @@ def test_errors_follow_the_tolerance() -> None:
         assert tight.errors.event_time < 1e-2 * loose.errors.event_time
         assert tight.errors.sequence.right and loose.errors.sequence.right
         assert tight.cost.rhs_evaluations > loose.cost.rhs_evaluations
-        assert len(tight.cost.wall_times) == 2
+        assert len(tight.cost.wall_times) >= 2
     assert result.uncertainty.state < 1e-12
 
 

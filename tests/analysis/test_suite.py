@@ -66,7 +66,7 @@ def test_the_near_grazing_scene_grazes_as_it_says() -> None:
         s = np.linspace(0.15 * period, 0.26 * period, 200_001)
         dips.append(float((piece.slip.direction * piece.slip.derivative(1, s)).min() / largest))
     assert dips[:3] == pytest.approx([-5.2e-4, -1.0e-4, -1.2e-5], rel=0.05)
-    assert all(7e-6 < dip < 1e-5 for dip in dips[3:]) and len(dips) == 8
+    assert all(7e-6 < dip < 1e-5 for dip in dips[3:]) and len(dips) == 6
 
 
 @pytest.mark.parametrize(
@@ -171,12 +171,12 @@ def test_what_was_left_out_is_said() -> None:
         for row in whole.comparison.rows
     )
     cut = replace(
-        suite(), results=(replace(whole, comparison=replace(whole.comparison, rows=rows)),), repeat=2
+        suite(), results=(replace(whole, comparison=replace(whole.comparison, rows=rows)),), repeat=99
     )
     assert cut.notes == (
         "dop853, left out because of the time it takes: P1 at rtol 1e-12",
         "scipy-dop853 (events=native), left out because of the time it takes: P1 at rtol 1e-12",
-        "5 of 5 runs were timed fewer than 2 times, 0 of them only in the run that warms up",
+        "5 of 5 runs were timed fewer than 99 times, 0 of them only in the run that warms up",
     )
     assert all(note in cut.table() for note in cut.notes)
 

@@ -37,7 +37,7 @@ SCENES: tuple[Scene, ...] = (
         "dfcs",
         "The published point (He et al. 2026, Table 1 with F0 = 30 N): the body sticks twice in each period.",
         {"F0": 30, "N": 40, "omega": "0.6*sqrt(k/m)"},
-        periods=8,
+        periods=6,
     ),
     Scene(
         "P2",
@@ -46,7 +46,7 @@ SCENES: tuple[Scene, ...] = (
         "The published point with F0 = 22 N: the force exceeds the limit of 20 N by little, so stick fills most of a "
         "period, and a release is a small difference of large forces.",
         {"F0": 22, "N": 40, "omega": "0.64*sqrt(k/m)"},
-        periods=8,
+        periods=6,
     ),
     Scene(
         "no-stop",
@@ -55,7 +55,7 @@ SCENES: tuple[Scene, ...] = (
         "Forced hard above resonance, the body turns round without a stop: each zero of the velocity is a crossing, "
         "and nothing erases an error of the past.",
         {"F0": 60, "N": 40, "omega": "1.4*sqrt(k/m)"},
-        periods=10,
+        periods=8,
     ),
     Scene(
         "grazing",
@@ -67,7 +67,7 @@ SCENES: tuple[Scene, ...] = (
         "none. So the modes are right only where the velocity is right to some 1e-5 and both zeros of a pair are "
         "seen.",
         {"F0": 62.035, "N": 40, "omega": "0.2*sqrt(k/m)"},
-        periods=4,
+        periods=3,
         needs=("multiple-roots",),
     ),
     Scene(
@@ -98,14 +98,14 @@ SCENES: tuple[Scene, ...] = (
         "Stribeck law: not linear in slip",
         "dfcs-stribeck",
         "The reference model with friction that falls with speed: no closed form, and a jump at each release.",
-        periods=6,
+        periods=5,
     ),
     Scene(
         "base-isolation",
         "Base-isolated storey, measured record",
         "base-isolation",
         "Four states under an input with a thousand knots: each knot ends a step, so a long one is worth nothing.",
-        t_end=4.0,
+        t_end=3.0,
     ),
 )
 
