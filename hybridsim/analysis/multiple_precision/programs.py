@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.multiple_precision.expansion import Expansion
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Modes = tuple[str, ...]
 """Name of the mode of each component."""
+UNDECIDED = ""
+"""The mode of a contact before the first decision."""
 
 
 class Programs:
@@ -34,6 +36,24 @@ class Programs:
         self.components = model.all_components()
         self._programs: dict[Modes, Program] = {}
         self._expansions: dict[tuple[Modes, Point], Expansion] = {}
+
+    @property
+    def first_modes(self) -> Modes:
+        """Modes before the first decision."""
+        return tuple(component.initial or UNDECIDED for component in self.components)
+
+    def decided(self, modes: Modes) -> Modes:
+        """Components without a mode are read as holding; their surfaces are the same functions in every mode."""
+        return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
+
+    def held(self, modes: Modes, components: Iterable[int]) -> Modes:
+        """The same modes with some components holding."""
+        changed = list(modes)
+        for c in components:
+            surface = self.components[c].surface
+            assert surface is not None
+            changed[c] = surface.hold
+        return tuple(changed)
 
     def program(self, modes: Modes) -> Program:
         """The equations in these modes."""
@@ -55,7 +75,7 @@ class Programs:
 
     def value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
         """The value of an expression at a point."""
-        return self.program(modes).value(expr, point)
+        return self.program(self.decided(modes)).value(expr, point)
 
     def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
         """The guards, (component, number), that are negative just after."""

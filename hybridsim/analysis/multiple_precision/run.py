@@ -21,6 +21,7 @@ from hybridsim.errors import UsageError
 if TYPE_CHECKING:
     from hybridsim.expr import Expression
     from hybridsim.model import Model
+    from hybridsim.model.schedule import Schedule
 
 _WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
 # The defect at the end of a step may be this much larger than the terms that the step was chosen by.
@@ -57,11 +58,13 @@ class Run:
             self._pieces(self.t0),
         )
         self._event_times: list[Number] = []
-        self.now = self.rules.settle(start, self.rules.first_modes)
+        due = [model.schedules[k] for k in self.appointments.due_at_start]
+        resets = [schedule.reset for schedule in due]
+        self.now = self.rules.settle(start, self.programs.first_modes, (), resets)
         self.sides = self._sides(self.now.expansion)
         self.sizes = [abs(state.c[0]) for state in self.now.expansion.states]
         self._adopt(self.now)
-        self._keep_schedules(self.appointments.due_at_start)
+        self._record_schedules(due)
         names = (component.name for component in self.rules.components)
         self.initial_modes = dict(zip(names, self.now.modes, strict=True))
 
@@ -220,9 +223,13 @@ class Run:
         """What is due at an instant, with the inputs as they are from then on."""
         point = replace(self.now.point, pieces=self._pieces(self.now.point.t))
         schedules = [self.model.schedules[k] for k in due]
-        self.events += [ExactEvent(float(point.t), one.name, "", "", kind="scheduled") for one in schedules]
-        self.finished = self.finished or any(one.terminate for one in schedules)
+        self._record_schedules(schedules)
         self._adopt(self.rules.settle(point, self.now.modes, (), [one.reset for one in schedules]))
+
+    def _record_schedules(self, schedules: Sequence[Schedule]) -> None:
+        t = float(self.now.point.t)
+        self.events += [ExactEvent(t, schedule.name, "", "", kind="scheduled") for schedule in schedules]
+        self.finished = self.finished or any(schedule.terminate for schedule in schedules)
 
     def _pieces(self, t: Number) -> tuple[tuple[Number, ...], ...]:
         return tuple(signal.piece(t) for signal in self.signals)

@@ -12,6 +12,9 @@ The rules, in words:
     (stick before slip). A tie, or none at all, ends the run.
 4.  Rounds of 1 to 3 are repeated until no guard of any component is about to be negative.
 
+What is located at an instant comes before what is scheduled for it, and inputs jump with the latter; at the start of a
+run nothing has moved yet, and the schedule comes first.
+
 Whether a quantity is zero, and on which side of zero it sets out, is read from its Taylor coefficients in the mode that
 is tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits) is zero, and the next decides. No rule
 says in advance what is zero at an event.
@@ -30,14 +33,13 @@ from typing import TYPE_CHECKING
 
 from hybridsim.analysis.multiple_precision.expansion import Expansion
 from hybridsim.analysis.multiple_precision.program import Point
-from hybridsim.analysis.multiple_precision.programs import Modes, Programs
+from hybridsim.analysis.multiple_precision.programs import UNDECIDED, Modes, Programs
 from hybridsim.analysis.multiple_precision.transitions import Move, Transitions
 from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.expr import Expression
 
-_UNDECIDED = ""  # the mode of a contact before the first decision
 
 _MOST_TOGETHER = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
 _MOST_ROUNDS = 50  # that one instant may take; a cascade of resets is far shorter
@@ -59,11 +61,6 @@ class Rules:
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
         self.transitions = Transitions(programs)
-
-    @property
-    def first_modes(self) -> Modes:
-        """Modes before the first decision."""
-        return tuple(component.initial or _UNDECIDED for component in self.components)
 
     def settle(
         self,
@@ -101,39 +98,26 @@ class Rules:
     def _surfaces(self) -> list[int]:
         return [c for c, component in enumerate(self.components) if component.surface]
 
-    def _held(self, modes: Modes, components: Iterable[int]) -> Modes:
-        """The same modes with some components holding."""
-        changed = list(modes)
-        for c in components:
-            surface = self.components[c].surface
-            assert surface is not None
-            changed[c] = surface.hold
-        return tuple(changed)
-
     def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
         """Give components off their surface the mode of their side; return those on it without a mode."""
         order = self._surfaces()
         if not order:
             return modes, set()
-        expansion = self.programs.expand(point, self._decided(modes))
+        expansion = self.programs.expand(point, self.programs.decided(modes))
         after, open_ = list(modes), set()
         for c, watched in zip(order, expansion.surfaces, strict=True):
             surface = self.components[c].surface
             assert surface is not None
             if expansion.is_zero(watched):
-                if modes[c] == _UNDECIDED:
+                if modes[c] == UNDECIDED:
                     open_.add(c)
                 continue
             side = surface.above if watched.c[0] > 0 else surface.below
             if after[c] != side:
-                if after[c] != _UNDECIDED:
+                if after[c] != UNDECIDED:
                     moves.append(Move(c, after[c], side, "reset"))
                 after[c] = side
         return tuple(after), open_
-
-    def _decided(self, modes: Modes) -> Modes:
-        """Components without a mode are read as holding; their surfaces are the same functions in every mode."""
-        return self._held(modes, [c for c, mode in enumerate(modes) if mode == _UNDECIDED])
 
     def _decide(
         self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
@@ -149,23 +133,25 @@ class Rules:
                     f"decides {_MOST_TOGETHER}",
                     remedy="compare against runs",
                 )
-            point = self.programs.program(self._held(self._decided(modes), chosen)).project(point)
+            point = self.programs.program(self.programs.held(self.programs.decided(modes), chosen)).project(
+                point
+            )
             best = self._best(point, modes, chosen)
             for c in chosen:
-                if modes[c] not in (best[c], _UNDECIDED):
+                if modes[c] not in (best[c], UNDECIDED):
                     moves.append(Move(c, modes[c], best[c], names.get(c, "")))
             modes = tuple(best[c] if c in chosen else mode for c, mode in enumerate(modes))
             deciding -= set(chosen)
         return point, modes
 
     def _on_surface(self, c: int, point: Point, modes: Modes) -> bool:
-        expansion = self.programs.expand(point, self._decided(modes))
+        expansion = self.programs.expand(point, self.programs.decided(modes))
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
         """A component with all, to be decided or holding, whose forces act on its surface or on each other's."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
-        program = self.programs.program(self._held(self._decided(modes), together))
+        program = self.programs.program(self.programs.held(self.programs.decided(modes), together))
         program.begin(point)
         held = [c for c in self._surfaces() if self._holds(c, program.modes)]
         coupled = {c: {held[j] for j in program.coupled(i)} for i, c in enumerate(held)}
@@ -182,7 +168,7 @@ class Rules:
         """The admissible combination that keeps most modes, then holds most surfaces."""
         scores: dict[tuple[int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
-            candidate = list(self._decided(modes))
+            candidate = list(self.programs.decided(modes))
             for c, mode in zip(chosen, combination, strict=True):
                 candidate[c] = mode
             trial = tuple(candidate)
