@@ -45,9 +45,11 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
+        smallest = _SMALLEST * math.ulp(abs(self.bound))
         for _ in range(_RETRIES):
-            last = h >= left
-            x1 = coefficients @ (direction * min(h, left)) ** np.arange(coefficients.shape[1])
+            last = h >= left - smallest  # what would be left is too short for a step of its own
+            h = left if last else h
+            x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
             if math.isnan(h) or self._holds(coefficients, x1, direction * h):
                 break
             self.flow.counters.rejected += 1
