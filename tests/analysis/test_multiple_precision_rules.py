@@ -263,3 +263,48 @@ def test_progress_rises_to_one() -> None:
     run('[states]\nx = { start = 1, der = "-x*sin(9*t)" }\n', 2.0, progress=fractions.append)
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
+
+
+def test_a_release_leaves_the_other_contact_as_it_is() -> None:
+    """Block 1 on the ground, block 2 on block 1, pushed by t/2: the ground gives way at t = 2 and carries 1 from then.
+
+    Block 2 weighs as much as block 1 and needs (t/2 - 1)/2 of the contact between them, which holds up to 0.6; that it
+    could also drop to its 0.4 in motion is no reason to.
+    """
+    text = """
+        [states]
+        v1 = { start = 0, der = "t/2 - f - g" }
+        v2 = { start = 0, der = "g" }
+        [contacts.f]
+        velocity = "v1"
+        normal = "1"
+        law = { name = "coulomb", mu = 1 }
+        [contacts.g]
+        velocity = "v1 - v2"
+        normal = "1"
+        law = { name = "static-kinetic", mu_s = 0.6, mu_k = 0.4 }
+    """
+    trajectory = run(text, 5.0)
+    changes = [(event.component, event.source, event.target) for event in trajectory.events]
+    assert changes == [("f", "stick", "slip+"), ("g", "stick", "slip+")]
+    assert [event.t for event in trajectory.events] == pytest.approx([2.0, 4.4], abs=1e-15)
+
+
+def test_at_the_start_a_clock_comes_before_a_guard() -> None:
+    """x is zero and falls: the guard fires at once, after the tick has set d."""
+    text = """
+        [states]
+        x = { start = 0, der = "-1" }
+        [discrete]
+        d = 1
+        [clocks.c]
+        period = 9
+        set = { d = "10*d" }
+        [modes.a]
+        initial = true
+        guards.g = { expr = "x", then = { to = "b", reset = { d = "d + 1", x = "d" } } }
+        [modes.b]
+    """
+    trajectory = run(text, 1.0)
+    assert trajectory.initial_modes == {"mode": "b"}
+    assert trajectory.states(np.array([0.0]), "+")[0, 0] == 10.0

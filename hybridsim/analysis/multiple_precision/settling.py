@@ -8,8 +8,9 @@ The rules, in words:
 2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
 3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
     combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of
-    theirs becomes negative. Of the admissible ones that is taken which keeps most modes, then which holds most surfaces
-    (stick before slip). A tie, or none at all, ends the run.
+    theirs becomes negative. Of the admissible ones that is taken which keeps most modes of the components whose guards
+    have not fired, then most modes of all, then holds most surfaces (stick before slip). A tie, or none at all, ends
+    the run.
 4.  Rounds of 1 to 3 are repeated until no guard of any component is about to be negative.
 
 What is located at an instant comes before what is scheduled for it, and inputs jump with the latter; at the start of a
@@ -136,7 +137,7 @@ class Rules:
             point = self.programs.program(self.programs.held(self.programs.decided(modes), chosen)).project(
                 point
             )
-            best = self._best(point, modes, chosen)
+            best = self._best(point, modes, chosen, deciding)
             for c in chosen:
                 if modes[c] not in (best[c], UNDECIDED):
                     moves.append(Move(c, modes[c], best[c], names.get(c, "")))
@@ -164,9 +165,9 @@ class Rules:
         surface = self.components[c].surface
         return surface is not None and modes[c] == surface.hold
 
-    def _best(self, point: Point, modes: Modes, chosen: Sequence[int]) -> Modes:
-        """The admissible combination that keeps most modes, then holds most surfaces."""
-        scores: dict[tuple[int, int], list[Modes]] = {}
+    def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
+        """The admissible combination that keeps most modes, of those above all that nothing happened to."""
+        scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))
             for c, mode in zip(chosen, combination, strict=True):
@@ -174,9 +175,9 @@ class Rules:
             trial = tuple(candidate)
             expansion = self.programs.expand(point, trial)
             if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
-                kept = sum(trial[c] == modes[c] for c in chosen)
+                kept = [c for c in chosen if trial[c] == modes[c]]
                 held = sum(self._holds(c, trial) for c in chosen)
-                scores.setdefault((kept, held), []).append(trial)
+                scores.setdefault((len(set(kept) - deciding), len(kept), held), []).append(trial)
         best = scores[max(scores)] if scores else []
         if len(best) != 1:
             what = "several motions are" if best else "no motion is"
