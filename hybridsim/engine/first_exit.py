@@ -69,6 +69,8 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
         if high < -error:
             start = last if touched < 0.0 else touched
             return FOUND, polished(a, order, min(last, start), left)
+        if touched < 0.0 and changes_once(stack[top, :m], error):
+            return FOUND, polished(a, order, left, left + width)
         if width <= 2.0**-_DEEPEST or (low >= -error and high <= error):
             if touched < 0.0:
                 touched = left
@@ -84,6 +86,18 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
         positions[top + 1], widths[top + 1] = left, 0.5 * width
         top += 2
     return (NEVER, 1.0) if touched < 0.0 else (OPEN, touched)
+
+
+@kernel
+def changes_once(b: Any, error: float) -> bool:
+    """Whether a piece certainly begins positive, ends negative and has one zero: its coefficients change sign once."""
+    if not (b[0] > error and b[b.shape[0] - 1] < -error):
+        return False
+    changes = 0
+    for i in range(1, b.shape[0]):
+        if (b[i] < 0.0) != (b[i - 1] < 0.0):
+            changes += 1
+    return changes == 1
 
 
 @kernel

@@ -11,6 +11,13 @@ import math
 from typing import Any
 
 from hybridsim.engine.jit import kernel
+from hybridsim.engine.lean_tape import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+)
 from hybridsim.engine.tape import (
     ABS,
     ACOS,
@@ -223,6 +230,31 @@ def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) ->
 
 
 @kernel
+def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) -> None:
+    """Order k of the operations of the lean tape: on a series a and a constant b, or the sine of a linear angle."""
+    u, du, v, dv = V[a, k], E[a, k], V[b, 0], E[b, 0]
+    if op == SCALE:
+        y = u * v
+        _put(V, E, out, k, y, abs(u) * dv + du * (abs(v) + dv) + UNIT * abs(y))
+    elif op == DIVIDE_BY:
+        _divide(V, E, out, k, u, du, b)
+    elif op == SINCOS_LINEAR and k == 0:
+        _leading(SINCOS, V, E, a, b, 0, out)
+    elif op == SINCOS_LINEAR:
+        rate, e = V[a, 1], E[a, 1]
+        s, ds, co, dco = V[out, k - 1], E[out, k - 1], V[out + 1, k - 1], E[out + 1, k - 1]
+        y = rate * co / k
+        _put(V, E, out, k, y, (abs(rate) * dco + e * (abs(co) + dco)) / k + 2.0 * UNIT * abs(y))
+        y = -rate * s / k
+        _put(V, E, out + 1, k, y, (abs(rate) * ds + e * (abs(s) + ds)) / k + 2.0 * UNIT * abs(y))
+    elif k > 0:
+        _put(V, E, out, k, -u if op == CONSTANT_SUB else u, du)
+    else:
+        y = v - u if op == CONSTANT_SUB else (u + v if op == ADD_CONSTANT else u - v)
+        _put(V, E, out, 0, y, du + dv + UNIT * abs(y))
+
+
+@kernel
 def _advance(row: Any, V: Any, E: Any, k: int) -> None:
     """Order k of one operation."""
     op, a, b, c, out = row[0], row[1], row[2], row[3], row[4]
@@ -255,6 +287,8 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
                 _put(V, E, out, k, 0.0, 0.0)
             else:
                 _divide(V, E, out, k, n, 0.5 * (E[a, k] + e) + UNIT * abs(n), out)
+    elif op >= ADD_CONSTANT:
+        _with_constant(op, V, E, a, b, out, k)
     elif op >= ABS:
         _logic(op, V, E, a, b, c, out, k)
     elif k == 0:
@@ -282,14 +316,24 @@ def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: An
 
 @kernel
 def run_series(
-    rows: Any, places: Any, s: float, s_error: float, x: Any, x_error: Any, p: Any, V: Any, E: Any
+    constant_rows: Any,
+    rows: Any,
+    inputs: Any,
+    derivatives: Any,
+    s: float,
+    s_error: float,
+    x: Any,
+    x_error: Any,
+    p: Any,
+    V: Any,
+    E: Any,
 ) -> None:
-    """Set the inputs of a tape and run it to the order that V and E have room for.
+    """Set the inputs of a lean tape and run it to the order that V and E have room for.
 
-    places: registers of constants and their values, of parameters and where in p they stand, of phases, of time
-    (-1: none), of states and of their derivatives.
+    inputs: registers of constants and their values, of parameters and where in p they stand, of phases, of time
+    (-1: none), of states. derivatives: registers of the states' rates.
     """
-    constants, values, parameters, sources, phases, time, states, derivatives = places
+    constants, values, parameters, sources, phases, time, states = inputs
     V[:] = 0.0
     E[:] = 0.0
     for i in range(constants.shape[0]):
@@ -306,4 +350,6 @@ def run_series(
     for i in range(states.shape[0]):
         V[states[i], 0] = x[i]
         E[states[i], 0] = x_error[i]
+    for r in range(constant_rows.shape[0]):
+        _advance(constant_rows[r], V, E, 0)
     run_tape(rows, order, states, derivatives, V, E)

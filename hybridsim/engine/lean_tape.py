@@ -1,9 +1,8 @@
-"""The tape of one vector of modes made lean: copies gone, what is constant in time worked out once a segment.
+"""The tape of one vector of modes made lean: copies gone, what is constant in time worked out once.
 
-Taylor coefficients of any order are wanted at every step, without error bounds. So the rows of a tape (see
-`hybridsim.engine.tape`) are sorted by what they depend on: a row over constants has one coefficient and runs once;
-a product with a constant, and the sine of an angle that grows linearly, cost one multiplication an order instead of a
-convolution.
+The rows of a tape (see `hybridsim.engine.tape`) are sorted by what they depend on: a row over constants has one
+coefficient and runs once; a product with a constant, and the sine of an angle that grows linearly, cost one
+multiplication an order instead of a convolution.
 """
 
 from __future__ import annotations
@@ -60,13 +59,15 @@ class LeanTape:
     ----------
     constant_rows : run once a segment, at order 0.
     rows : run at every order.
-    derivatives, guards, monitors : registers of the results.
+    states, derivatives, guards, surfaces, monitors : registers of the states, their rates and the results.
     """
 
     constant_rows: np.ndarray
     rows: np.ndarray
+    states: np.ndarray
     derivatives: np.ndarray
     guards: np.ndarray
+    surfaces: np.ndarray
     monitors: np.ndarray
 
 
@@ -94,11 +95,12 @@ def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable
     def registers(key: str) -> np.ndarray:
         return np.array([same.get(r, r) for r in tape[key]], dtype=np.int64)
 
-    guards, derivatives, monitors = registers("guards"), registers("derivatives"), registers("monitors")
-    wanted = {*derivatives, *monitors, *(guards[g] for g in active)}
+    states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
+    surfaces, monitors = registers("surfaces"), registers("monitors")
+    wanted = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
     needed = _needed(series_rows, wanted)
     constants = _needed(constant_rows, wanted | {r for row in needed for r in row[1:4]})
-    return LeanTape(_array(constants), _array(needed), derivatives, guards, monitors)
+    return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
 
 
 def _array(rows: list[tuple[int, ...]]) -> np.ndarray:

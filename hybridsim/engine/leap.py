@@ -14,7 +14,7 @@ import numpy as np
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.jit import call, kernel
-from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, guard_series, settle_ordinary
+from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, settle_ordinary
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of, two_sum
 
@@ -83,6 +83,13 @@ def holds(
 
 
 @kernel
+def value_and_slope(rows: Any, places: Any, register: int, s: float, x: Any, W: Any) -> tuple[float, float]:
+    """A function of the tape and its rate along the flow at (s, x)."""
+    expand(rows, places, 1, s, x, W)
+    return W[register, 0], W[register, 1]
+
+
+@kernel
 def state_at(states: Any, order: int, d: float, V: Any, x: Any) -> None:
     """States at a distance d from the origin of the series (Horner)."""
     for i in range(states.shape[0]):
@@ -116,6 +123,8 @@ def earliest_exit(
             a[j] = V[r, j] * power
             total += abs(a[j])
             power *= h
+        if not total < math.inf:
+            return OPEN, g, 0.0
         if total == 0.0 and sides[g] >= 0:
             continue  # zero all along: neither a side nor a change of it
         if sides[g] <= 0:
@@ -135,7 +144,6 @@ def leap(
     automata: Any,
     tapes: Any,
     inputs: Any,
-    registers: Any,
     places: Any,
     control: Any,
     target: Any,
@@ -157,7 +165,7 @@ def leap(
     x, x_error, z, p, sides, orders, floors = state
     V, W, a, b, stack, y, y1, y_error, u, q, scale, slopes, side_now, order_now, floor_now = room
     steps, series, segments, clocks, modes, vectors, fires, jumps = record
-    constants, values, parameters, sources, _phases, time, states, _derivatives = inputs
+    constants, values, parameters, sources, _phases, time, states = inputs
     n, n_steps, n_segments = x.shape[0], 0, 0
     last_gap, last_ratio, steady = math.inf, math.inf, 0
     while True:
@@ -231,10 +239,8 @@ def leap(
         last_gap, last_ratio = gap, ratio
         if steady > 2 or gap <= _ULPS * 2.0**-52 * abs(clock[0]):
             return STOPPED, first_step, n_segments
-        y_error[:] = 0.0
         s_error = 2.0 * 2.0**-52 * s
-        guard_series(tapes, inputs, registers, k, Before(s, 0.0, y, y_error, p, z), y, y_error, z, work)
-        value, slope = work.values[fired, 0], work.values[fired, 1]
+        value, slope = value_and_slope(rows, flow_places, tapes.guards[k, fired], s, y, W)
         if slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
         call(functions.flow, s, y, p, z, slopes)
@@ -249,7 +255,6 @@ def leap(
             automata,
             tapes,
             inputs,
-            registers,
             at,
             fired,
             n_discrete,

@@ -48,11 +48,11 @@ class Leaper:
         self.system = system
         n, layout, guards = system.n, system.layout, system.guard_count
         rtol = max(tolerances.rtol, _TIGHTEST)
-        order = series_order(rtol)
+        order = series_order(rtol, system.is_linear)
         registers = system.registers
         self.shelf = TapeShelf(system)
         self.functions, self.automata = functions_of(system), automata_of(system)
-        self.inputs, self.registers = registers.inputs, registers.guards
+        self.inputs = registers.inputs
         self.places = (
             np.asarray(system.rates),
             layout.origin_at,
@@ -105,8 +105,8 @@ class Leaper:
         )
         while True:
             code, _, count = leap(
-                self.functions, self.automata, self.shelf.tapes, self.inputs, self.registers, self.places,
-                self.control, to, clock, state, self.work, self.room, self.record,
+                self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
+                to, clock, state, self.work, self.room, self.record,
             )  # fmt: skip
             self._commit(count, state[2], clock, record)
             known = len(self.shelf.tapes.modes)

@@ -33,15 +33,13 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """One row or one slice for each vector of modes: modes, lean rows, constant rows, rows with bounds, guards."""
+    """One row or one slice for each vector of modes: modes, lean rows, constant rows, active guards, registers."""
 
     modes: np.ndarray
     lean_start: np.ndarray
     lean: np.ndarray
     constant_start: np.ndarray
     constant: np.ndarray
-    full_start: np.ndarray
-    full: np.ndarray
     active_start: np.ndarray
     active: np.ndarray
     derivatives: np.ndarray
@@ -119,7 +117,6 @@ class TapeShelf:
             modes,
             *_rows([tape.rows for tape in lean]),
             *_rows([tape.constant_rows for tape in lean]),
-            *_rows([system.full_tape(z) for z in met]),
             *_flat(active),
             np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
             np.array([tape.guards for tape in lean], dtype=np.int64).reshape(len(met), system.guard_count),

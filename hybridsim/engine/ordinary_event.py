@@ -73,14 +73,18 @@ def find_modes(modes: Any, z: Any) -> int:
 
 
 @kernel
-def guard_series(
-    tapes: Any, inputs: Any, registers: Any, k: int, at: Any, x: Any, x_error: Any, z: Any, work: Any
-) -> None:
-    """Coefficients to third order of all guards, with bounds, along the flow of the modes in row k."""
-    rows = tapes.full[tapes.full_start[k] : tapes.full_start[k + 1]]
-    run_series(rows, inputs, at.s, at.s_error, x, x_error, at.p, work.V, work.E)
-    for g in range(registers.shape[0]):
-        work.values[g], work.bounds[g] = work.V[registers[g]], work.E[registers[g]]
+def guard_series(tapes: Any, inputs: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
+    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k."""
+    constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
+    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+    run_series(
+        constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, work.V, work.E
+    )
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        r = tapes.guards[k, g]
+        for j in range(work.values.shape[1]):
+            work.values[g, j], work.bounds[g, j] = work.V[r, j], work.E[r, j]
 
 
 @kernel
@@ -159,7 +163,6 @@ def settle_ordinary(
     automata: Any,
     tapes: Any,
     inputs: Any,
-    registers: Any,
     at: Any,
     fired: int,
     n_discrete: int,
@@ -181,7 +184,7 @@ def settle_ordinary(
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
-    guard_series(tapes, inputs, registers, k, at, x, x_error, z, work)
+    guard_series(tapes, inputs, k, at, x, x_error, work)
     if not is_alone(tapes, k, fired, work):
         return NOT_ORDINARY, False
     c = automata.owner[fired]
@@ -189,14 +192,14 @@ def settle_ordinary(
     if jumped:
         if not take_choice(functions, automata, at, fired, n_discrete, discrete_at, x, x_error, z, p, work):
             return NOT_ORDINARY, False
-    elif not decide_surface(functions, automata, tapes, inputs, registers, at, fired, x, x_error, z, work):
+    elif not decide_surface(functions, automata, tapes, inputs, at, fired, x, x_error, z, work):
         return NOT_ORDINARY, False
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
     after = Before(at.s, at.s_error, x, x_error, p, at.z)
     continuous = not jumped and is_continuous(functions, automata, at, x, z, everything, fired, work.jumps)
-    guard_series(tapes, inputs, registers, k, after, x, x_error, z, work)
+    guard_series(tapes, inputs, k, after, x, x_error, work)
     decree(automata, at, z, fired, not jumped and z[c] == at.z[c], continuous, work)
     if judge_members(automata, z, everything, work) != FINE:
         return NOT_ORDINARY, False
@@ -209,7 +212,6 @@ def decide_surface(
     automata: Any,
     tapes: Any,
     inputs: Any,
-    registers: Any,
     at: Any,
     fired: int,
     x: Any,
@@ -249,7 +251,7 @@ def decide_surface(
         k = find_modes(tapes.modes, trial)
         if k < 0:
             return False
-        guard_series(tapes, inputs, registers, k, at, x, x_error, trial, work)
+        guard_series(tapes, inputs, k, at, x, x_error, work)
         continuous = is_continuous(functions, automata, at, x, trial, cluster, fired, work.jumps)
         decree(automata, at, trial, fired, True, continuous, work)
         verdicts[number] = judge_members(automata, trial, cluster, work)

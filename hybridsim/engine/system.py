@@ -42,12 +42,9 @@ class Automaton:
 
 
 class _Registers:
-    """Where the tape's inputs and results are, as index arrays."""
+    """Where the tape's inputs are, as index arrays."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        def numbers(key: str) -> np.ndarray:
-            return np.array(tape[key], dtype=np.int64)
-
         self.count: int = tape["registers"]
         time: int = tape["time"]
         constants = np.array([r for r, _ in tape["constants"]], dtype=np.int64)
@@ -55,23 +52,8 @@ class _Registers:
         parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
         sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
         is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)
-        phases = parameters[is_phase]
-        self.states = numbers("states")
-        self.inputs = (
-            constants,
-            values,
-            parameters,
-            sources,
-            phases,
-            time,
-            self.states,
-            numbers("derivatives"),
-        )
-        self.guards, self.surfaces, self.monitors = (
-            numbers("guards"),
-            numbers("surfaces"),
-            numbers("monitors"),
-        )
+        phases, states = parameters[is_phase], np.array(tape["states"], dtype=np.int64)
+        self.inputs = (constants, values, parameters, sources, phases, time, states)
 
 
 @dataclass(frozen=True)
@@ -80,7 +62,7 @@ class Series:
 
     V: np.ndarray
     E: np.ndarray
-    place: _Registers
+    place: LeanTape
 
     @property
     def guards(self) -> np.ndarray:
@@ -169,9 +151,13 @@ class System:
             for numbers in automaton.guards:
                 self.owner[list(numbers)] = c
         self._registers = _Registers(data["tape"], self.layout)
-        self._tapes: dict[bytes, np.ndarray] = {}
         self._lean: dict[bytes, LeanTape] = {}
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the flow of every mode is linear in the states."""
+        return all(all(modes) for modes in self.linear.values())
 
     # -- values ---------------------------------------------------------------------------------------------
 
@@ -298,13 +284,6 @@ class System:
         mask[numbers[numbers >= 0]] = True
         return mask
 
-    def full_tape(self, z: np.ndarray) -> np.ndarray:
-        """The rows of the tape of the modes z."""
-        key = z.tobytes()
-        if key not in self._tapes:
-            self._tapes[key] = np.array(self._rows(z), dtype=np.int64).reshape(-1, 5)
-        return self._tapes[key]
-
     def _rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
@@ -322,7 +301,9 @@ class System:
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
     ) -> Series:
         """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
-        place = self._registers
-        V, E = np.empty((place.count, ORDER + 1)), np.empty((place.count, ORDER + 1))
-        run_series(self.full_tape(z), place.inputs, s, s_error, x, x_error, p, V, E)
-        return Series(V, E, place)
+        tape, count = self.lean_tape(z), self._registers.count
+        V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
+        run_series(
+            tape.constant_rows, tape.rows, self._registers.inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
+        )  # fmt: skip
+        return Series(V, E, tape)
