@@ -251,6 +251,7 @@ class SegmentRun:
                     self.sightings.append(Sighting(step.s1, x, k, side))
                 else:
                     stopping.append(k)
+                    locator.monitor_sides[k] = before[k]  # which decides the direction that is recorded
         if fired or stopping:
             return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
         return step, None

@@ -151,3 +151,16 @@ def test_a_rate_that_is_no_number_is_named() -> None:
     sol = hs.simulate(model('[states]\nx = { start = 1, der = "1/(x - 1)" }\n'), (0, 1))
     assert sol.status == "step-failure"
     assert "x" in sol.message
+
+
+@pytest.mark.parametrize("integrator", LOCATING)
+def test_a_monitor_whose_reset_falls_on_a_tick_is_recorded(integrator: str) -> None:
+    """y rises to 0.5 at t = 0.5, where a clock ticks as well, and falls back to -0.5, to be there again at 1.5."""
+    text = (
+        '[states]\ny = { start = 0, der = "1" }\n[discrete]\nd = 0\n[clocks.c]\nperiod = 0.5\nset = { d = "d + 1" }\n'
+        '[monitors.r]\nexpr = "y - 0.5"\ndirection = "up"\naction = "reset"\nreset = { y = "y - 1" }\n'
+    )
+    sol = hs.simulate(model(text), (0, 1.75), integrator=integrator)
+    assert [e.t for e in sol.events if e.component == "r"] == pytest.approx([0.5, 1.5], abs=1e-12)
+    assert [e.t for e in sol.events if e.component == "c"] == [0, 0.5, 1, 1.5]
+    assert sol(1.75)[0] == pytest.approx(-0.25, abs=1e-12)
