@@ -17,4 +17,5 @@ def test_a_run_goes_on_for_periods_else_to_the_end_of_a_record() -> None:
     assert end_time(hs.load("base-isolation"), None) == 20.0
     assert end_time(driven_by(kind="chirp", f0=1, f1=2, duration=3.5), None) == 3.5
     assert end_time(driven_by(kind="table", times=(-2, -1), values=(0, 1)), None) == DEFAULT_SECONDS
-    assert end_time(hs.load("bouncing-ball"), None) == DEFAULT_SECONDS
+    assert end_time(hs.Model("m", [hs.State("x", 0, "1")]), None) == DEFAULT_SECONDS
+    assert end_time(hs.load("bouncing-ball"), None) == hs.load("bouncing-ball").duration_value() == 3.0
