@@ -85,6 +85,7 @@ def simulate(
     system = System(model)
     for name in system.hot_functions():
         system.address(name)
+    method.prepare(system)
     compile_time = time.perf_counter() - began
     _refuse_lacking(method, model, system, span)
     return _run(

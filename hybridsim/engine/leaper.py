@@ -41,6 +41,35 @@ class SeriesPieces:
         return out
 
 
+_compiled: list[bool] = []
+
+
+def compile_leaps(system: System) -> None:
+    """Have ready what leaps call: functions of this system, and the loop itself, the same for all, once a process."""
+    functions_of(system)
+    if _compiled or not system.n:
+        return
+    leaper = Leaper(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
+    nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
+    guards, n = system.guard_count, system.n
+    modes = np.zeros(len(system.automata), dtype=np.int64)
+    p = system.vector(nowhere, np.zeros(system.layout.discrete))
+    still = Outcome(
+        np.zeros(n),
+        p,
+        modes,
+        np.ones(guards, dtype=np.int64),
+        np.zeros(guards, dtype=np.int64),
+        none,
+        none,
+        np.zeros(n),
+        np.zeros(guards),
+        np.zeros(0),
+    )
+    leaper.leap(nowhere, still, p, nowhere, Trajectory())
+    _compiled.append(True)
+
+
 class Leaper:
     """Leaps of one run."""
 

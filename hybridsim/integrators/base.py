@@ -63,6 +63,10 @@ class Integrator(ABC):
     dense_is_accurate: ClassVar[bool] = False
     leaps: ClassVar[bool] = False  # whether the engine's compiled loop takes this method's steps where it can
 
+    def prepare(self, system: System) -> None:
+        """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
+        return
+
     def start(
         self,
         flow: Flow,

@@ -8,8 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from hybridsim.engine.leaper import compile_leaps
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import Integrator
 
@@ -106,6 +108,10 @@ class Taylor(Integrator):
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
     dense_is_accurate: ClassVar[bool] = True
     leaps: ClassVar[bool] = True
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        compile_leaps(system)
 
     def start(
         self,
