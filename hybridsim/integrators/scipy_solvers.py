@@ -10,8 +10,9 @@ import numpy as np
 from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.scipy_native import NativeStepper
-from hybridsim.integrators.scipy_stepper import SolverStepper
+from hybridsim.integrators.scipy_stepper import SolverStepper, series_step
 
+_NOISE = {"accumulation": "hops shorter than its tolerances are noise: every restart is at order one"}
 _EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
 
 
@@ -30,6 +31,7 @@ class ScipyIntegrator(Integrator):
 
     solver: ClassVar[str]
     implicit: ClassVar[bool] = False
+    starts_blind: ClassVar[bool] = False  # a first step that is far too long makes it give up
 
     def start(
         self,
@@ -46,6 +48,8 @@ class ScipyIntegrator(Integrator):
         solver = getattr(scipy.integrate, self.solver)
         if self.events == "native":
             return NativeStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step, watch)
+        if self.starts_blind:
+            first_step = min(first_step or np.inf, series_step(flow, x0, s_bound, tolerances))
         return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
 
 
@@ -126,6 +130,7 @@ class ScipyBDF(ScipyIntegrator):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Shampine and Reichelt 1997, doi:10.1137/S1064827594276424"
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
+    lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "BDF"
     implicit: ClassVar[bool] = True
@@ -135,7 +140,8 @@ class ScipyBDF(ScipyIntegrator):
 class ScipyLSODA(ScipyIntegrator):
     """ODEPACK's LSODA: Adams formulas while the motion is not stiff, BDF where it is, by its own choice.
 
-    When to choose it: modes of which nobody knows whether they are stiff.
+    When to choose it: modes of which nobody knows whether they are stiff. It gives up where its first step is far too
+    long, so it is given one from the Taylor series of the states.
     """
 
     name: ClassVar[str] = "scipy-lsoda"
@@ -143,6 +149,8 @@ class ScipyLSODA(ScipyIntegrator):
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Petzold 1983, doi:10.1137/0904010"
     when: ClassVar[str] = "stiffness not known"
+    lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"
     implicit: ClassVar[bool] = True
+    starts_blind: ClassVar[bool] = True

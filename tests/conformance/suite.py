@@ -37,8 +37,9 @@ LAST_RESORT = 1e-13  # for a method of low order whose error at 1e-12 is still a
 # Error in units of rtol that a study cut short may show: a low-order method makes ten to a hundred times its
 # tolerance in a period, and a lightly damped motion remembers tens of periods.
 CUT_SHORT = 1000.0
-# A method of order 3 would take a hundred thousand steps for 1e-9: its tolerances are this much looser.
-LOW_ORDER = 100.0
+# A method of order 3 would take a hundred thousand steps for 1e-9 over more than fifty periods: there its tolerances
+# are this much looser.
+LOW_ORDER, LONG = 100.0, 50.0
 # A method with this option has the capability when it is set so.
 LIFTED = {"stick_velocity": ("zero", "exact-stick")}
 
@@ -91,7 +92,8 @@ def lacking(one: Any) -> dict[str, str]:
 def study(one: Any, scene: Scene) -> tuple[Setting, ...]:
     """The settings at which a scene is run, from loose to tight."""
     if "adaptive" not in one.lacks:
-        factor = LOW_ORDER if one.order == "3(2)" else 1.0
+        is_long = abs(scene.span[1] - scene.span[0]) > LONG * scene.unit
+        factor = LOW_ORDER if one.order == "3(2)" and is_long else 1.0
         return tuple(adaptive(factor * rtol, scene) for rtol in scene.tolerances)
     known = option_names(one)
     fixed: dict[str, Any] = {option: value for option, (value, _) in LIFTED.items() if option in known}

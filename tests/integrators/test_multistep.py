@@ -1,4 +1,4 @@
-"""Values between the steps on a stiff stretch: a body that creeps under a smoothed law moves as slowly as it should."""
+"""Multistep solvers: values between stiff steps are those of the slow motion, and a first step is not far too long."""
 
 from __future__ import annotations
 
@@ -42,3 +42,14 @@ def test_a_series_that_does_not_reach_the_other_end() -> None:
     assert converges(smooth, h, np.exp([-h]))
     stiff = np.array([[1.0, -1e-6 * 1e4, 1e-6 * 1e8 / 2, -1e-6 * 1e12 / 6]])
     assert not converges(stiff, h, np.array([0.999999]))
+
+
+@pytest.mark.parametrize("periods", [20, 100])
+def test_lsoda_is_not_sent_off_with_a_step_as_long_as_the_stick_before(periods: int) -> None:
+    """Its first step comes from the series of the states: one far too long made it give up at a release."""
+    model = hs.load("dfcs")
+    period = 2 * math.pi / model.parameter_values()["omega"]
+    for rtol in (1e-4, 1e-8):
+        sol = hs.simulate(model, (0, periods * period), integrator="scipy-lsoda", rtol=rtol)
+        assert sol.success, sol.message
+        assert len(sol.events) == 4 * periods + 1
