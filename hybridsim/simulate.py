@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.errors import ModelError, UsageError
+from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
@@ -120,6 +120,7 @@ def _run(
     max_step: float,
     first_step: float | None,
 ) -> Solution:
+    from hybridsim.engine.driving import refuse_driving
     from hybridsim.engine.stepping import Tolerances
     from hybridsim.engine.trajectory import Task
     from hybridsim.solution import Solution
@@ -135,31 +136,11 @@ def _run(
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
     grid = arguments.time_grid(t_eval, span)
-    _refuse_driving(system, span[0], start, discrete, z0)
+    refuse_driving(system, span[0], start, discrete, z0)
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
     return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span)
-
-
-def _refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
-    """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
-    from hybridsim.engine.timepair import Instant
-
-    try:
-        effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
-    except (ZeroDivisionError, ValueError, OverflowError):
-        return  # not a number at the start: the run itself says where
-    for c, effect in effects.items():
-        if effect >= 0.0:
-            name = system.automata[c].name
-            place = system.model.all_components()[c].place
-            raise ModelError(
-                f"contact {name}: the force {name} acts along its relative velocity, not against it "
-                f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
-                place=place,
-                remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
-            )
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

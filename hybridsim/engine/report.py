@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from hybridsim.engine.driving import refuse_driving
 from hybridsim.engine.modules import compiled, is_cached
+from hybridsim.engine.system import System
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -38,8 +42,12 @@ class Report:
 
 
 def describe(model: Model) -> Report:
-    """Lower a model (nothing is compiled) and say what came of it."""
+    """Lower a model (nothing is compiled) and say what came of it; what no run would start with is refused."""
     known = is_cached(model)
+    system = System(model)
+    discrete = np.array(list(model.discrete_values().values()), dtype=float)
+    modes = np.array([automaton.initial for automaton in system.automata], dtype=np.int64)
+    refuse_driving(system, 0.0, system.start_state({}), discrete, modes)
     data = compiled(model).data
     components = model.all_components()
     names = [c.name for c in components]

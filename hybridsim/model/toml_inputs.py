@@ -63,6 +63,8 @@ def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
         times, values = read_columns(path, columns)
     except ModelError as fault:
         where = fault.place.prefix if fault.place else ""
-        table.fail(where + fault.message, f"{fault.remedy} Paths are taken from {folder}.", "file")
+        table.fail(
+            where + fault.message, f"{fault.remedy} Paths begin at the folder {folder.resolve()}", "file"
+        )
         return {}
     return {"times": times, "values": values}

@@ -10,9 +10,10 @@ if TYPE_CHECKING:
 
 
 def units_of(model: Model) -> dict[str, str]:
-    """Names of states, outputs, contact forces and discrete states, in that order, with their units."""
+    """Names of states, outputs, contact forces, discrete states and inputs, in that order, with their units."""
     units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
     rest = {contact.name: "" for contact in model.contacts} | {d.name: d.unit for d in model.discrete}
+    rest |= {declared.name: "" for declared in model.inputs}
     return units | {name: unit for name, unit in rest.items() if name not in units}
 
 

@@ -25,21 +25,22 @@ def friction_loop(
 
     Parameters
     ----------
-    output : the first that is the force of a contact if not given, else the first of all.
+    output : the force of the first contact if not given; without a contact the first output.
     state : the first if not given.
     t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
     axes : where to draw; a new figure if not given.
     """
     model = solution.model
     if output is None:
-        names = [declared.name for declared in model.outputs]
-        forces = [contact.name for contact in model.contacts if contact.name in names]
+        names = [
+            *(contact.name for contact in model.contacts),
+            *(declared.name for declared in model.outputs),
+        ]
         if not names:
             raise UsageError(
-                f"{model.name} has no outputs",
-                remedy="declare one under [outputs], such as the friction force",
+                f"{model.name} has no contacts and no outputs", remedy="declare an output under [outputs]"
             )
-        output = (forces or names)[0]
+        output = names[0]
     if state is None:
         state = model.states[0].name
     return draw_orbit(solution, state, output, t_span, axes)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.rows import Row
 
 SIZE = 6.5
+PALE = 0.35
 
 # Of regularised forms and the law that they stand for; their integrators differ in their dashes.
 _SET_VALUED = "set-valued"
@@ -99,23 +100,25 @@ def _shade(hue: str, place: int, count: int) -> str:
 
 def draw_line(
     panel: Axes, look: Look, points: Sequence[tuple[float, float]], spreads: Sequence[tuple[float, float]],
-    verdicts: Sequence[bool | None], size: float = SIZE,
+    verdicts: Sequence[bool | None], size: float = SIZE, cold: Sequence[bool] = (),
 ) -> None:  # fmt: skip
     """Draw the settings of a line at their (time, error), with the spread of the times.
 
     A point is filled where the modes are right, hollow where they are wrong, half filled where there are none to
-    judge.
+    judge. What is cold was timed only in its first run, which warms up: it is drawn pale and the line passes it by.
     """
     if not points:
         return
+    cold = cold or [False] * len(points)
+    timed = [point for point, is_cold in zip(points, cold, strict=True) if not is_cold] or points
     panel.plot(
-        *zip(*points, strict=True), color=look.colour, linestyle=look.dashes, linewidth=size / 6, zorder=2
+        *zip(*timed, strict=True), color=look.colour, linestyle=look.dashes, linewidth=size / 6, zorder=2
     )
-    for (x, y), (low, high), right in zip(points, spreads, verdicts, strict=True):
+    for (x, y), (low, high), right, is_cold in zip(points, spreads, verdicts, cold, strict=True):
         if high > low:
             panel.plot([low, high], [y, y], color=look.colour, linewidth=size / 2.6, alpha=0.35, zorder=2)
         panel.plot(
             x, y, look.marker, color=look.colour, markersize=size, markeredgewidth=size / 5,
             markerfacecolor="white" if right is False else look.colour, markerfacecoloralt="white",
-            fillstyle="left" if right is None else "full",
+            fillstyle="left" if right is None else "full", alpha=PALE if is_cold else 1.0,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormat
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
-from hybridsim.plot.lines import SIZE, Look, draw_line, looks
+from hybridsim.plot.lines import PALE, SIZE, Look, draw_line, looks
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -92,6 +92,7 @@ def draw_panel(
             [(min(row.cost.wall_times), max(row.cost.wall_times)) for row, _ in found if row.cost],
             [verdict_of(row) for row, _ in found],
             size,
+            [is_cold(row) for row, _ in found],
         )
     style.dress(panel)
     if not panel.lines:
@@ -116,6 +117,11 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, floa
     if reading is None or row.cost is None or not math.isfinite(reading.value):
         return None
     return row.cost.wall_time, max(reading.value, _ZERO)
+
+
+def is_cold(row: Row) -> bool:
+    """Whether a run was timed only where it warmed up itself."""
+    return row.cost is not None and row.cost.repetitions == 0
 
 
 def verdict_of(row: Row) -> bool | None:
@@ -157,6 +163,10 @@ def handles(
             mark = Line2D([], [], color=style.INK, marker="o", markersize=size, linewidth=0, label=text)
             mark.set(fillstyle=fill, markerfacecoloralt="white")
             found.append(mark)
+    if any(is_cold(row) for row in rows):
+        mark = Line2D([], [], color=style.INK, marker="o", markersize=size, linewidth=0, alpha=PALE)
+        mark.set_label("pale: timed once, not warmed up")
+        found.append(mark)
     if any(comparison.floor(quantity) > 0 for comparison in comparisons for quantity in QUANTITIES):
         found.append(Patch(color=_UNCERTAIN, label="reference uncertain"))
     return found

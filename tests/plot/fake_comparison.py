@@ -27,7 +27,7 @@ def comparison() -> Comparison:
             rows.append(
                 Row(
                     name, name, ("rtol", 10.0**-digits), {"rtol": 10.0**-digits}, "finished", errors=errors,
-                    cost=Cost(times, 70_000, 60_000, 3_000),
+                    cost=Cost(times, 70_000, 60_000, 3_000, repetitions=3),
                 )
             )  # fmt: skip
     for label, error, order, sequence in (
@@ -39,7 +39,7 @@ def comparison() -> Comparison:
             size = error * (1200 / steps) ** order
             time = steps / 1200 * 5e-3
             errors = Errors(size, size / 3, size * PERIOD / 20, sequence)
-            cost = Cost((time * 0.97, time, time * 1.1), 4 * steps * 100, steps, steps * 100)
+            cost = Cost((time * 0.97, time, time * 1.1), 4 * steps * 100, steps, steps * 100, repetitions=3)
             rows.append(
                 Row(
                     label.split()[0], label, ("steps_per_period", steps), {"steps_per_period": steps},

@@ -102,7 +102,7 @@ SCENES: tuple[Scene, ...] = (
     ),
     Scene(
         "base-isolation",
-        "Base-isolated storey, measured record",
+        "Base-isolated storey, ground motion",
         "base-isolation",
         "Four states under an input with a thousand knots: each knot ends a step, so a long one is worth nothing.",
         t_end=3.0,

@@ -1,0 +1,27 @@
+"""A contact whose force drives its own relative velocity instead of opposing it: a sign slip, refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.errors import ModelError
+
+
+def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
+    """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
+    try:
+        effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return  # not a number at the start: the run itself says where
+    for c, effect in effects.items():
+        if effect >= 0.0:
+            name = system.automata[c].name
+            place = system.model.all_components()[c].place
+            raise ModelError(
+                f"contact {name}: the force {name} acts along its relative velocity, not against it "
+                f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
+                place=place,
+                remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
+            )
