@@ -150,6 +150,7 @@ def _refuse_lacking(method: Integrator, model: Model, system: System, span: tupl
         "monitors": bool(model.monitors),
         "scheduled": bool(model.schedules or model.inputs),
         "backward": span[1] < span[0],
+        "corners": "corners" in method.lacks and system.has_corners,
     }
     for capability, needed in needs.items():
         if needed and capability in method.lacks:

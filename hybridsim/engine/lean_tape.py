@@ -103,6 +103,21 @@ def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable
     return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
 
 
+def has_corners(tape: dict[str, Any]) -> bool:
+    """Whether a corner or a jump (abs, min, max, sign, a condition) depends on what moves, in any mode."""
+    kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
+    for _, branches in tape["parts"]:
+        for op, *given, out in (row for branch in branches for row in branch):
+            kinds = [kind.get(r, CONSTANT) for r in given[: _registers(op)]]
+            deciding = kinds[:1] if op == SELECT else kinds
+            if op >= ABS and max(deciding) != CONSTANT:
+                return True
+            kind[out] = max(_kind(op, kinds), kind.get(out, CONSTANT))
+            if op in _PAIRED:
+                kind[out + 1] = kind[out]
+    return False
+
+
 def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
     return np.array(rows, dtype=np.int64).reshape(-1, 5)
 

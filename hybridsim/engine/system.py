@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.lean_tape import LeanTape, lean
+from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
 from hybridsim.engine.modules import compiled
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
@@ -153,6 +153,11 @@ class System:
         self._registers = _Registers(data["tape"], self.layout)
         self._lean: dict[bytes, LeanTape] = {}
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
+
+    @property
+    def has_corners(self) -> bool:
+        """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
+        return has_corners(self.code.data["tape"])
 
     @property
     def is_linear(self) -> bool:

@@ -23,6 +23,7 @@ CAPABILITIES = {
     "accumulation": "events that follow each other ever faster, down to rounding",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
+    "corners": "corners and jumps (abs, min, max, sign, a condition) inside a mode",
     "stiff": "rates that differ by many decades",
     "adaptive": "the error follows rtol and atol",
 }

@@ -105,7 +105,10 @@ class Taylor(Integrator):
     order: ClassVar[str] = "by the tolerance"
     reference: ClassVar[str] = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
     when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
-    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    lacks: ClassVar[dict[str, str]] = {
+        "stiff": "explicit: its step is bound by the fastest rate",
+        "corners": "a series follows one side of an abs, min, max, sign or condition past its corner",
+    }
     dense_is_accurate: ClassVar[bool] = True
     leaps: ClassVar[bool] = True
 

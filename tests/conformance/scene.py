@@ -16,6 +16,7 @@ VOCABULARY = (
     "accumulation",
     "exact-stick",
     "backward",
+    "corners",
     "stiff",
     "adaptive",
 )

@@ -18,3 +18,19 @@ def test_a_step_that_would_leave_a_few_ulps_goes_all_the_way(rtol: float) -> Non
     size = np.abs(other(times)).max(axis=1, keepdims=True)
     assert np.all(np.abs(solution(times) - other(times)) <= 100 * rtol * size)
     assert [event.target for event in solution.events] == [event.target for event in other.events]
+
+
+@pytest.mark.parametrize("rate", ["-max(-1, min(1, x))", "-v*abs(v)", "-sign(x)", "1 if x < 0 else -x"])
+def test_what_has_corners_is_refused(rate: str) -> None:
+    """A series would follow one side past the corner, and say nothing."""
+    model = hs.Model("corner", states=[hs.State("x", 1, der="v"), hs.State("v", 0, der=rate)])
+    with pytest.raises(hs.UsageError, match="past its corner"):
+        hs.simulate(model, (0, 0.1), integrator="taylor")
+    assert hs.simulate(model, (0, 0.1)).success
+
+
+def test_a_condition_on_parameters_is_no_corner() -> None:
+    model = hs.Model(
+        "switch", states=[hs.State("x", 1, der="-x if k > 1 else x*min(k, 2)")], parameters={"k": 2}
+    )
+    assert hs.simulate(model, (0, 1), integrator="taylor")(1.0)[0] == pytest.approx(0.36787944117144233)
