@@ -59,10 +59,11 @@ def holds(
     d: float,
     rtol: float,
     atol: Any,
+    watched: Any,
     V: Any,
     W: Any,
 ) -> bool:
-    """Whether the series V from s still satisfies the equation at s + d, where the state is x1."""
+    """Whether the series V from s still hold at s + d, where the state is x1: the equation, and the guards' values."""
     time, states, derivatives = places
     if time >= 0:
         W[time, 0] = s + d
@@ -78,6 +79,16 @@ def holds(
             change += abs(term * d)
         scale = atol[i] + rtol * max(abs(x0[i]), abs(x1[i])) + rtol * change
         if not abs(d * (slope - W[derivatives[i], 0])) <= _DEFECT * scale:
+            return False
+    for j in range(watched.shape[0]):
+        r = watched[j]
+        value, largest, power = 0.0, 0.0, 1.0
+        for k in range(order + 1):
+            term = V[r, k] * power
+            value += term
+            largest = max(largest, abs(term))
+            power *= d
+        if not abs(value - W[r, 0]) <= (_DEFECT * rtol + 64.0 * UNIT) * largest:
             return False
     return True
 
@@ -205,7 +216,7 @@ def leap(
                 return STOPPED, first_step, n_segments
             state_at(states, order, d, V, y1)
             trials = 0
-            while not holds(rows, flow_places, order, s, y, y1, d, rtol, atol, V, W):
+            while not holds(rows, flow_places, order, s, y, y1, d, rtol, atol, watched, V, W):
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
                 if trials > _TRIALS:
                     return STOPPED, first_step, n_segments

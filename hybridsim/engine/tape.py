@@ -85,7 +85,10 @@ class TapeBuilder:
         import sympy as sp
 
         if e.is_Mul:
-            numerator, denominator = e.as_numer_denom()
+            # negative powers only: exp(-u) over one would be infinite where it is nothing
+            below = [a for a in e.args if a.is_Pow and a.exp.is_number and a.exp.is_negative]
+            numerator = sp.Mul(*(a for a in e.args if a not in below))
+            denominator = sp.Mul(*(1 / a for a in below))
             if denominator != 1 and not denominator.is_number:
                 a, b = self._emit(numerator, known, rows), self._emit(denominator, known, rows)
                 return self._op(rows, DIV, a, b)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ import numpy as np
 from hybridsim.engine.hermite import hermite
 from hybridsim.engine.jit import call, kernel
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
+from hybridsim.engine.trajectory import Pieces
 
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 10.0
+_MOST_PARTS = 64  # of a step that is repeated up to an event
 _SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
 
 
@@ -134,9 +137,24 @@ class RungeKuttaStepper:
         return Step(s0, self.s, x0, x, hermite(s0, self.s, left, self.left))
 
     def restep(self, step: Step, s: float) -> Step:
-        """The step up to s in one step of exactly that length."""
-        x, _ = self._attempt(step.s0, step.x0, self._rhs(step.s0, step.x0), s - step.s0)
-        return Step(step.s0, s, step.x0, x, self._dense(step.s0, s, step.x0, x))
+        """The step up to s in one step of exactly that length; in equal parts where its error asks for them."""
+        count = 1
+        while True:
+            knots, states = np.linspace(step.s0, s, count + 1), [step.x0]
+            good = True
+            for a, b in pairwise(knots):
+                x, error = self._attempt(float(a), states[-1], self._rhs(float(a), states[-1]), float(b - a))
+                states.append(x)
+                good = good and error <= 1.0
+            if good or count == _MOST_PARTS:
+                break
+            self.flow.counters.rejected += 1
+            count *= 2
+        parts = tuple(
+            self._dense(float(a), float(b), x0, x1)
+            for (a, b), (x0, x1) in zip(pairwise(knots), pairwise(states), strict=True)
+        )
+        return Step(step.s0, s, step.x0, states[-1], parts[0] if count == 1 else Pieces(knots, parts))
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
         made: list[Dense] = []

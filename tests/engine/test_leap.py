@@ -143,3 +143,31 @@ def test_output_is_exact_in_stick() -> None:
     for interval in sol.modes["f"]:
         if interval.mode == "stick":
             assert (sol(np.linspace(interval.t0, np.nextafter(interval.t1, 0), 50))[1] == 0.2).all()
+
+
+@pytest.mark.parametrize(
+    ("guard", "time"),
+    [
+        ("0.5 - tanh(50*(x - 1))", 1 + math.atanh(0.5) / 50),
+        ("1 - exp(1000*(x - 5))", 5.0),
+        ("1 - exp(100*(x - 1))", 1.0),
+        ("2 - x**50", 2 ** (1 / 50)),
+        ("1/(1 + x**12) - 0.01", 99 ** (1 / 12)),
+        ("cos(x**4)", (math.pi / 2) ** 0.25),
+        ("cos(x**8) + 0.5", (2 * math.pi / 3) ** 0.125),
+    ],
+)
+@pytest.mark.parametrize("rtol", [1e-9, 1e-12])
+def test_guards_whose_series_say_nothing_of_what_comes(guard: str, time: float, rtol: float) -> None:
+    """Saturated, gapped or growing series: the guard itself is looked at where a step ends."""
+    model = hs.Model(
+        "still",
+        states=[hs.State("x", 0, "1")],
+        components=[
+            hs.Component(
+                "c", modes=[hs.Mode("a", guards=[hs.Guard("g", guard, then="b")]), hs.Mode("b")], initial="a"
+            )
+        ],
+    )
+    sol = hs.simulate(model, (0, 8), integrator="taylor", rtol=rtol)
+    assert [event.t for event in sol.events] == pytest.approx([time], rel=1e-9)
