@@ -54,7 +54,7 @@ class CvodeStepper:
         atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
         self.solver = CVODE(
             self._rhs(),
-            jacfn=self._jacobian(),
+            jacfn=self._jacobian() if method == "BDF" else None,
             method=method,
             rtol=tolerances.rtol,
             atol=atol,
