@@ -36,4 +36,4 @@ def test_a_function_is_not_hidden_by_the_module_of_its_name() -> None:
 
 def test_unknown_name() -> None:
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
-        hybridsim.simulat  # noqa: B018
+        hybridsim.simulat  # noqa: B018  # reading it is the test

@@ -163,6 +163,9 @@ class Leaper:
             last = int(ends[i])
             record.segments.append(self._segment(i, first, last))
             record.counters.steps += last - first
+            record.counters.rhs_evaluations += 2 * (
+                last - first
+            )  # one series a step, and the check at its end
             record.counters.restarts += 1
             first = last
             if fires[i] < 0:

@@ -92,6 +92,7 @@ class NativeStepper:
         def event(s: float, x: np.ndarray) -> float:
             return float(self.flow.monitors(np.array([s]), x[None, :])[0, number])
 
+        # as for guards: attributes that a function does not have by its type
         event.terminal = monitor.action != "record"  # type: ignore[attr-defined]
         event.direction = _DIRECTIONS[monitor.direction]  # type: ignore[attr-defined]
         return event
