@@ -1,0 +1,346 @@
+"""The march of a fixed-step method: steps by the kernel, declared events, and decisions at the zones it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybridsim.engine.accumulation import Accumulation
+from hybridsim.engine.fixed_dense import StepDense
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.settle import Settling, Situation
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.engine.timetable import Appointment, Timetable
+from hybridsim.engine.trajectory import Occurrence, Segment, Task, Trajectory
+from hybridsim.integrators.rk4_kernels import (
+    BOUND,
+    FULL,
+    MONITOR,
+    NOT_FINITE,
+    SIGN,
+    rk4_step,
+    run_steps,
+    workspace,
+)
+
+_ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """What both methods hand to the kernel."""
+
+    step: float
+    rule: int
+    every_stage: bool
+    dichotomy: bool
+    zeroed: bool
+    located: bool
+    rest_of_step: bool
+    eps: float
+    halvings: int
+
+
+class FixedStepRun:
+    """One run with fixed steps: surface components by the zone rule in the kernel, everything else settled here."""
+
+    def __init__(
+        self, system: System, task: Task, settings: FixedStep, progress: Callable[[float], None] | None
+    ) -> None:
+        self.system, self.task, self.settings, self.progress = system, task, settings, progress
+        self.record = Trajectory()
+        self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.timetable = Timetable(system, self.end)
+        self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
+        self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
+        self.table = np.array(
+            [
+                (c, a.above, a.below, a.hold, *(a.guards[a.hold][:2]))
+                for c, a in enumerate(system.automata)
+                if a.has_surface
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 6)
+        names = ("flow", "surfaces", "guards", "monitors", "project")
+        self.addresses = tuple(system.address(n) for n in names)
+        self.counts = np.zeros(3, dtype=np.int64)
+        located = settings.step * 2.0**-settings.halvings  # how well an event is located
+        self.accumulation = Accumulation(located, 4.0 * located)
+        self.scale = np.abs(self.x)  # largest size of each state lately: what rounding is relative to
+        self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
+        self.law = (settings.rule, settings.every_stage, settings.eps)
+        self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
+
+    def run(self) -> Trajectory:
+        """Step to the end; what was computed is kept in any case."""
+        record = self.record
+        try:
+            self._run()
+            record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
+        except KeyboardInterrupt:
+            record.status = "interrupted"
+            record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
+        record.counters.rhs_evaluations, record.counters.guard_evaluations = (
+            int(self.counts[0]),
+            int(self.counts[1]),
+        )
+        return record
+
+    def _run(self) -> None:
+        due = self.timetable.due_at_start(self.origin)
+        self.timetable.kept(self.origin)
+        if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
+            return
+        while self.origin != self.end:
+            appointment = self.timetable.next(self.origin, forward=True)
+            if self._stretch(appointment, appointment.instant if appointment else self.end):
+                return
+            if self.progress:
+                self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
+
+    def _vector(self) -> np.ndarray:
+        p = self.system.vector(self.origin, self.discrete)
+        p[self.system.layout.pin_at] = 1.0 if self.settings.zeroed else 0.0
+        return p
+
+    def _stretch(self, appointment: Appointment | None, target: Instant) -> bool:
+        """One call of the kernel and what ends it; True where the run stops."""
+        system, set_ = self.system, self.settings
+        p, bound = self._vector(), target.minus(self.origin)
+        times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
+        modes = np.empty((_ROWS, len(self.z)), dtype=np.int64)
+        numbers = (
+            system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
+        )
+        flags = (set_.dichotomy, set_.zeroed, set_.located, set_.rest_of_step)
+        start_z = self.z.copy()
+        count, why = run_steps(
+            self.addresses,
+            (set_.step, set_.halvings),
+            self.law,
+            flags,
+            self.table,
+            numbers,
+            bound,
+            p,
+            self.x,
+            self.z,
+            self.fresh,
+            times,
+            states,
+            modes,
+            self.work,
+            self.counts,
+        )
+        self.fresh[:] = False
+        self.scale = np.abs(states[:count]).max(axis=0)
+        self._keep(p, times[:count], states[:count], modes[:count], start_z)
+        s, x = float(times[count - 1]), states[count - 1]
+        self.x, self.z = x.copy(), modes[count - 1].copy()
+        instant = target if why == BOUND else self.origin.plus(s)
+        if why == NOT_FINITE:
+            self.record.status = "step-failure"
+            self.record.message = (
+                f"after t = {float(instant)!r}: the state or a guard is not a number after one step"
+            )
+            return True
+        if why == FULL:
+            self.origin = instant
+            return False
+        if why == BOUND:
+            self.origin = instant
+            schedules = appointment.schedules if appointment else ()
+            self.timetable.kept(instant)
+            at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
+            return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
+        return self._declared_event(s, p, why)
+
+    # -- events of guards and monitors beside the surfaces --------------------------------------------------
+
+    def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
+        """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
+        set_, x, z = self.settings, self.x, self.z
+        watched = self._watched()
+        before = self._monitors(s, x, p)
+        low, high, best = 0.0, set_.step, x
+        for _ in range(set_.halvings):
+            tau = 0.5 * (low + high)
+            trial = self._trial(s, tau, p)
+            if why == MONITOR:
+                after = self._monitors(s + tau, trial, p)
+                beyond = bool(((before != 0.0) & ((before > 0.0) != (after > 0.0))).any())
+            else:
+                guards = self._guards(s + tau, trial, p)
+                beyond = bool((guards[watched] < 0.0).any())
+            if beyond:
+                high = tau
+            else:
+                low = tau
+        tau = high
+        best = self._trial(s, tau, p)
+        self._keep(p, np.array([s, s + tau]), np.array([x, best]), np.array([z, z]), z)
+        instant = self.origin.plus(s + tau)
+        if why == MONITOR:
+            self.x, self.origin = best, instant
+            after = self._monitors(s + tau, best, p)
+            crossed = np.flatnonzero((before != 0.0) & ((before > 0.0) != (after > 0.0)))
+            self.fresh[crossed] = True
+            return self._monitor_events(instant, crossed, np.where(after > 0.0, 1, -1), best)
+        first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
+        self.x = best
+        fired = sorted((g for g in watched if last[g] < 0.0), key=lambda g: first[g] / (first[g] - last[g]))
+        return self._settle(instant, tuple(fired), (), best)
+
+    def _watched(self) -> list[int]:
+        """Guards of the components without a surface, in their present modes."""
+        if not self.declared:
+            return []
+        return [int(g) for g in self.system.guards_of(self.z)[self.declared].ravel() if g >= 0]
+
+    def _guards(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return self.system.rows("guards", self.system.guard_count, np.array([s]), x[None, :], p, self.z)[0]
+
+    def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
+        out = np.empty(self.system.n)
+        rk4_step(self.addresses, self.law, self.table, s, tau, self.x, p, self.z, out, self.work)
+        self.counts[0] += 4
+        return out
+
+    def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return self.system.rows(
+            "monitors", len(self.system.monitor_names), np.array([s]), x[None, :], p, self.z
+        )[0]
+
+    def _monitor_events(
+        self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray
+    ) -> bool:
+        stop = False
+        for k in crossed:
+            monitor = self.system.model.monitors[k]
+            if {"up": 1, "down": -1, "both": directions[k]}[monitor.direction] != directions[k]:
+                continue
+            occurrence = Occurrence(instant, "monitor", monitor.name, "", "", "", int(directions[k]), x, x)
+            self.record.occurrences.append(occurrence)
+            if monitor.action == "reset":
+                stop = self._settle(instant, (), (), x, monitors=(int(k),)) or stop
+            elif monitor.action == "terminate":
+                self.record.status = "terminated"
+                self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
+                stop = True
+        return stop
+
+    def _settle(
+        self,
+        instant: Instant,
+        fired: tuple[int, ...],
+        schedules: tuple[int, ...],
+        x_minus: np.ndarray,
+        monitors: tuple[int, ...] = (),
+        starting: bool = False,
+    ) -> bool:
+        """Transitions and resets by the event contract, for all components but those with a surface."""
+        system, record = self.system, self.record
+        self.origin = instant
+        p = self._vector()
+        before = np.where(starting, self.task.z0, self.z)
+        sides = np.sign(self._monitors(0.0, self.x, p))
+        # what was located lies within the last halving of a step
+        s_error = self.settings.step * 2.0**-self.settings.halvings if fired or monitors else 0.0
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale) + s_error * np.abs(
+            system.flow(0.0, self.x, p, self.z)
+        )
+        at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
+        resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
+        resets += [("monitor", k) for k in monitors]
+        outcome = Settling(system, at, before, forward=True, scope=self.declared).run(fired, resets)
+        self.x, self.z, self.discrete = outcome.x, outcome.z, system.discrete(outcome.p).copy()
+        for change in outcome.changes:
+            automaton = system.automata[change.component]
+            source, target = automaton.modes[change.source], automaton.modes[change.target]
+            record.occurrences.append(
+                Occurrence(
+                    instant,
+                    "transition",
+                    automaton.name,
+                    change.guard,
+                    source,
+                    target,
+                    -1,
+                    x_minus,
+                    outcome.x,
+                )
+            )
+            record.counters.events += 1
+        for k in schedules:
+            schedule = system.model.schedules[k]
+            record.occurrences.append(
+                Occurrence(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
+            )
+            if schedule.terminate:
+                record.status, record.message = (
+                    "terminated",
+                    f"ended by {schedule.name} at t = {float(instant)!r}",
+                )
+        self._crossed_in_jump(instant, sides, np.sign(self._monitors(0.0, self.x, self._vector())), monitors)
+        if outcome.status:
+            record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+        limit = self.accumulation.limit(instant) if outcome.changes else None
+        if limit is not None:
+            record.status = "accumulation"
+            record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+        return record.status != "finished"
+
+    def _crossed_in_jump(
+        self, instant: Instant, before: np.ndarray, after: np.ndarray, handled: tuple[int, ...]
+    ) -> None:
+        """Record the monitors that a reset carried to their other side."""
+        crossed = [k for k in np.flatnonzero(before * after < 0.0) if k not in handled]
+        self._monitor_events(instant, np.array(crossed, dtype=np.int64), after.astype(np.int64), self.x)
+
+    # -- the record -----------------------------------------------------------------------------------------
+
+    def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
+        """Segments of constant modes out of the rows of one stretch, and the mode changes between them."""
+        record = self.record
+        record.counters.steps += len(s) - 1
+        if self.settings.rule == SIGN:
+            self._side_of_zeros(z)
+        changed = np.flatnonzero((z[1:] != z[:-1]).any(axis=1)) + 1
+        if len(record.segments) and (z[0] != before).any():
+            self._changes(s[0], before, z[0], x[0])
+        for first, last in zip([0, *changed], [*changed, len(s) - 1], strict=True):
+            if last > first:
+                rows = slice(first, last + 1)
+                dense = StepDense(self.system, p, z[first].copy(), s[rows].copy(), x[rows].copy())
+                record.segments.append(Segment(self.origin, dense.z, p, dense.s, dense.x, dense))
+        for k in changed:
+            self._changes(s[k], z[k - 1], z[k], x[k])
+
+    def _side_of_zeros(self, z: np.ndarray) -> None:
+        """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
+        for c, _, _, hold, *_ in self.table:
+            for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
+                z[k, c] = z[k + 1, c]
+            if z[-1, c] == hold and len(z) > 1:
+                z[-1, c] = z[-2, c]
+
+    def _changes(self, s: float, source: np.ndarray, target: np.ndarray, x: np.ndarray) -> None:
+        for c in np.flatnonzero(source != target):
+            automaton = self.system.automata[c]
+            self.record.counters.events += 1
+            self.record.occurrences.append(
+                Occurrence(
+                    self.origin.plus(float(s)),
+                    "transition",
+                    automaton.name,
+                    "",
+                    automaton.modes[source[c]],
+                    automaton.modes[target[c]],
+                    -1,
+                    x,
+                    x,
+                )
+            )
