@@ -11,10 +11,9 @@ from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.leaper import Leaper
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Outcome, Settling, Situation
-from hybridsim.engine.stepping import Method, StepFailure, Watch
+from hybridsim.engine.stepping import Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
@@ -50,12 +49,12 @@ class ModeLoop:
             span = task.t1 - task.t0
             self.progress = lambda instant: progress((float(instant) - task.t0) / span)
 
-    def _leaper(self) -> Leaper | None:
+    def _leaper(self) -> Leaps | None:
         """The compiled loop, where method and model allow it."""
         model = self.system.model
         if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors or model.inputs:
             return None
-        return Leaper(self.system, self.task.tolerances, self.renewal)
+        return self.method.leaper(self.system, self.task.tolerances, self.renewal)
 
     def run(self) -> Trajectory:
         """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
@@ -105,7 +104,7 @@ class ModeLoop:
             stop = self._settle(instant, arrival, appointment if at_target else None, segment)
             step_size = segment.last_step if self.outcome.continuous else None
 
-    def _leap(self, leaper: Leaper, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
+    def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
         """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
         done = len(self.record.occurrences)
         origin, outcome, arrived = leaper.leap(self.origin, self.outcome, self.p, target, self.record)

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.system import System
+
+if TYPE_CHECKING:
+    from hybridsim.engine.settle import Outcome
+    from hybridsim.engine.timepair import Instant
+    from hybridsim.engine.trajectory import Trajectory
 
 Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
 
@@ -150,6 +155,15 @@ class Stepper(Protocol):
         """The step anew from its start to s exactly: the method's own accuracy at an event time."""
 
 
+class Leaps(Protocol):
+    """A compiled mode loop of one run: whole segments and their ordinary events at once."""
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> tuple[Instant, Outcome, bool]:
+        """As far as ordinary events go: the new origin, the state there, and whether it is the target."""
+
+
 class Method(Protocol):
     """What the mode loop uses of an integrator."""
 
@@ -159,7 +173,10 @@ class Method(Protocol):
 
     @property
     def leaps(self) -> bool:
-        """Whether the compiled loop takes its steps where it can."""
+        """Whether it has a compiled loop."""
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
+        """Its compiled loop for one run, no segment longer than `longest`; None where this model rules it out."""
 
     def start(
         self,

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.loop import ModeLoop
-from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import Flow, Leaps, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 
@@ -62,7 +62,7 @@ class Integrator(ABC):
     when: ClassVar[str]
     lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
     dense_is_accurate: ClassVar[bool] = False
-    leaps: ClassVar[bool] = False  # whether the engine's compiled loop takes this method's steps where it can
+    leaps: ClassVar[bool] = False  # whether it has a compiled loop, which leaper() gives
 
     def prepare(self, system: System) -> None:
         """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
@@ -79,6 +79,10 @@ class Integrator(ABC):
     ) -> Stepper:
         """Begin a smooth segment."""
         raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
+        """The compiled loop of this method for one run; None where the model rules it out."""
+        return None
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task; by default step by step through the engine's mode loop."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.leaper import compile_leaps
+from hybridsim.engine.leaper import Leaper, compile_leaps
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
@@ -115,6 +115,10 @@ class Taylor(Integrator):
     def prepare(self, system: System) -> None:
         """The compiled mode loop."""
         compile_leaps(system)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaper:
+        """The compiled mode loop."""
+        return Leaper(system, tolerances, longest)
 
     def start(
         self,
