@@ -325,7 +325,7 @@ class Emitter:
         return found | {
             "parts": tuple(parts),
             "registers": builder.count,
-            "constants": tuple((r, v) for v, r in builder.constants.items()),
+            "constants": tuple((r, *value) for value, r in builder.constants.items()),
             "parameters": tuple((r, int(w[2:-1])) for r, w in sources.items() if w.startswith("p[")),
         }
 

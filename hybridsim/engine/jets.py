@@ -330,14 +330,14 @@ def run_series(
 ) -> None:
     """Set the inputs of a lean tape and run it to the order that V and E have room for.
 
-    inputs: registers of constants and their values, of parameters and where in p they stand, of phases, of time
-    (-1: none), of states. derivatives: registers of the states' rates.
+    inputs: registers of constants, their values and error bounds (m, 2), registers of parameters and where in p they
+    stand, of phases, of time (-1: none), of states. derivatives: registers of the states' rates.
     """
     constants, values, parameters, sources, phases, time, states = inputs
     V[:] = 0.0
     E[:] = 0.0
     for i in range(constants.shape[0]):
-        V[constants[i], 0] = values[i]
+        V[constants[i], 0], E[constants[i], 0] = values[i, 0], values[i, 1]
     for i in range(parameters.shape[0]):
         V[parameters[i], 0] = p[sources[i]]
     for i in range(phases.shape[0]):

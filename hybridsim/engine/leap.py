@@ -42,7 +42,7 @@ def load(
 ) -> None:
     """Constants of a segment into their registers."""
     for i in range(constants.shape[0]):
-        V[constants[i], 0] = values[i]
+        V[constants[i], 0] = values[i, 0]
     for i in range(parameters.shape[0]):
         V[parameters[i], 0] = p[sources[i]]
     advance(tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]], V, 0)

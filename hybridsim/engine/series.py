@@ -36,7 +36,7 @@ class SeriesRun:
         self.rtol, self.atol = max(tolerances.rtol, _TIGHTEST), tolerances.atol
         self.order = series_order(self.rtol, system.is_linear)
         self.V = np.zeros((tape["registers"], self.order + 1))
-        for register, value in tape["constants"]:
+        for register, value, _ in tape["constants"]:
             self.V[register, 0] = value
         for register, source in tape["parameters"]:
             self.V[register, 0] = p[source]

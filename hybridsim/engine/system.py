@@ -47,8 +47,8 @@ class _Registers:
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
         self.count: int = tape["registers"]
         time: int = tape["time"]
-        constants = np.array([r for r, _ in tape["constants"]], dtype=np.int64)
-        values = np.array([v for _, v in tape["constants"]])
+        constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
+        values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)
         parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
         sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
         is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)

@@ -6,6 +6,7 @@ generated source, and run by `hybridsim.engine.jets` to get Taylor coefficients 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +16,7 @@ SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, 
 # how INTEGRAL finds its own leading coefficient from the argument c
 LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
+_UNIT = 2.0**-53  # unit roundoff of a double
 # Twelve squarings; exp(n log u), which has no value for u < 0, only beyond
 _MAX_INTEGER_POWER = 4096
 
@@ -24,7 +26,7 @@ class TapeBuilder:
 
     def __init__(self) -> None:
         self.registers: dict[str, int] = {}  # name -> register
-        self.constants: dict[float, int] = {}  # value -> register
+        self.constants: dict[tuple[float, float], int] = {}  # value and bound of its error -> register
         self.count = 0
 
     def register(self, name: str) -> int:
@@ -45,10 +47,10 @@ class TapeBuilder:
         self.count += 1
         return self.count - 1
 
-    def _constant(self, value: float) -> int:
-        if value not in self.constants:
-            self.constants[value] = self._new()
-        return self.constants[value]
+    def _constant(self, value: float, error: float = 0.0) -> int:
+        if (value, error) not in self.constants:
+            self.constants[value, error] = self._new()
+        return self.constants[value, error]
 
     def _op(self, rows: list[tuple[int, ...]], op: int, a: int, b: int = 0, c: int = 0) -> int:
         out = self._new()
@@ -71,7 +73,9 @@ class TapeBuilder:
         if e is sp.true or e is sp.false:
             return self._constant(1.0 if e is sp.true else 0.0)
         if e.is_number and not e.has(sp.Function):
-            return self._constant(float(e))
+            value = float(e)
+            is_exact = e.is_Float or (e.is_Rational and math.isfinite(value) and sp.Rational(value) == e)
+            return self._constant(value, 0.0 if is_exact else _UNIT * abs(value))
         if e.is_Add or e.is_Mul:
             return self._emit_chain(e, known, rows)
         if e.is_Pow:

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -79,6 +79,15 @@ def test_interruption(hybridsim: Callable, monkeypatch: pytest.MonkeyPatch) -> N
     assert "interrupted" in err and "nothing was written" in err
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Ctrl-C as on a terminal: a shell that runs the tests in the background has it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_interruption_that_comes_out_as_another_error(
     hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

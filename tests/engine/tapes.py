@@ -56,8 +56,8 @@ def series(text: str, at: Point, x_error: float = 0.0, s_error: float = 0.0) -> 
     rows = np.array(builder.rows(assignments, {}), dtype=np.int64)
     place = {n: builder.register(n) for n in (*NAMES, *flow, "g")}
     V, E = np.zeros((builder.count, ORDER + 1)), np.zeros((builder.count, ORDER + 1))
-    for value, register in builder.constants.items():
-        V[register, 0] = value
+    for (value, error), register in builder.constants.items():
+        V[register, 0], E[register, 0] = value, error
     for name in NAMES:
         V[place[name], 0] = getattr(at, name)
     for name in STATES:

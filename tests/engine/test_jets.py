@@ -130,6 +130,12 @@ def ratios(text: str, at: Point) -> list[float]:
     return result
 
 
+def test_a_constant_that_is_no_double_has_a_bound() -> None:
+    at = Point(x=0.1, y=0.2, u=0.3, v=0.4, t=0.5, a=0.6, b=0.7, c=0.8)
+    for text in ("cos(atan(2))", "sqrt(2)", "1/3"):
+        ratios(text, at)
+
+
 @given(st.integers(0, 2**32))
 @settings(max_examples=150)
 def test_the_bound_holds_for_random_expressions(seed: int) -> None:
