@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from hybridsim.engine.chain import SegmentChain
+    from hybridsim.engine.pieces import Segment
     from hybridsim.engine.system import System
-    from hybridsim.engine.trajectory import Segment, Trajectory
+    from hybridsim.engine.trajectory import Trajectory
     from hybridsim.model import Model
 
 _GOOD = ("finished", "terminated")
@@ -109,21 +111,24 @@ class Solution:
                 return self._grid[:0]
             low, high = sorted((self.t_start, self.t_end))
             return self._grid[(self._grid >= low) & (self._grid <= high)]
-        parts = [segment.origin.high + (segment.s + segment.origin.low) for segment in self._segments]
-        for part, end in zip(parts, self._ends, strict=True):
-            part[-1] = end  # its local time is rounded
-        return np.concatenate(parts) if parts else np.zeros(0)
+        index, s, _ = self._knots
+        times = self._origins[index, 0] + (s + self._origins[index, 1])
+        times[np.cumsum(np.bincount(index, minlength=len(self._starts))) - 1] = (
+            self._ends
+        )  # s is rounded there
+        return times
 
     @cached_property
     def y(self) -> np.ndarray:
         """States (n, m) at the times t."""
-        if self._grid is not None:
-            return self(self.t)
-        parts = [segment.x for segment in self._segments]
-        return np.concatenate(parts).T if parts else np.zeros((self._system.n, 0))
+        return self(self.t) if self._grid is not None else self._knots[2].T
+
+    @cached_property
+    def _knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._segments.knots()
 
     @property
-    def _segments(self) -> list[Segment]:
+    def _segments(self) -> SegmentChain:
         return self._trajectory.segments
 
     @property
@@ -142,10 +147,8 @@ class Solution:
         side "+" is right-continuous, as x+ at an event; "-" gives x-.
         """
         times = np.atleast_1d(np.asarray(t, dtype=float))
-        out = np.empty((len(times), self._system.n))
-        for segment, chosen, s in self._pieces(times, side):
-            out[chosen] = self._states(segment, s)
-        return out[0] if np.ndim(t) == 0 else out.T
+        x = self._segments.states(*self._places(times, side))
+        return x[0] if np.ndim(t) == 0 else x.T
 
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
         """A named quantity over time: a state, an output, an input, a definition, a variable of a mode such as a force.
@@ -168,8 +171,9 @@ class Solution:
         given = self.t if t is None else t
         times = np.atleast_1d(np.asarray(given, dtype=float))
         out = np.empty(len(times))
-        for segment, chosen, s in self._pieces(times, side):
-            out[chosen] = self._quantity(name, segment, s, self._states(segment, s))
+        x, pieces = self._pieces(times, side)
+        for segment, chosen, s in pieces:
+            out[chosen] = self._quantity(name, segment, s, x[chosen])
         return out[0] if np.ndim(given) == 0 else out
 
     def _quantity(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -197,27 +201,28 @@ class Solution:
             found.append(values[:, known.index(special[-1] if special else name)])
         return found
 
-    def _states(self, segment: Segment, s: np.ndarray) -> np.ndarray:
-        x = np.ascontiguousarray(segment.dense(s), dtype=float)
-        at_knot = np.searchsorted(segment.s, s) if segment.s[-1] >= segment.s[0] else None
-        if at_knot is not None:
-            same = segment.s[np.minimum(at_knot, len(segment.s) - 1)] == s
-            x[same] = segment.x[at_knot[same]]
-        if self._system.pins:
-            x = self._system.rows("project", self._system.n, s, x, segment.p, segment.z)
-        return x
+    @cached_property
+    def _origins(self) -> np.ndarray:
+        return self._segments.origins()
+
+    @cached_property
+    def _spans(self) -> np.ndarray:
+        return self._segments.spans()
 
     @cached_property
     def _starts(self) -> np.ndarray:
-        return np.array([float(segment.start) for segment in self._segments])
+        (high, low), s = self._origins.T, self._spans[:, 0]
+        total = high + s
+        moved = total - high
+        return total + (((high - (total - moved)) + (s - moved)) + low)
 
     @property
-    def _ends(self) -> list[float]:
+    def _ends(self) -> np.ndarray:
         """Where each segment ends: to the last bit where the next begins."""
-        return [*self._starts[1:].tolist(), self.t_end] if self._segments else []
+        return np.append(self._starts[1:], self.t_end) if self._segments else self._starts
 
-    def _pieces(self, times: np.ndarray, side: str) -> list[tuple[Segment, np.ndarray, np.ndarray]]:
-        """(segment, indices of the times in it, their local times)."""
+    def _places(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the segment that holds each time, and its local time there."""
         if side not in ("+", "-"):
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
         if not self._segments:
@@ -230,52 +235,46 @@ class Solution:
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)
         index = np.searchsorted(sign * self._starts, sign * times, side="right" if later else "left") - 1
-        index = np.clip(index, 0, len(self._segments) - 1)
-        result = []
-        for i in np.unique(index):
-            segment, chosen = self._segments[i], np.flatnonzero(index == i)
-            s = (times[chosen] - segment.origin.high) - segment.origin.low
-            low_s, high_s = sorted((segment.s[0], segment.s[-1]))
-            result.append((segment, chosen, np.clip(s, low_s, high_s)))
-        return result
+        index = np.maximum(index, 0)
+        s = (times - self._origins[index, 0]) - self._origins[index, 1]
+        spans = self._spans[index]
+        return index, np.clip(s, spans.min(axis=1), spans.max(axis=1))
+
+    def _pieces(
+        self, times: np.ndarray, side: str
+    ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
+        """States (k, n) at some times, and (segment, indices of the times in it, their local times) for each."""
+        index, s = self._places(times, side)
+        parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
+        pieces = [(self._segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
+        return self._segments.states(index, s), pieces
 
     # -- events and modes -----------------------------------------------------------------------------------
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """All events in order of time: transitions, monitors, scheduled events, near-grazings."""
-        return tuple(
-            Event(
-                float(o.instant),
-                o.kind,
-                o.component,
-                o.guard,
-                o.source,
-                o.target,
-                o.direction,
-                o.x_minus,
-                o.x_plus,
-            )
-            for o in self._trajectory.occurrences
-        )
+        return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
-        return np.array([e.t for e in self.events if e.component == component and kind in (None, e.kind)])
+        blocks = self._trajectory.occurrences.blocks
+        return np.concatenate(
+            [np.empty(0), *(block.times[block.chosen(component, kind)] for block in blocks)]
+        )
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
         """For each component its modes in order, with the stretch of time of each."""
+        numbers, ends = self._segments.modes(), self._ends
         result = {}
         for c, automaton in enumerate(self._system.automata):
-            runs: list[ModeInterval] = []
-            for segment, start, end in zip(self._segments, self._starts.tolist(), self._ends, strict=True):
-                mode = automaton.modes[segment.z[c]]
-                if runs and runs[-1].mode == mode:
-                    runs[-1] = ModeInterval(mode, runs[-1].t0, end)
-                else:
-                    runs.append(ModeInterval(mode, start, end))
-            result[automaton.name] = tuple(runs)
+            changed = np.flatnonzero(np.diff(numbers[:, c])) + 1
+            first = np.concatenate([[0], changed]) if len(numbers) else changed
+            last = np.append(changed, len(numbers))[: len(first)] - 1
+            names = [automaton.modes[m] for m in numbers[first, c].tolist()]
+            stretches = zip(names, self._starts[first].tolist(), ends[last].tolist(), strict=True)
+            result[automaton.name] = tuple(ModeInterval(*stretch) for stretch in stretches)
         return result
 
     # -- how it went ----------------------------------------------------------------------------------------
@@ -347,19 +346,20 @@ class Solution:
         model, own_steps = self.model, points is None and self._grid is None
         if own_steps:
             t, ends = self.t, np.cumsum([len(g.s) for g in self._segments], dtype=int)
+            x = self.y.T
             pieces = [
                 (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(self._segments, ends, strict=True)
             ]
         else:
             t = self.t if points is None else np.linspace(self.t_start, self.t_end, points)
-            pieces = self._pieces(t, "+") if len(t) else []
+            x, pieces = self._pieces(t, "+") if len(t) else (np.zeros((0, len(self.names))), [])
         names = [d.name for d in model.discrete]
         names += [q for q in self._system.quantities if " in " not in q]
         columns = {name: np.empty(len(t)) for name in (*self.names, *names)}
         numbers = np.empty((len(self._system.automata), len(t)), dtype=np.int64)
         for segment, chosen, s in pieces:
-            x = segment.x if own_steps else self._states(segment, s)
-            for name, values in zip(columns, (*x.T, *self._quantities(names, segment, s, x)), strict=True):
+            found = self._quantities(names, segment, s, x[chosen])
+            for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
                 columns[name][chosen] = values
             numbers[:, chosen] = segment.z[:, None]
         return Table(

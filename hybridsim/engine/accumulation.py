@@ -6,6 +6,8 @@ import math
 from collections import deque
 from itertools import pairwise
 
+import numpy as np
+
 from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
@@ -36,6 +38,31 @@ class Accumulation:
         return factor < 1.0 - _SAME_FACTOR and all(
             abs(f - factor) <= 2.0 * _SAME_FACTOR * factor for f in factors
         )
+
+    def limit_of_all(self, instants: np.ndarray) -> float | None:
+        """Note events (E, 2) in a row; the limit time as soon as there is one, else None."""
+        if len(instants) <= _TERMS:
+            return self._one_by_one(instants)
+        if self.last is None:
+            self.last, instants = Instant(*instants[0].tolist()), instants[1:]
+        times = np.concatenate([[self.last], instants])
+        steps = times[1:] - times[:-1]
+        gaps = np.concatenate([self.intervals, np.abs(steps[:, 0] + steps[:, 1])])
+        shortest = max(self.shortest, _ULPS * float(np.spacing(np.max(np.abs(times[:, 0])))))
+        grows = np.flatnonzero((gaps[1:] >= gaps[:-1]) & (gaps[1:] > shortest))
+        falls = np.diff(np.concatenate([[-1], grows, [len(gaps) - 1]])) - 1
+        if falls.max() >= _TERMS:  # so many in a row are worth a closer look
+            return self._one_by_one(instants)
+        self.intervals.extend(gaps[-_TERMS - 1 :].tolist())
+        self.last = Instant(*instants[-1].tolist())
+        return None
+
+    def _one_by_one(self, instants: np.ndarray) -> float | None:
+        for high, low in instants.tolist():
+            limit = self.limit(Instant(high, low))
+            if limit is not None:
+                return limit
+        return None
 
     def limit(self, instant: Instant) -> float | None:
         """Note an event; the limit time once the rest of the series is below the resolution, else None."""

@@ -3,43 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.leap import AT_TARGET, FULL, leap
-from hybridsim.engine.mode_tables import TapeShelf, automata_of
+from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.series import series_order
+from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.settle import Outcome
-from hybridsim.engine.stepping import Tolerances
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
-from hybridsim.engine.taylor import polynomials
 from hybridsim.engine.timepair import Instant
-from hybridsim.engine.trajectory import Occurrence, Segment, Trajectory
+from hybridsim.engine.trajectory import Trajectory
 
 _STEPS, _SEGMENTS = 4096, 1024  # room for one call
+_ROOM, _FEWEST = (
+    1 << 19,
+    64,
+)  # doubles for the series of one call, as far as that leaves room for so many steps
+_FROM_NOTHING = np.zeros(1, dtype=np.int64)
 _TIGHTEST = 1e-15
-
-
-@dataclass(frozen=True)
-class SeriesPieces:
-    """Dense output made of one Taylor series for each step: knots (m + 1,), coefficients (m, n, order + 1)."""
-
-    knots: np.ndarray
-    coefficients: np.ndarray
-
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
-        s = np.asarray(s, dtype=float)
-        index = np.searchsorted(self.knots[1:-1], s, side="right")
-        out = np.empty((len(s), self.coefficients.shape[1]))
-        for i in np.unique(index):
-            chosen = np.flatnonzero(index == i)
-            part = np.empty((len(chosen), out.shape[1]))
-            polynomials(self.coefficients[i], s[chosen] - self.knots[i], part)
-            out[chosen] = part
-        return out
 
 
 _compiled: list[bool] = []
@@ -67,7 +52,7 @@ def compile_leaps(system: System) -> None:
         np.zeros(guards),
         np.zeros(0),
     )
-    leaper.leap(nowhere, still, p, nowhere, Trajectory())
+    leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
     _compiled.append(True)
 
 
@@ -80,8 +65,8 @@ class Leaper:
         rtol = max(tolerances.rtol, _TIGHTEST)
         order = series_order(rtol, system.is_linear)
         registers = system.registers
-        self.shelf = TapeShelf(system)
-        self.functions, self.automata = functions_of(system), automata_of(system)
+        self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.functions = functions_of(system)
         self.inputs = registers.inputs
         self.places = (
             np.asarray(system.rates),
@@ -106,23 +91,30 @@ class Leaper:
             np.empty(guards, dtype=np.int64),
             np.empty(guards),
         )
+        self.order = order
+        self._renew()
+
+    def _renew(self) -> None:
+        """Fresh arrays to write to; blocks that were committed go on using the former ones."""
+        n, count = self.system.n, len(self.system.automata)
+        steps = min(max(_ROOM // (n * (self.order + 1)), _FEWEST), _STEPS)
+        self.used = (0, 0)  # steps and segments
         self.record = (
-            np.empty((_STEPS, 2)),
-            np.empty((_STEPS, n, order + 1)),
+            np.empty((steps, 2)),
+            np.empty((steps, n, self.order + 1)),
             np.empty(_SEGMENTS, dtype=np.int64),
             np.empty((_SEGMENTS, 2)),
             np.empty((_SEGMENTS, count), dtype=np.int64),
-            np.empty((_SEGMENTS, layout.size)),
+            np.empty((_SEGMENTS, self.system.layout.size)),
             np.empty(_SEGMENTS, dtype=np.int64),
             np.empty((_SEGMENTS, 2, n)),
         )
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> tuple[Instant, Outcome, bool]:
-        """As far as ordinary events go: the new origin, the state there, and whether it is the target."""
-        self.shelf.add(outcome.z)
-        self._shelve_neighbours(outcome.z)
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        self.shelf.surround(outcome.z)
         clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
         state = (
             outcome.x.copy(),
@@ -133,85 +125,60 @@ class Leaper:
             outcome.orders.copy(),
             outcome.guard_floors.copy(),
         )
+        instants = []
         while True:
-            code, _, count = leap(
+            rows = tuple(part[u:] for part, u in zip(self.record, self._offsets(), strict=True))
+            code, steps, count = leap(
                 self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
-                to, clock, state, self.work, self.room, self.record,
+                to, clock, state, self.work, self.room, rows,
             )  # fmt: skip
-            self._commit(count, state[2], clock, record)
+            instants.append(self._commit(rows, steps, count, state[2], clock, record))
+            is_full = code == FULL and (count > 0 or self.used != (0, 0))
+            if is_full:
+                self._renew()
             known = len(self.shelf.tapes.modes)
-            self._shelve_neighbours(state[2])
-            if not (code == FULL and count) and len(self.shelf.tapes.modes) == known:
+            self.shelf.surround(state[2])
+            if is_full or len(self.shelf.tapes.modes) == known:
                 break
         x, x_error, z, p, sides, orders, floors = state
         none = np.zeros(0, dtype=np.int64)
         after = Outcome(x, p, z, sides, orders, none, none, x_error, floors, np.zeros(0), continuous=False)
-        return Instant(float(clock[0]), float(clock[1])), after, code == AT_TARGET
+        reached = Instant(*clock.tolist())
+        end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
+        return Landing(reached, after, end, instants[0] if len(instants) == 1 else np.concatenate(instants))
 
-    def _shelve_neighbours(self, z: np.ndarray) -> None:
-        """Put the modes that one event may lead to on the shelf."""
-        for c, automaton in enumerate(self.system.automata):
-            for m in range(len(automaton.modes)):
-                other = z.copy()
-                other[c] = m
-                self.shelf.add(other)
+    def _offsets(self) -> tuple[int, ...]:
+        """Where the next call writes, in each array of the record."""
+        steps, segments = self.used
+        return (steps, steps, *(segments for _ in self.record[2:]))
 
-    def _commit(self, count: int, z_after: np.ndarray, clock: np.ndarray, record: Trajectory) -> None:
-        _, _, ends, clocks, modes, _, fires, jumps = self.record
-        first = 0
-        for i in range(count):
-            last = int(ends[i])
-            record.segments.append(self._segment(i, first, last))
-            record.counters.steps += last - first
-            record.counters.rhs_evaluations += 2 * (
-                last - first
-            )  # one series a step, and the check at its end
-            record.counters.restarts += 1
-            first = last
-            if fires[i] < 0:
-                continue
-            after = modes[i + 1] if i + 1 < count else z_after
-            at = Instant(*map(float, clocks[i + 1])) if i + 1 < count else Instant(*map(float, clock))
-            self._occur(int(fires[i]), modes[i], after, at, jumps[i], record)
-
-    def _segment(self, i: int, first: int, last: int) -> Segment:
-        steps, series, _, clocks, modes, vectors, _, jumps = self.record
-        knots = np.append(steps[first:last, 0], steps[last - 1, 0] + steps[last - 1, 1])
-        coefficients = series[first:last].copy()
-        states = np.concatenate([coefficients[:, :, 0], jumps[i, :1]])
-        p, z = vectors[i].copy(), modes[i].copy()
-        if self.system.pins:
-            states = self.system.rows("project", self.system.n, knots, states, p, z)
-        return Segment(
-            Instant(*map(float, clocks[i])), z, p, knots, states, SeriesPieces(knots, coefficients)
-        )
-
-    def _occur(
+    def _commit(
         self,
-        fired: int,
-        before: np.ndarray,
-        after: np.ndarray,
-        at: Instant,
-        x: np.ndarray,
+        rows: tuple[np.ndarray, ...],
+        steps: int,
+        count: int,
+        z_after: np.ndarray,
+        clock: np.ndarray,
         record: Trajectory,
-    ) -> None:
-        system = self.system
-        owner = int(system.owner[fired])
-        for c, automaton in enumerate(system.automata):
-            if before[c] == after[c] and not (c == owner and not automaton.has_surface):
-                continue
-            place = automaton.guards[before[c]].index(fired) if c == owner else -1
-            record.occurrences.append(
-                Occurrence(
-                    at,
-                    "transition",
-                    automaton.name,
-                    automaton.guard_names[before[c]][place] if c == owner else "",
-                    automaton.modes[before[c]],
-                    automaton.modes[after[c]],
-                    -1,
-                    x[0].copy(),
-                    x[1].copy(),
-                )
-            )
-            record.counters.events += 1
+    ) -> np.ndarray:
+        """Leave the used part of the record to the trajectory; the instants (E, 2) of its events."""
+        if not count:
+            return np.empty((0, 2))
+        lengths, series, ends, origins, modes, vectors, fired, jumps = (
+            part[: steps if k < 2 else count] for k, part in enumerate(rows)
+        )
+        self.used = (self.used[0] + steps, self.used[1] + count)
+        starts = np.concatenate([_FROM_NOTHING, ends])
+        system, counters = self.system, record.counters
+        record.segments.add(SeriesBlock(system, starts, lengths, series, origins, modes, vectors, jumps))
+        counters.steps += steps
+        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end
+        counters.restarts += count
+        events = count if fired[-1] >= 0 else count - 1
+        instants = np.concatenate([origins[1:], clock[None]])[:events]
+        if events:
+            after = np.concatenate([modes[1:], z_after[None]])[:events]
+            crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events])
+            counters.events += len(crossings)
+            record.occurrences.add(crossings)
+        return instants

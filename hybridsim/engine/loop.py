@@ -11,13 +11,14 @@ from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Outcome, Settling, Situation
-from hybridsim.engine.stepping import Leaps, Method, StepFailure, Watch
+from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
-from hybridsim.engine.trajectory import Occurrence, Task, Trajectory
+from hybridsim.engine.trajectory import Task, Trajectory
 
 # Local time rounds angles that grow in time, by 1e-13 after this many turns: a stretch without events begins anew then.
 _TURNS = 100
@@ -31,7 +32,7 @@ class ModeLoop:
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
-        self.record = Trajectory()
+        self.record = Trajectory(system)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.crossed_by_reset: dict[
@@ -106,23 +107,27 @@ class ModeLoop:
 
     def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
         """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
-        done = len(self.record.occurrences)
-        origin, outcome, arrived = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
-        self.origin, self.outcome = origin, outcome
-        if self.progress:
-            self.progress(origin)
-        for occurrence in self.record.occurrences[done:]:
-            self.adopted = occurrence.instant
-            if self._accumulated(occurrence.instant):
+        while True:
+            landing = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
+            self.origin, self.outcome = landing.origin, landing.outcome
+            arrived = landing.end == ARRIVED
+            if self.progress:
+                self.progress(self.origin)
+            if len(landing.instants):
+                self.adopted = Instant(*landing.instants[-1].tolist())
+            if not arrived or self.adopted == self.origin:
+                self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
+            if self._accumulated(landing.instants):
                 return arrived, True
+            if landing.end != PAUSED:
+                break
         if not arrived:
-            self.p = self.system.vector(origin, self.system.discrete(outcome.p), self.forward)
             return False, False
         if appointment is None:
             return True, True
         self.timetable.kept(target)
-        x = outcome.x
-        settled = self._settle_appointment(target, x, appointment.schedules, outcome.x_error)
+        x = self.outcome.x
+        settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
         return True, self._adopt(target, settled, x, appointment.schedules, ())
 
     def _segment_run(self) -> SegmentRun:
@@ -159,7 +164,7 @@ class ModeLoop:
             record.segments.append(run.segment())
         passed = [(seen.s, self._sighting(seen)) for seen in run.sightings]
         passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in run.grazings]
-        record.occurrences += [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
+        record.occurrences.extend(occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0])))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
             record.warn(f"monitor {name} is not a number on a part of the run: no crossing is seen there")
@@ -221,7 +226,7 @@ class ModeLoop:
             outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
-        return self._accumulated(instant)
+        return self._accumulated(np.array([instant]))
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
@@ -280,9 +285,9 @@ class ModeLoop:
         resets = [("schedule", k) for k in schedules]
         return Settling(system, at, z.copy(), self.forward).run((), resets)
 
-    def _accumulated(self, instant: Instant) -> bool:
-        """Whether events follow each other ever faster; then the run ends, saying where that leads."""
-        limit = self.accumulation.limit(instant)
+    def _accumulated(self, instants: np.ndarray) -> bool:
+        """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
+        limit = self.accumulation.limit_of_all(instants)
         if limit is None:
             return False
         self.record.status = "accumulation"

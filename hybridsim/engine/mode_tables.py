@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.engine.system import System
+
+_LONGEST = 256  # vectors of modes on a shelf that is shared: each event searches it from one end to the other
 
 
 class Automata(NamedTuple):
@@ -48,6 +51,16 @@ class Tapes(NamedTuple):
 
 def automata_of(system: System) -> Automata:
     """The arrays of a system's automata."""
+    return system.code.shared("automata", lambda: _automata(system))
+
+
+def shelf_of(system: System) -> TapeShelf:
+    """The shelf of all systems of one structure; a new one where it has grown too long to be searched."""
+    shelf: TapeShelf = system.code.shared("shelf", lambda: TapeShelf(system))
+    return shelf if len(shelf.tapes.modes) <= _LONGEST else TapeShelf(system)
+
+
+def _automata(system: System) -> Automata:
     automata, n = system.automata, system.n
     count = len(automata)
     modes = max((len(a.modes) for a in automata), default=1)
@@ -99,17 +112,29 @@ class TapeShelf:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self._met: list[np.ndarray] = []
+        self._met: dict[bytes, np.ndarray] = {}
+        self._surrounded: set[bytes] = set()
+        self._lock = Lock()
         self.tapes = self._stacked()
 
-    def add(self, z: np.ndarray) -> None:
-        """Put the tapes of a vector of modes on the shelf."""
-        if not any((met == z).all() for met in self._met):
-            self._met.append(z.copy())
-            self.tapes = self._stacked()
+    def surround(self, z: np.ndarray) -> None:
+        """Put the tapes of a vector of modes on the shelf, and those of the modes that one event may lead to."""
+        if z.tobytes() in self._surrounded:
+            return
+        with self._lock:
+            met = len(self._met)
+            self._met.setdefault(z.tobytes(), z.copy())
+            for c, automaton in enumerate(self.system.automata):
+                for m in range(len(automaton.modes)):
+                    other = z.copy()
+                    other[c] = m
+                    self._met.setdefault(other.tobytes(), other)
+            if len(self._met) > met:
+                self.tapes = self._stacked()
+            self._surrounded.add(z.tobytes())
 
     def _stacked(self) -> Tapes:
-        system, met = self.system, self._met
+        system, met = self.system, list(self._met.values())
         lean = [system.lean_tape(z) for z in met]
         modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
         active = [list(np.flatnonzero(system.active(z))) for z in met]

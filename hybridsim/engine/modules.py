@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,6 +36,16 @@ class Compiled:
     @cached_property
     def _kept(self) -> dict[str, tuple[Any, Any]]:
         return {}
+
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
+        return {}
+
+    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        """Something that follows from the structure alone, made once for all systems that share it."""
+        if name not in self._shared:
+            self._shared[name] = make()
+        return self._shared[name]
 
     def address(self, name: str) -> Any:
         """Address of one of flow, tangent, project, guards, surfaces, monitors, quantities; compiled on first use."""

@@ -12,6 +12,7 @@ from hybridsim.engine.backward import Entry, entries
 from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.locate import Findings, Hit, Locator, polish
+from hybridsim.engine.pieces import Pieces, Segment
 from hybridsim.engine.roots import POINTS, find_roots
 from hybridsim.engine.stepping import (
     Counters,
@@ -26,7 +27,6 @@ from hybridsim.engine.stepping import (
 )
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
-from hybridsim.engine.trajectory import Pieces, Segment
 
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
 _CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output

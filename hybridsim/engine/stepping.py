@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -155,13 +155,32 @@ class Stepper(Protocol):
         """The step anew from its start to s exactly: the method's own accuracy at an event time."""
 
 
+ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a leap ended
+
+
+class Landing(NamedTuple):
+    """Where a leap ended: the origin of the next segment, what holds there, and why it ended.
+
+    ARRIVED at its target; PAUSED for want of room, to be taken up where it ended; BEFORE_SOMETHING that is not
+    ordinary. instants (E, 2) are those of the events on the way.
+    """
+
+    origin: Instant
+    outcome: Outcome
+    end: int
+    instants: np.ndarray
+
+
 class Leaps(Protocol):
-    """A compiled mode loop of one run: whole segments and their ordinary events at once."""
+    """A compiled mode loop of one run: whole segments and their ordinary events at once.
+
+    It adds what it went over to the record as blocks (`hybridsim.engine.blocks`) and counts in its counters.
+    """
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> tuple[Instant, Outcome, bool]:
-        """As far as ordinary events go: the new origin, the state there, and whether it is the target."""
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
 
 
 class Method(Protocol):

@@ -150,6 +150,7 @@ class System:
         for c, automaton in enumerate(self.automata):
             for numbers in automaton.guards:
                 self.owner[list(numbers)] = c
+        self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
         self._registers = _Registers(data["tape"], self.layout)
         self._lean: dict[bytes, LeanTape] = {}
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)

@@ -7,83 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.stepping import Counters, Dense
+from hybridsim.engine.blocks import OccurrenceList
+from hybridsim.engine.chain import Chain, SegmentChain
+from hybridsim.engine.pieces import Occurrence, Pieces, Segment, end_point
+from hybridsim.engine.stepping import Counters
+from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
-
-@dataclass(frozen=True)
-class Segment:
-    """One piece of trajectory in one z: knots at local times s (m+1,), states x (m+1, n), dense output between."""
-
-    origin: Instant
-    z: np.ndarray
-    p: np.ndarray
-    s: np.ndarray
-    x: np.ndarray
-    dense: Dense
-
-    @property
-    def start(self) -> Instant:
-        """Where it begins."""
-        return self.origin.plus(float(self.s[0]))
-
-    @property
-    def end(self) -> Instant:
-        """Where it ends."""
-        return self.origin.plus(float(self.s[-1]))
+__all__ = ["Occurrence", "Pieces", "Segment", "Task", "Trajectory"]
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Dense output made of one interpolant for each step."""
-
-    knots: np.ndarray
-    interpolants: tuple[Dense, ...]
-
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
-        ascending = self.knots[-1] >= self.knots[0]
-        inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
-        index = np.searchsorted(inner, s if ascending else -s, side="right")
-        parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
-        first = self.interpolants[parts[0][0]](s[parts[0][1]])
-        out = np.empty((len(s), first.shape[1]))
-        out[parts[0][1]] = first
-        for i, chosen in parts[1:]:
-            out[chosen] = self.interpolants[i](s[chosen])
-        return out
-
-
-@dataclass(frozen=True)
-class Occurrence:
-    """An event as the engine records it; names are resolved by the solution."""
-
-    instant: Instant
-    kind: str  # transition, monitor, scheduled, near-grazing
-    component: str
-    guard: str
-    source: str
-    target: str
-    direction: int
-    x_minus: np.ndarray
-    x_plus: np.ndarray
-
-
-def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
-    """A segment of no length: the state after an event with which a run ends."""
-    return Segment(origin, z, p, np.zeros(1), x[None, :].copy(), lambda s: np.tile(x, (len(s), 1)))
-
-
-@dataclass
 class Trajectory:
-    """The record of a run."""
+    """The record of a run.
 
-    segments: list[Segment] = field(default_factory=list)
-    occurrences: list[Occurrence] = field(default_factory=list)
-    counters: Counters = field(default_factory=Counters)
-    status: str = "finished"
-    message: str = ""
-    warnings: dict[str, int] = field(default_factory=dict)  # message -> how often
+    segments and occurrences are sequences of `Segment` and `Occurrence`: append objects to them, or add the blocks
+    (`hybridsim.engine.blocks`) that a compiled loop leaves behind.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.segments = SegmentChain(system)
+        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList)
+        self.counters = Counters()
+        self.status, self.message = "finished", ""
+        self.warnings: dict[str, int] = {}  # message -> how often
 
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
         """Keep the state after an event at the very end of the run, which no segment begins with."""

@@ -10,11 +10,12 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.fixed_dense import StepDense
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.pieces import Occurrence, Segment
 from hybridsim.engine.settle import Settling, Situation
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
-from hybridsim.engine.trajectory import Occurrence, Segment, Task, Trajectory
+from hybridsim.engine.trajectory import Task, Trajectory
 from hybridsim.integrators.rk4_kernels import (
     BOUND,
     FULL,
@@ -51,7 +52,7 @@ class FixedStepRun:
         self, system: System, task: Task, settings: FixedStep, progress: Callable[[float], None] | None
     ) -> None:
         self.system, self.task, self.settings, self.progress = system, task, settings, progress
-        self.record = Trajectory()
+        self.record = Trajectory(system)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete

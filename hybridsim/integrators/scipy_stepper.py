@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.pieces import Pieces
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
-from hybridsim.engine.trajectory import Pieces
 
 _SHARE_OF_A_TURN = 0.1  # of the fastest forcing, in radians: what a first step may span
 _RETRIES, _SHORTER = 25, 0.25  # where a solver gives up on a trial that is no number

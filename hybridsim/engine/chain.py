@@ -1,0 +1,133 @@
+"""All segments and all occurrences of a run, in blocks, and how much of them is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar, overload
+
+import numpy as np
+
+from hybridsim.engine.blocks import Block, SegmentList
+from hybridsim.engine.pieces import Segment
+from hybridsim.engine.system import System
+
+Item = TypeVar("Item")
+
+_LOOSE = 16  # items in a list that is forgotten as a whole
+
+
+class Chain(Sequence[Item]):
+    """All items of a run in order, in blocks.
+
+    Parameters
+    ----------
+    loose : makes an empty list for items that come one by one; it is a block as well.
+    window : how long back, in the unit of t, items are kept: what is older is forgotten as newer blocks come. The last
+        block stays in any case; with None nothing is kept at all.
+    """
+
+    def __init__(self, loose: Callable[[], Any], window: float | None = math.inf) -> None:
+        self.blocks: list[Any] = []
+        self._loose, self.window = loose, window
+
+    def append(self, item: Item) -> None:
+        """One more item."""
+        if self.window is None:
+            return
+        limit = math.inf if self.window == math.inf else _LOOSE
+        last = self.blocks[-1] if self.blocks else None
+        if not isinstance(last, list) or len(last) >= limit:
+            self.blocks.append(last := self._loose())
+        last.append(item)
+        self._forget()
+
+    def extend(self, items: Iterable[Item]) -> None:
+        """More items."""
+        for item in items:
+            self.append(item)
+
+    def add(self, block: Block[Item]) -> None:
+        """A whole block."""
+        if self.window is not None and len(block):
+            self.blocks.append(block)
+            self._forget()
+
+    def _forget(self) -> None:
+        """Let go of the blocks that lie further back than the window."""
+        if self.window is None or self.window == math.inf:
+            return
+        now = self.blocks[-1].until
+        while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > self.window:
+            del self.blocks[0]
+
+    def starts(self) -> np.ndarray:
+        """Number of the first item of each block, and of all items."""
+        return np.cumsum([0, *map(len, self.blocks)])
+
+    def __len__(self) -> int:
+        return sum(map(len, self.blocks))
+
+    def __iter__(self) -> Iterator[Item]:
+        for block in self.blocks:
+            yield from block
+
+    @overload
+    def __getitem__(self, i: int, /) -> Item: ...
+    @overload
+    def __getitem__(self, i: slice, /) -> list[Item]: ...
+    def __getitem__(self, i: int | slice, /) -> Item | list[Item]:
+        count = len(self)
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(count))]
+        place = i + count if i < 0 else i
+        if not 0 <= place < count:
+            raise IndexError(f"{i} is beyond {count} items")
+        for block in self.blocks:
+            if place < len(block):
+                return block[place]
+            place -= len(block)
+        raise AssertionError("the blocks hold fewer items than they say")
+
+
+class SegmentChain(Chain[Segment]):
+    """All segments of a run."""
+
+    def __init__(self, system: System, window: float | None = math.inf) -> None:
+        super().__init__(lambda: SegmentList(system), window)
+        self._shape = (system.n, len(system.automata))
+
+    def origins(self) -> np.ndarray:
+        """Origins of local time (N, 2)."""
+        return np.concatenate([np.empty((0, 2)), *(block.origins for block in self.blocks)])
+
+    def spans(self) -> np.ndarray:
+        """First and last local times (N, 2)."""
+        return np.concatenate([np.empty((0, 2)), *(block.spans for block in self.blocks)])
+
+    def modes(self) -> np.ndarray:
+        """Modes (N, C)."""
+        none = np.empty((0, self._shape[1]), dtype=np.int64)
+        return np.concatenate([none, *(block.modes for block in self.blocks)])
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        if len(self.blocks) == 1:
+            return self.blocks[0].states(index, s)
+        starts = self.starts()
+        owner = np.searchsorted(starts, index, side="right") - 1
+        out = np.empty((len(s), self._shape[0]))
+        for b in np.unique(owner):
+            chosen = np.flatnonzero(owner == b)
+            out[chosen] = self.blocks[b].states(index[chosen] - starts[b], s[chosen])
+        return out
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The run's own steps: numbers of segments (m,), local times (m,), states (m, n)."""
+        index, s, x = [np.empty(0, dtype=np.int64)], [np.empty(0)], [np.empty((0, self._shape[0]))]
+        for block, start in zip(self.blocks, self.starts().tolist(), strict=False):
+            numbers, times, states = block.knots()
+            index.append(numbers + start)
+            s.append(times)
+            x.append(states)
+        return np.concatenate(index), np.concatenate(s), np.concatenate(x)

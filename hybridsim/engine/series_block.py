@@ -1,0 +1,140 @@
+"""Segments whose dense output is Taylor series, in the arrays that the compiled mode loop wrote them to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.pieces import Segment
+from hybridsim.engine.system import System
+from hybridsim.engine.taylor import polynomials
+from hybridsim.engine.timepair import Instant
+
+
+@dataclass(frozen=True)
+class SeriesPieces:
+    """Dense output made of one Taylor series for each step: knots (m + 1,), coefficients (m, n, order + 1)."""
+
+    knots: np.ndarray
+    coefficients: np.ndarray
+
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """States (k, n) at local times (k,)."""
+        s = np.asarray(s, dtype=float)
+        index = np.searchsorted(self.knots[1:-1], s, side="right")
+        out = np.empty((len(s), self.coefficients.shape[1]))
+        for i in np.unique(index):
+            chosen = np.flatnonzero(index == i)
+            part = np.empty((len(chosen), out.shape[1]))
+            polynomials(self.coefficients[i], s[chosen] - self.knots[i], part)
+            out[chosen] = part
+        return out
+
+
+@kernel
+def series_states(
+    project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
+) -> None:
+    """States at local times s of the segments of these numbers; see `SeriesBlock`."""
+    modes, vectors, jumps = record
+    n, order = series.shape[1], series.shape[2] - 1
+    x = np.empty(n)
+    for k in range(s.shape[0]):
+        i = index[k]
+        first, last = ends[i], ends[i + 1] - 1
+        if s[k] >= steps[last, 0] + steps[last, 1]:
+            out[k] = jumps[i, 0]
+            continue
+        while first < last:
+            middle = (first + last + 1) // 2
+            if steps[middle, 0] <= s[k]:
+                first = middle
+            else:
+                last = middle - 1
+        d = s[k] - steps[first, 0]
+        for j in range(n):
+            total = series[first, j, order]
+            for m in range(order - 1, -1, -1):
+                total = total * d + series[first, j, m]
+            x[j] = total
+        if pinned:
+            call(project, s[k], x, vectors[i], modes[i], out[k])
+        else:
+            out[k] = x
+
+
+@dataclass(frozen=True)
+class SeriesBlock(Sequence[Segment]):
+    """N segments of several steps each; see `hybridsim.engine.blocks.SegmentBlock`.
+
+    Parameters
+    ----------
+    ends : (N + 1,), rows of the steps at which each segment begins and the last one ends.
+    steps, series : (steps, 2) local time at which a step begins and its length; (steps, n, order + 1) coefficients.
+    origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
+    jumps : (N, 2, n), x- and x+ at the end of each segment.
+    """
+
+    system: System
+    ends: np.ndarray
+    steps: np.ndarray
+    series: np.ndarray
+    origins: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    jumps: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ends) - 1
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """Local times of start and end (N, 2)."""
+        return np.stack([self.steps[self.ends[:-1], 0], self.steps[self.ends[1:] - 1].sum(axis=1)], axis=1)
+
+    @property
+    def until(self) -> Instant:
+        """End of the last segment."""
+        high, low = self.origins[-1].tolist()
+        return Instant(high, low).plus(float(self.steps[self.ends[-1] - 1].sum()))
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        out, pinned = np.empty((len(s), self.system.n)), bool(self.system.pins)
+        project = self.system.address("project" if pinned else "flow")
+        record = (self.modes, self.vectors, self.jumps)
+        series_states(project, pinned, index, s, self.ends, self.steps, self.series, record, out)
+        return out
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of segments, local times and states where steps begin, and at the end of each segment."""
+        count = len(self)
+        index = np.repeat(np.arange(count), np.diff(self.ends) + 1)
+        s = np.empty(len(index))
+        at_end = self.ends[1:] - self.ends[0] + np.arange(count)
+        begins = np.ones(len(index), dtype=np.bool_)
+        begins[at_end] = False
+        s[begins], s[at_end] = self.steps[self.ends[0] : self.ends[-1], 0], self.spans[:, 1]
+        return index, s, self.states(index, s)
+
+    def since(self, first: int) -> SeriesBlock:
+        """Those from the first on."""
+        rows = (self.origins, self.modes, self.vectors, self.jumps)
+        return SeriesBlock(
+            self.system, self.ends[first:], self.steps, self.series, *(r[first:] for r in rows)
+        )
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        first, last = self.ends[i], self.ends[i + 1]
+        s = np.append(self.steps[first:last, 0], self.spans[i, 1])
+        x = self.states(np.full(len(s), i), s)
+        high, low = self.origins[i].tolist()
+        dense = SeriesPieces(s, self.series[first:last])
+        return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
