@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import inlined, kernel
 
 FINE, UNDECIDED, LEAVES = 1, 0, -1  # verdicts on a guard or a candidate
 NONUNIQUE, NONE = -1, -2  # outcomes of a choice that names no candidate
 
 
-@kernel
+@inlined
 def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
     """Sign of a guard just after the instant, and the order that decides it.
 
@@ -41,7 +41,7 @@ def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
     return side, order
 
 
-@kernel
+@inlined
 def open_question(series: Any, bounds: Any, decreed: int) -> bool:
     """Whether a guard without a side is a question of rounding (and not zero identically)."""
     for k in range(decreed, series.shape[0]):
@@ -50,7 +50,7 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
     return False
 
 
-@kernel
+@inlined
 def judge(
     series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
 ) -> int:
@@ -105,7 +105,7 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
     return NONUNIQUE if ties > 0 else best
 
 
-@kernel
+@inlined
 def decree_orders(
     guards_of: Any, holding: Any, on_surface: Any, released: Any, continuous: bool, fired: Any, decreed: Any
 ) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -53,7 +53,7 @@ UNIT = 2.0**-53  # unit roundoff of a double
 ORDER = 3  # guards are judged by their derivatives up to the third
 
 
-@kernel
+@inlined
 def _product(V: Any, E: Any, a: int, b: int, k: int, first: int, last: int) -> tuple[float, float]:
     """sum_{i=first}^{last} a_i b_{k-i} and its error bound."""
     total, error = 0.0, 0.0
@@ -67,7 +67,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int, first: int, last: int) -> t
     return total, error
 
 
-@kernel
+@inlined
 def _weighted(V: Any, E: Any, a: int, b: int, k: int, last: int) -> tuple[float, float]:
     """sum_{i=1}^{last} i a_i b_{k-i} and its error bound: the product a' b, times k."""
     total, error = 0.0, 0.0
@@ -98,13 +98,13 @@ def _first_difference(V: Any, a: int, b: int, k: int) -> float:
     return 0.0
 
 
-@kernel
+@inlined
 def _put(V: Any, E: Any, out: int, k: int, value: float, error: float) -> None:
     V[out, k] = value
     E[out, k] = error
 
 
-@kernel
+@inlined
 def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b: int) -> None:
     """V[out, k] = numerator / b_0 with the bound of a quotient."""
     divisor = V[b, 0]
@@ -330,10 +330,10 @@ def run_series(
 ) -> None:
     """Set the inputs of a lean tape and run it to the order that V and E have room for.
 
-    inputs: registers of constants, their values and error bounds (m, 2), registers of parameters and where in p they
-    stand, of phases, of time (-1: none), of states. derivatives: registers of the states' rates.
+    inputs: as `hybridsim.engine.system.Inputs`. derivatives: registers of the states' rates.
     """
-    constants, values, parameters, sources, phases, time, states = inputs
+    constants, values, parameters = inputs.constants, inputs.values, inputs.parameters
+    sources, phases, time, states = inputs.sources, inputs.phases, inputs.time[0], inputs.states
     V[:] = 0.0
     E[:] = 0.0
     for i in range(constants.shape[0]):

@@ -49,6 +49,22 @@ if ENABLED:
             lambda: numba.njit(cache=True, nogil=True, error_model="numpy")(function),
         )
 
+    def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+        """A short kernel, made part of its callers."""
+        return _with_cache_folder(
+            str(kernel_folder()),
+            lambda: numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function),
+        )
+
+    def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
+        return _with_cache_folder(
+            str(kernel_folder()),
+            lambda: numba.njit(
+                cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"}
+            )(function),
+        )
+
     def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
         """Compile one generated function; return its address and the object that keeps it alive."""
         compiled = _with_cache_folder(
@@ -81,6 +97,8 @@ else:
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Leave the function as it is: the compiler is switched off."""
         return function
+
+    inlined = polynomial_kernel = kernel
 
     def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""

@@ -7,13 +7,13 @@ that holds something which is not ordinary; the mode loop then takes that one se
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, settle_ordinary
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of, two_sum
@@ -27,7 +27,53 @@ _SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from whic
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
-@kernel
+class State(NamedTuple):
+    """What holds at the start of a segment: x, x_error (n,), z (C,), p, and sides, orders, floors (G,) of guards."""
+
+    x: np.ndarray
+    x_error: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    floors: np.ndarray
+
+
+class Room(NamedTuple):
+    """Scratch arrays: two sets of series (registers, order + 1), a polynomial, its Bernstein forms, and a state."""
+
+    V: np.ndarray
+    W: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    stack: np.ndarray
+    y: np.ndarray
+    y1: np.ndarray
+    y_error: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    scale: np.ndarray
+    slopes: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    floors: np.ndarray
+
+
+class Record(NamedTuple):
+    """What is committed: steps (S, 2) and their series (S, n, order + 1); for each segment the row after its last step,
+    its origin (2,), modes, run-time vector, the guard that fired (-1: none), and the states before and after (2, n)."""
+
+    steps: np.ndarray
+    series: np.ndarray
+    segments: np.ndarray
+    clocks: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    fires: np.ndarray
+    jumps: np.ndarray
+
+
+@inlined
 def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
     """The run-time vector of a segment whose local time starts at an instant; inputs are left as they are."""
     origin_at, phases_at = place
@@ -36,15 +82,13 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
         p[phases_at + i] = phase_of(hi, lo, rates[i], 0.0)
 
 
-@kernel
-def load(
-    constants: Any, values: Any, parameters: Any, sources: Any, tapes: Any, k: int, p: Any, V: Any
-) -> None:
+@inlined
+def load(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
     """Constants of a segment into their registers."""
-    for i in range(constants.shape[0]):
-        V[constants[i], 0] = values[i, 0]
-    for i in range(parameters.shape[0]):
-        V[parameters[i], 0] = p[sources[i]]
+    for i in range(inputs.constants.shape[0]):
+        V[inputs.constants[i], 0] = inputs.values[i, 0]
+    for i in range(inputs.parameters.shape[0]):
+        V[inputs.parameters[i], 0] = p[inputs.sources[i]]
     advance(tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]], V, 0)
 
 
@@ -93,14 +137,14 @@ def holds(
     return True
 
 
-@kernel
+@inlined
 def value_and_slope(rows: Any, places: Any, register: int, s: float, x: Any, W: Any) -> tuple[float, float]:
     """A function of the tape and its rate along the flow at (s, x)."""
     expand(rows, places, 1, s, x, W)
     return W[register, 0], W[register, 1]
 
 
-@kernel
+@inlined
 def state_at(states: Any, order: int, d: float, V: Any, x: Any) -> None:
     """States at a distance d from the origin of the series (Horner)."""
     for i in range(states.shape[0]):
@@ -155,6 +199,7 @@ def leap(
     automata: Any,
     tapes: Any,
     inputs: Any,
+    lin: Any,
     places: Any,
     control: Any,
     target: Any,
@@ -173,10 +218,22 @@ def leap(
     """
     rates, origin_at, phases_at, discrete_at, n_discrete = places
     rtol, atol, order, max_step, longest = control
-    x, x_error, z, p, sides, orders, floors = state
-    V, W, a, b, stack, y, y1, y_error, u, q, scale, slopes, side_now, order_now, floor_now = room
-    steps, series, segments, clocks, modes, vectors, fires, jumps = record
-    constants, values, parameters, sources, _phases, time, states = inputs
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    sides, orders, floors = state.sides, state.orders, state.floors
+    V, W, a, b, stack = room.V, room.W, room.a, room.b, room.stack
+    y, y1, y_error, u, q, scale, slopes = (
+        room.y,
+        room.y1,
+        room.y_error,
+        room.z,
+        room.p,
+        room.scale,
+        room.slopes,
+    )
+    side_now, order_now, floor_now = room.sides, room.orders, room.floors
+    steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
+    modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
+    time, states = inputs.time[0], inputs.states
     n, n_steps, n_segments = x.shape[0], 0, 0
     last_gap, last_ratio, steady = math.inf, math.inf, 0
     while True:
@@ -191,8 +248,8 @@ def leap(
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
         rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
         flow_places = (time, states, tapes.derivatives[k])
-        load(constants, values, parameters, sources, tapes, k, p, V)
-        load(constants, values, parameters, sources, tapes, k, p, W)
+        load(inputs, tapes, k, p, V)
+        load(inputs, tapes, k, p, W)
         count = tapes.active_start[k + 1] - tapes.active_start[k]
         watched = np.empty(count, dtype=np.int64)
         for i in range(count):
@@ -266,6 +323,7 @@ def leap(
             automata,
             tapes,
             inputs,
+            lin,
             at,
             fired,
             n_discrete,
@@ -288,7 +346,7 @@ def leap(
         clock[0], clock[1] = two_sum(high, low + clock[1])
 
 
-@kernel
+@inlined
 def holding(automata: Any, z: Any) -> bool:
     """Whether any component holds its surface."""
     for c in range(z.shape[0]):

@@ -7,9 +7,11 @@ import math
 import numpy as np
 
 from hybridsim.engine.crossings import Crossings
-from hybridsim.engine.leap import AT_TARGET, FULL, leap
+from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, State, leap
+from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
+from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.settle import Outcome
@@ -25,6 +27,7 @@ _ROOM, _FEWEST = (
 )  # doubles for the series of one call, as far as that leaves room for so many steps
 _FROM_NOTHING = np.zeros(1, dtype=np.int64)
 _TIGHTEST = 1e-15
+_NOT_LINEAR = no_tables()
 
 
 _compiled: list[bool] = []
@@ -78,18 +81,20 @@ class Leaper:
         self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest)
         self.work = work_space(system)
         count = len(system.automata)
-        self.room = (
-            np.zeros((registers.count, order + 1)),
-            np.zeros((registers.count, order + 1)),
-            *(np.empty(order + 1) for _ in range(2)),
-            np.empty((64, order + 1)),
-            *(np.empty(n) for _ in range(3)),
-            np.empty(count, dtype=np.int64),
-            np.empty(layout.size),
-            *(np.empty(n) for _ in range(2)),
-            np.empty(guards, dtype=np.int64),
-            np.empty(guards, dtype=np.int64),
-            np.empty(guards),
+        self.room = packed(
+            Room(
+                np.zeros((registers.count, order + 1)),
+                np.zeros((registers.count, order + 1)),
+                *(np.empty(order + 1) for _ in range(2)),
+                np.empty((64, order + 1)),
+                *(np.empty(n) for _ in range(3)),
+                np.empty(count, dtype=np.int64),
+                np.empty(layout.size),
+                *(np.empty(n) for _ in range(2)),
+                np.empty(guards, dtype=np.int64),
+                np.empty(guards, dtype=np.int64),
+                np.empty(guards),
+            )
         )
         self.order = order
         self._renew()
@@ -116,7 +121,7 @@ class Leaper:
         """As far as ordinary events and the room for them go."""
         self.shelf.surround(outcome.z)
         clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
-        state = (
+        state = State(
             outcome.x.copy(),
             outcome.x_error.copy(),
             outcome.z.copy(),
@@ -127,10 +132,10 @@ class Leaper:
         )
         instants = []
         while True:
-            rows = tuple(part[u:] for part, u in zip(self.record, self._offsets(), strict=True))
+            rows = Record(*(part[u:] for part, u in zip(self.record, self._offsets(), strict=True)))
             code, steps, count = leap(
-                self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
-                to, clock, state, self.work, self.room, rows,
+                self.functions, self.automata, self.shelf.tapes, self.inputs, _NOT_LINEAR, self.places, self.control,
+                to, clock, packed(state), self.work, self.room, packed(rows),
             )  # fmt: skip
             instants.append(self._commit(rows, steps, count, state[2], clock, record))
             is_full = code == FULL and (count > 0 or self.used != (0, 0))

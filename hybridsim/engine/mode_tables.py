@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.packs import packed
 from hybridsim.engine.system import System
 
 _LONGEST = 256  # vectors of modes on a shelf that is shared: each event searches it from one end to the other
@@ -50,8 +51,9 @@ class Tapes(NamedTuple):
 
 
 def automata_of(system: System) -> Automata:
-    """The arrays of a system's automata."""
-    return system.code.shared("automata", lambda: _automata(system))
+    """The arrays of a system's automata, as kernels take them."""
+    automata: Automata = system.code.shared("automata", lambda: packed(_automata(system)))
+    return automata
 
 
 def shelf_of(system: System) -> TapeShelf:
@@ -138,14 +140,19 @@ class TapeShelf:
         lean = [system.lean_tape(z) for z in met]
         modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
         active = [list(np.flatnonzero(system.active(z))) for z in met]
-        return Tapes(
-            modes,
-            *_rows([tape.rows for tape in lean]),
-            *_rows([tape.constant_rows for tape in lean]),
-            *_flat(active),
-            np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
-            np.array([tape.guards for tape in lean], dtype=np.int64).reshape(len(met), system.guard_count),
+        tapes: Tapes = packed(
+            Tapes(
+                modes,
+                *_rows([tape.rows for tape in lean]),
+                *_rows([tape.constant_rows for tape in lean]),
+                *_flat(active),
+                np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
+                np.array([tape.guards for tape in lean], dtype=np.int64).reshape(
+                    len(met), system.guard_count
+                ),
+            )
         )
+        return tapes
 
 
 def _rows(tapes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,9 @@ import numpy as np
 
 from hybridsim.engine.decide import FINE, NONE, NONUNIQUE, choose, decree_orders, judge, side_after
 from hybridsim.engine.jets import ORDER, UNIT, run_series
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.linear_kernels import functions_of_time, linear_series
+from hybridsim.engine.packs import packed
 
 SETTLED, NOT_ORDINARY = 0, 1
 _MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
@@ -31,10 +33,16 @@ class Functions(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one event: series with bounds (registers, 4), guards' rows of them, and vectors of flags."""
+    """Room for one event: series with bounds (registers, 4), guards' rows of them, vectors of flags, candidates.
+
+    factors, w, w_error: functions of time of linear modes. The last ones have a row for each joint candidate.
+    """
 
     V: np.ndarray
     E: np.ndarray
+    factors: np.ndarray
+    w: np.ndarray
+    w_error: np.ndarray
     values: np.ndarray
     bounds: np.ndarray
     decreed: np.ndarray
@@ -47,6 +55,19 @@ class Work(NamedTuple):
     released: np.ndarray
     jumps: np.ndarray
     out: np.ndarray
+    everything: np.ndarray
+    members: np.ndarray
+    current: np.ndarray
+    holds: np.ndarray
+    trial: np.ndarray
+    table: np.ndarray
+    asked: np.ndarray
+    candidates: np.ndarray
+    verdicts: np.ndarray
+    smooth: np.ndarray
+    all_sides: np.ndarray
+    all_orders: np.ndarray
+    all_floors: np.ndarray
 
 
 class Before(NamedTuple):
@@ -60,7 +81,14 @@ class Before(NamedTuple):
     z: np.ndarray
 
 
-@kernel
+@inlined
+def put(source: Any, out: Any) -> None:
+    """Copy an array; a slice assignment takes ten times as long for a few numbers."""
+    for i in range(source.shape[0]):
+        out[i] = source[i]
+
+
+@inlined
 def find_modes(modes: Any, z: Any) -> int:
     """Row of a vector of modes on the shelf; -1 where it is not."""
     for k in range(modes.shape[0]):
@@ -72,9 +100,16 @@ def find_modes(modes: Any, z: Any) -> int:
     return -1
 
 
-@kernel
-def guard_series(tapes: Any, inputs: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
-    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k."""
+@inlined
+def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
+    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k.
+
+    Linear modes have them as rows over states and functions of time, which the work space holds at this time; other
+    modes by the tape.
+    """
+    if lin.kinds.shape[0] > 0:
+        linear_series(lin, tapes, k, x, x_error, work.w, work.w_error, work.values, work.bounds)
+        return
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
     run_series(
@@ -87,7 +122,7 @@ def guard_series(tapes: Any, inputs: Any, k: int, at: Any, x: Any, x_error: Any,
             work.values[g, j], work.bounds[g, j] = work.V[r, j], work.E[r, j]
 
 
-@kernel
+@inlined
 def is_release(automata: Any, before: Any, z: Any, c: int, fired: int) -> bool:
     """Whether a component leaves its holding mode through the guard that was located."""
     if automata.hold[c] < 0 or before[c] != automata.hold[c] or z[c] == automata.hold[c]:
@@ -96,7 +131,7 @@ def is_release(automata: Any, before: Any, z: Any, c: int, fired: int) -> bool:
     return automata.owner[fired] == c and automata.place[fired] == side
 
 
-@kernel
+@inlined
 def is_continuous(
     functions: Any, automata: Any, at: Any, x: Any, z: Any, members: Any, fired: int, jumps: Any
 ) -> bool:
@@ -117,7 +152,7 @@ def is_continuous(
     return True
 
 
-@kernel
+@inlined
 def decree(automata: Any, at: Any, z: Any, fired: int, is_on: bool, continuous: bool, work: Any) -> None:
     """Leading zeros of all guards in the candidate z; `is_on`: the located guard is still to be crossed."""
     work.fired[:] = False
@@ -125,14 +160,15 @@ def decree(automata: Any, at: Any, z: Any, fired: int, is_on: bool, continuous: 
     for c in range(z.shape[0]):
         work.holding[c] = automata.hold[c] >= 0 and z[c] == automata.hold[c]
         work.released[c] = is_release(automata, at.z, z, c, fired)
-    table = np.empty((z.shape[0], automata.guards_of.shape[2]), dtype=np.int64)
-    for c in range(z.shape[0]):
-        table[c] = automata.guards_of[c, z[c]]
+        for j in range(work.table.shape[1]):
+            work.table[c, j] = automata.guards_of[c, z[c], j]
     work.decreed[:] = 0
-    decree_orders(table, work.holding, work.on_surface, work.released, continuous, work.fired, work.decreed)
+    decree_orders(
+        work.table, work.holding, work.on_surface, work.released, continuous, work.fired, work.decreed
+    )
 
 
-@kernel
+@inlined
 def judge_members(automata: Any, z: Any, members: Any, work: Any) -> int:
     """Verdict on the guards of some components; their sides and orders stay in the work space."""
     work.active[:] = False
@@ -144,7 +180,7 @@ def judge_members(automata: Any, z: Any, members: Any, work: Any) -> int:
     return judge(work.values, work.bounds, work.decreed, work.active, False, work.sides, work.orders)
 
 
-@kernel
+@inlined
 def is_alone(tapes: Any, k: int, fired: int, work: Any) -> bool:
     """Whether no other guard is zero within its bound and leaves together with the one that fired."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
@@ -163,6 +199,7 @@ def settle_ordinary(
     automata: Any,
     tapes: Any,
     inputs: Any,
+    lin: Any,
     at: Any,
     fired: int,
     n_discrete: int,
@@ -175,33 +212,50 @@ def settle_ordinary(
 ) -> tuple[int, bool]:
     """What holds just after the event, written to x, x_error, z and p; (SETTLED, whether the flow goes on smoothly).
 
-    NOT_ORDINARY leaves the event to others, whatever has been written. Sides, orders and the guards' series of the
-    new modes are in the work space.
+    NOT_ORDINARY leaves the event to others, whatever has been written. Sides, orders and bounds of the guards' values
+    in the new modes are in the work space.
     """
-    everything = np.arange(z.shape[0])
-    x[:], x_error[:], z[:], p[:] = at.x, at.x_error, at.z, at.p
+    put(at.x, x)
+    put(at.x_error, x_error)
+    put(at.z, z)
+    put(at.p, p)
     work.on_surface[:] = False
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
-    guard_series(tapes, inputs, k, at, x, x_error, work)
-    if not is_alone(tapes, k, fired, work):
-        return NOT_ORDINARY, False
+    if lin.kinds.shape[0] > 0:
+        functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
+    if tapes.active_start[k + 1] - tapes.active_start[k] > 1:
+        guard_series(tapes, inputs, lin, k, at, x, x_error, work)
+        if not is_alone(tapes, k, fired, work):
+            return NOT_ORDINARY, False
     c = automata.owner[fired]
-    jumped = automata.hold[c] < 0
-    if jumped:
+    if automata.hold[c] >= 0:
+        number = decide_surface(functions, automata, tapes, inputs, lin, at, fired, x, x_error, z, work)
+        if number < 0:
+            return NOT_ORDINARY, False
+        if (
+            automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]
+        ):  # all has been judged there
+            for g in range(work.sides.shape[0]):
+                work.sides[g], work.orders[g] = work.all_sides[number, g], work.all_orders[number, g]
+                work.bounds[g, 0] = work.all_floors[number, g]
+            return SETTLED, work.smooth[number]
+        continuous = is_continuous(functions, automata, at, x, z, work.everything, fired, work.jumps)
+        is_on = z[c] == at.z[c]
+    else:
         if not take_choice(functions, automata, at, fired, n_discrete, discrete_at, x, x_error, z, p, work):
             return NOT_ORDINARY, False
-    elif not decide_surface(functions, automata, tapes, inputs, at, fired, x, x_error, z, work):
-        return NOT_ORDINARY, False
+        if lin.kinds.shape[0] > 0:
+            functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
+        continuous, is_on = False, False
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
     after = Before(at.s, at.s_error, x, x_error, p, at.z)
-    continuous = not jumped and is_continuous(functions, automata, at, x, z, everything, fired, work.jumps)
-    guard_series(tapes, inputs, k, after, x, x_error, work)
-    decree(automata, at, z, fired, not jumped and z[c] == at.z[c], continuous, work)
-    if judge_members(automata, z, everything, work) != FINE:
+    guard_series(tapes, inputs, lin, k, after, x, x_error, work)
+    decree(automata, at, z, fired, is_on, continuous, work)
+    if judge_members(automata, z, work.everything, work) != FINE:
         return NOT_ORDINARY, False
     return SETTLED, continuous
 
@@ -212,58 +266,65 @@ def decide_surface(
     automata: Any,
     tapes: Any,
     inputs: Any,
+    lin: Any,
     at: Any,
     fired: int,
     x: Any,
     x_error: Any,
     z: Any,
     work: Any,
-) -> bool:
-    """The admissible modes of the components of a cluster that are at their surfaces; False where it is not plain."""
+) -> int:
+    """The admissible modes, written to z, of the components of a cluster that are at their surfaces.
+
+    Returns the number of that candidate; -1 where it is not plain.
+    """
     c = automata.owner[fired]
     cluster = automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
-    members = np.empty(_MOST, dtype=np.int64)
     count = 0
     for i in range(cluster.shape[0]):
         d = cluster[i]
         if d == c or z[d] == automata.hold[d]:
-            if count == _MOST:
-                return False
-            members[count] = d
+            if count == work.members.shape[0]:
+                return -1
+            work.members[count] = d
             count += 1
             work.on_surface[d] = True
-    members = members[:count]
-    total = 3**count  # a surface has three modes
-    candidates, verdicts = np.empty((total, count), dtype=np.int64), np.empty(total, dtype=np.int64)
-    held = z.copy()
+    total, trial = 3**count, work.trial  # a surface has three modes
+    put(z, trial)
     for i in range(count):
-        held[members[i]] = automata.hold[members[i]]
-    call(functions.project, at.s, at.x, at.p, held, x)
+        d = work.members[i]
+        trial[d] = automata.hold[d]
+    call(functions.project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        x_error[automata.pin[members[i]]] = UNIT * abs(x[automata.pin[members[i]]])
-    trial = z.copy()
+        d = work.members[i]
+        x_error[automata.pin[d]] = UNIT * abs(x[automata.pin[d]])
     for number in range(total):
         rest = number
         for i in range(count - 1, -1, -1):
-            candidates[number, i] = rest % 3
-            trial[members[i]] = rest % 3
+            work.candidates[number, i] = rest % 3
+            trial[work.members[i]] = rest % 3
             rest //= 3
         k = find_modes(tapes.modes, trial)
         if k < 0:
-            return False
-        guard_series(tapes, inputs, k, at, x, x_error, work)
+            return -1
+        guard_series(tapes, inputs, lin, k, at, x, x_error, work)
         continuous = is_continuous(functions, automata, at, x, trial, cluster, fired, work.jumps)
         decree(automata, at, trial, fired, True, continuous, work)
-        verdicts[number] = judge_members(automata, trial, cluster, work)
-    current, holds = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+        work.verdicts[number] = judge_members(automata, trial, cluster, work)
+        work.smooth[number] = continuous
+        for g in range(work.sides.shape[0]):
+            work.all_sides[number, g], work.all_orders[number, g] = work.sides[g], work.orders[g]
+            work.all_floors[number, g] = work.bounds[g, 0]
     for i in range(count):
-        current[i], holds[i] = z[members[i]], automata.hold[members[i]]
-    number = choose(candidates, verdicts, current, holds)
-    if number in (NONE, NONUNIQUE) or verdicts[number] != FINE:
-        return False
+        work.current[i], work.holds[i] = z[work.members[i]], automata.hold[work.members[i]]
+    number = choose(
+        work.candidates[:total, :count], work.verdicts[:total], work.current[:count], work.holds[:count]
+    )
+    if number in (NONE, NONUNIQUE) or work.verdicts[number] != FINE:
+        return -1
     for i in range(count):
-        z[members[i]] = candidates[number, i]
-    return True
+        z[work.members[i]] = work.candidates[number, i]
+    return number
 
 
 @kernel
@@ -286,7 +347,7 @@ def take_choice(
             return False
     c, n, count = automata.owner[fired], x.shape[0], z.shape[0]
     mode, place = at.z[c], automata.place[fired]
-    asked = np.empty(count + 3, dtype=np.int64)
+    asked = work.asked
     asked[:count] = at.z
     asked[count], asked[count + 1], asked[count + 2] = c, mode, place
     call(functions.choose, at.s, at.x, at.p, asked, work.out)
@@ -309,30 +370,55 @@ def take_choice(
     return True
 
 
-def work_space(system: Any) -> Work:
-    """Room for the events of one system."""
+def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
+    """Room for the events of one system; for linear modes also for their functions of time."""
     guards, count = system.guard_count, len(system.automata)
     registers = system.registers.count
+    widest = max((len(g) for a in system.automata for g in a.guards), default=0) or 1
+    together = min(_MOST, len(system.surface_of))
+    joint = 3**together
+
+    def numbers(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
 
     def flags(size: int) -> np.ndarray:
         return np.zeros(size, dtype=np.bool_)
 
-    return Work(
-        np.empty((registers, ORDER + 1)),
-        np.empty((registers, ORDER + 1)),
-        np.empty((guards, ORDER + 1)),
-        np.empty((guards, ORDER + 1)),
-        np.zeros(guards, dtype=np.int64),
-        flags(guards),
-        np.ones(guards, dtype=np.int64),
-        np.zeros(guards, dtype=np.int64),
-        flags(guards),
-        flags(count),
-        flags(count),
-        flags(count),
-        np.zeros(2 * max(len(system.surface_of), 1)),
-        np.zeros(max(system.n + len(system.model.discrete), 1)),
+    work: Work = packed(
+        Work(
+            V=np.empty((registers, ORDER + 1)),
+            E=np.empty((registers, ORDER + 1)),
+            factors=np.zeros((2 * atoms, 2)),
+            w=np.zeros(monomials),
+            w_error=np.zeros(monomials),
+            values=np.empty((guards, ORDER + 1)),
+            bounds=np.empty((guards, ORDER + 1)),
+            decreed=numbers(guards),
+            active=flags(guards),
+            sides=np.ones(guards, dtype=np.int64),
+            orders=numbers(guards),
+            fired=flags(guards),
+            holding=flags(count),
+            on_surface=flags(count),
+            released=flags(count),
+            jumps=np.zeros(2 * max(len(system.surface_of), 1)),
+            out=np.zeros(max(system.n + len(system.model.discrete), 1)),
+            everything=np.arange(count, dtype=np.int64),
+            members=numbers(together),
+            current=numbers(together),
+            holds=numbers(together),
+            trial=numbers(count),
+            table=numbers(count, widest),
+            asked=numbers(count + 3),
+            candidates=numbers(joint, together),
+            verdicts=numbers(joint),
+            smooth=flags(joint),
+            all_sides=numbers(joint, guards),
+            all_orders=numbers(joint, guards),
+            all_floors=np.zeros((joint, guards)),
+        )
     )
+    return work
 
 
 def functions_of(system: Any) -> Functions:

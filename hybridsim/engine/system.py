@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
 from hybridsim.engine.modules import compiled
+from hybridsim.engine.packs import packed
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase
@@ -41,6 +42,19 @@ class Automaton:
         return self.hold >= 0
 
 
+class Inputs(NamedTuple):
+    """Registers of a tape's inputs: constants with values and error bounds (m, 2), parameters and their places in p,
+    phases, time (1,) (-1: none), states."""
+
+    constants: np.ndarray
+    values: np.ndarray
+    parameters: np.ndarray
+    sources: np.ndarray
+    phases: np.ndarray
+    time: np.ndarray
+    states: np.ndarray
+
+
 class _Registers:
     """Where the tape's inputs are, as index arrays."""
 
@@ -53,7 +67,9 @@ class _Registers:
         sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
         is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)
         phases, states = parameters[is_phase], np.array(tape["states"], dtype=np.int64)
-        self.inputs = (constants, values, parameters, sources, phases, time, states)
+        self.inputs = packed(
+            Inputs(constants, values, parameters, sources, phases, np.array([time], dtype=np.int64), states)
+        )
 
 
 @dataclass(frozen=True)
@@ -290,7 +306,8 @@ class System:
         mask[numbers[numbers >= 0]] = True
         return mask
 
-    def _rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+    def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+        """The rows of the tape in the modes z."""
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
             rows += branches[0 if component < 0 else z[component]]
@@ -300,7 +317,7 @@ class System:
         """The tape of the modes z for series of any order."""
         key = z.tobytes()
         if key not in self._lean:
-            self._lean[key] = lean(self.code.data["tape"], self._rows(z), np.flatnonzero(self.active(z)))
+            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), np.flatnonzero(self.active(z)))
         return self._lean[key]
 
     def series(

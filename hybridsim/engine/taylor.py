@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -53,7 +53,7 @@ _SHORTER = 0.5  # factor on a step over which a guard's series does not reach
 _TRIALS = 60  # halvings: down to nothing
 
 
-@kernel
+@inlined
 def _convolution(V: Any, a: int, b: int, k: int, first: int, last: int) -> float:
     """sum_{i=first}^{last} a_i b_{k-i}."""
     total = 0.0
@@ -62,7 +62,7 @@ def _convolution(V: Any, a: int, b: int, k: int, first: int, last: int) -> float
     return total
 
 
-@kernel
+@inlined
 def _weighted(V: Any, a: int, b: int, k: int, last: int) -> float:
     """sum_{i=1}^{last} i a_i b_{k-i}: coefficient k - 1 of a' b."""
     total = 0.0

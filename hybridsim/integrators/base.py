@@ -25,6 +25,7 @@ CAPABILITIES = {
     "backward": "time running backward",
     "corners": "corners and jumps (abs, min, max, sign, a condition) inside a mode",
     "stiff": "rates that differ by many decades",
+    "nonlinear": "flows and guards that are not linear in the states",
     "adaptive": "the error follows rtol and atol",
 }
 

@@ -1,0 +1,120 @@
+"""Segments in closed form, in the arrays that the compiled loop of linear modes wrote them to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.linear_kernels import moved, states_of
+from hybridsim.engine.linear_tables import LinearTables
+from hybridsim.engine.pieces import Segment
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+
+
+@kernel
+def closed_form_states(
+    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, c: Any, x: Any, out: Any
+) -> None:
+    """States out (m, n) at local times s (m,) of the segments of these numbers; see `ClosedFormBlock`.
+
+    c, x: room for modal coordinates and states.
+    """
+    ends, rows, coordinates, modes, vectors, jumps = record
+    for m in range(s.shape[0]):
+        i = index[m]
+        if s[m] == 0.0 or s[m] >= ends[i]:
+            side = 0 if s[m] == 0.0 else 1
+            for j in range(x.shape[0]):
+                out[m, j] = jumps[i, side, j]
+            continue
+        moved(lin, rows[i], coordinates[i], s[m], c)
+        states_of(lin, rows[i], c, x)
+        if pinned:
+            call(project, s[m], x, vectors[i], modes[i], out[m])
+        else:
+            for j in range(x.shape[0]):
+                out[m, j] = x[j]
+
+
+@dataclass(frozen=True)
+class ClosedFormBlock(Sequence[Segment]):
+    """N segments from local time 0 on; see `hybridsim.engine.blocks.SegmentBlock`.
+
+    Parameters
+    ----------
+    tables, rows : the linear modes, and which of them each segment is in (N,).
+    ends : (N,) local times of the ends.
+    coordinates : (N, J) modal coordinates at the starts.
+    origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
+    jumps : (N, 3, n), states at the start, x- and x+ at the end of each segment.
+    """
+
+    system: System
+    tables: LinearTables
+    rows: np.ndarray
+    ends: np.ndarray
+    coordinates: np.ndarray
+    origins: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    jumps: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """Local times of start and end (N, 2)."""
+        return np.stack([np.zeros(len(self)), self.ends], axis=1)
+
+    @property
+    def until(self) -> Instant:
+        """End of the last segment."""
+        high, low = self.origins[-1].tolist()
+        return Instant(high, low).plus(float(self.ends[-1]))
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        n, pinned = self.system.n, bool(self.system.pins)
+        out = np.empty((len(s), n))
+        closed_form_states(
+            self.system.address("project" if pinned else "flow"),
+            pinned,
+            self.tables,
+            index,
+            s,
+            (self.ends, self.rows, self.coordinates, self.modes, self.vectors, self.jumps),
+            np.empty(self.coordinates.shape[1], dtype=complex),
+            np.empty(n),
+            out,
+        )
+        return out
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of segments, local times and states at start and end of each segment."""
+        index = np.repeat(np.arange(len(self)), 2)
+        return index, self.spans.ravel(), self.jumps[:, :2].reshape(len(index), -1)
+
+    def since(self, first: int) -> ClosedFormBlock:
+        """Those from the first on."""
+        rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
+        return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        i = range(len(self))[i]
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            return self.states(np.full(len(s), i), np.asarray(s, dtype=float))
+
+        high, low = self.origins[i].tolist()
+        return Segment(
+            Instant(high, low), self.modes[i], self.vectors[i], self.spans[i], self.jumps[i, :2], dense
+        )

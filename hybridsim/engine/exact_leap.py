@@ -1,0 +1,231 @@
+"""The compiled mode loop of linear modes: each segment in closed form, from event to event, no Python between.
+
+As `hybridsim.engine.leap`, with one closed form for a segment where that has steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.first_exit import FOUND, OPEN
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
+from hybridsim.engine.linear_kernels import (
+    first_zero,
+    functions_of_time,
+    moved,
+    state_sizes,
+    states_of,
+    to_modal,
+)
+from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, put, settle_ordinary
+from hybridsim.engine.timepair import two_sum
+
+_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
+_NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
+_ULPS = 64.0  # events closer than this are for the general way to tell apart
+
+
+class Room(NamedTuple):
+    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), and a state."""
+
+    c: np.ndarray
+    v: np.ndarray
+    terms: np.ndarray
+    y: np.ndarray
+    y1: np.ndarray
+    y_error: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    scale: np.ndarray
+    slopes: np.ndarray
+
+
+class Record(NamedTuple):
+    """What is committed of each segment: its end in local time, origin (2,), row of the tables, modes, run-time vector,
+    modal coordinates at its start, the guard that fired (-1: none), states at start and on both sides of its end (3, n).
+    """
+
+    ends: np.ndarray
+    clocks: np.ndarray
+    rows: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    coordinates: np.ndarray
+    fires: np.ndarray
+    jumps: np.ndarray
+
+
+@kernel
+def first_exit_of(
+    lin: Any,
+    tapes: Any,
+    k: int,
+    c: Any,
+    bound: float,
+    sides: Any,
+    orders: Any,
+    floors: Any,
+    room: Any,
+    v: Any,
+) -> tuple[int, float]:
+    """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
+
+    All guards are followed up to one horizon, and then to one four times as far: most stay positive for long.
+    """
+    first, last = tapes.active_start[k], tapes.active_start[k + 1]
+    horizon = bound
+    if last - first > 1:
+        for i in range(first, last):
+            horizon = min(horizon, lin.farthest[k, tapes.active[i]])
+    while True:
+        fired, s = _NONE, min(horizon, bound)
+        for i in range(first, last):
+            g = tapes.active[i]
+            outcome, at = first_zero(lin, k, g, c, s, sides[g], orders[g], floors[g], room, v)
+            if outcome == OPEN:
+                return _OPEN, at
+            if outcome == FOUND:
+                fired, s = g, at
+        if fired >= 0 or horizon >= bound:
+            return fired, s
+        horizon *= 4.0
+
+
+@kernel
+def exact_leap(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    places: Any,
+    longest: float,
+    target: Any,
+    clock: Any,
+    state: Any,
+    work: Any,
+    room: Any,
+    record: Any,
+) -> tuple[int, int]:
+    """Go from event to event; returns why it ended and how many segments were committed.
+
+    places, target, clock, state, work as for `leap`; longest: of a segment. room: scratch arrays. record: what the
+    segments and events are written to.
+    """
+    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    sides, orders, floors = state.sides, state.orders, state.floors
+    c, v, terms, scale, slopes = room.c, room.v, room.terms, room.scale, room.slopes
+    y, y1, y_error, z1, p1 = room.y, room.y1, room.y_error, room.z, room.p
+    ends, clocks, rows, modes = record.ends, record.clocks, record.rows, record.modes
+    vectors, coordinates, fires, jumps = record.vectors, record.coordinates, record.fires, record.jumps
+    n, n_segments = x.shape[0], 0
+    last_gap, last_ratio, steady = math.inf, math.inf, 0
+    while True:
+        k = find_modes(tapes.modes, z)
+        bound = (target[0] - clock[0]) + (target[1] - clock[1])
+        if not bound > 0.0:
+            return AT_TARGET, n_segments
+        if k < 0:
+            return STOPPED, n_segments
+        if n_segments >= ends.shape[0]:
+            return FULL, n_segments
+        set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
+        functions_of_time(lin, 0.0, 0.0, p, work.factors, work.w, work.w_error)
+        to_modal(lin, k, x, work.w, c)
+        fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, terms, v)
+        if fired == _OPEN:
+            return STOPPED, n_segments
+        if s > longest:
+            return STOPPED, n_segments
+        moved(lin, k, c, s, v)
+        states_of(lin, k, v, y)
+        for i in range(n):
+            scale[i] = 0.0
+        state_sizes(lin, k, c, scale)
+        state_sizes(lin, k, v, scale)
+        if holding(automata, z):
+            call(functions.project, s, y, p, z, y1)
+            put(y1, y)
+        for i in range(n):
+            if not abs(y[i]) < math.inf:
+                return STOPPED, n_segments
+        gap = s
+        ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
+        rows[n_segments], fires[n_segments] = k, fired
+        put(z, modes[n_segments])
+        put(p, vectors[n_segments])
+        put(c, coordinates[n_segments])
+        put(x, jumps[n_segments, 0])
+        put(y, jumps[n_segments, 1])
+        put(y, jumps[n_segments, 2])
+        if fired < 0:
+            put(y, x)
+            for i in range(n):
+                x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
+            clock[0], clock[1] = target[0], target[1]
+            return AT_TARGET, n_segments + 1
+        ratio = gap / last_gap
+        steady = steady + 1 if ratio < _SHRINKING and abs(ratio - last_ratio) <= _STEADY * ratio else 0
+        last_gap, last_ratio = gap, ratio
+        if steady > 2 or gap <= _ULPS * 2.0**-52 * abs(clock[0]):
+            return STOPPED, n_segments
+        s_error = 2.0 * 2.0**-52 * s
+        functions_of_time(lin, s, 0.0, p, work.factors, work.w, work.w_error)
+        value, slope = _value_and_slope(lin, k, fired, y, work.w)
+        if slope != 0.0 and math.isfinite(value / slope):
+            s_error = max(s_error, abs(value / slope))
+        call(functions.flow, s, y, p, z, slopes)
+        for i in range(n):
+            y_error[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
+        for m in range(z.shape[0]):
+            if automata.hold[m] >= 0 and z[m] == automata.hold[m]:
+                y_error[automata.pin[m]] = UNIT * abs(y[automata.pin[m]])
+        at_event = Before(s, s_error, y, y_error, p, z)
+        outcome, _ = settle_ordinary(
+            functions,
+            automata,
+            tapes,
+            inputs,
+            lin,
+            at_event,
+            fired,
+            n_discrete,
+            discrete_at,
+            y1,
+            slopes,
+            z1,
+            p1,
+            work,
+        )
+        if outcome != SETTLED:
+            return STOPPED, n_segments
+        put(y1, jumps[n_segments, 2])
+        n_segments += 1
+        put(y1, x)
+        put(slopes, x_error)
+        put(z1, z)
+        put(p1, p)
+        for g in range(sides.shape[0]):
+            sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
+            floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
+        high, low = two_sum(clock[0], s)
+        clock[0], clock[1] = two_sum(high, low + clock[1])
+
+
+@inlined
+def _value_and_slope(lin: Any, k: int, g: int, x: Any, w: Any) -> tuple[float, float]:
+    """A guard and its rate at y = (x, w)."""
+    n, value, slope = x.shape[0], 0.0, 0.0
+    for m in range(n):
+        value += lin.series[k, g, m, 0] * x[m]
+        slope += lin.series[k, g, m, 1] * x[m]
+    for m in range(w.shape[0]):
+        value += lin.series[k, g, n + m, 0] * w[m]
+        slope += lin.series[k, g, n + m, 1] * w[m]
+    return value, slope

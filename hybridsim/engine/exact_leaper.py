@@ -1,0 +1,147 @@
+"""Leaps over segments of linear modes, as the general mode loop sees them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.closed_form_block import ClosedFormBlock
+from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.exact_leap import Record, Room, exact_leap
+from hybridsim.engine.leap import AT_TARGET, FULL, State
+from hybridsim.engine.linear_tables import TERMS, LinearTables, tables_of
+from hybridsim.engine.mode_tables import automata_of, shelf_of
+from hybridsim.engine.ordinary_event import functions_of, work_space
+from hybridsim.engine.packs import packed
+from hybridsim.engine.settle import Outcome
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.engine.trajectory import Trajectory
+
+_SEGMENTS = 1024  # room for one call
+
+
+_compiled: list[bool] = []
+
+
+def compile_exact_leaps(system: System) -> None:
+    """Have ready what leaps call: functions of this system, and the loop itself, the same for all, once a process."""
+    functions_of(system)
+    if _compiled or not system.n:
+        return
+    guards, n, none = system.guard_count, system.n, np.zeros(0, dtype=np.int64)
+    modes = np.zeros(len(system.automata), dtype=np.int64)
+    nowhere = Instant(0.0)
+    p = system.vector(nowhere, np.zeros(system.layout.discrete))
+    sides, orders = np.ones(guards, dtype=np.int64), np.zeros(guards, dtype=np.int64)
+    still = Outcome(
+        np.zeros(n), p, modes, sides, orders, none, none, np.zeros(n), np.zeros(guards), np.zeros(0)
+    )
+    ExactLeaper(system, np.inf).leap(nowhere, still, p, nowhere, Trajectory(system))
+    _compiled.append(True)
+
+
+class ExactLeaper:
+    """Leaps of one run."""
+
+    def __init__(self, system: System, longest: float) -> None:
+        self.system, self.longest = system, longest
+        self.shelf, self.automata, self.functions = (
+            shelf_of(system),
+            automata_of(system),
+            functions_of(system),
+        )
+        layout = system.layout
+        self.places = (
+            np.asarray(system.rates),
+            layout.origin_at,
+            layout.phases_at,
+            layout.discrete_at,
+            layout.discrete,
+        )
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        self.shelf.surround(outcome.z)
+        clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
+        state = State(
+            outcome.x.copy(),
+            outcome.x_error.copy(),
+            outcome.z.copy(),
+            p.copy(),
+            outcome.sides.copy(),
+            outcome.orders.copy(),
+            outcome.guard_floors.copy(),
+        )
+        tapes = self.shelf.tapes
+        tables = tables_of(self.system, tapes.modes, p)
+        work = work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1)
+        rows = self._record(tables)
+        code, count = exact_leap(
+            self.functions, self.automata, tapes, self.system.registers.inputs, tables, self.places, self.longest,
+            to, clock, packed(state), work, packed(self._room(tables)), packed(rows),
+        )  # fmt: skip
+        instants = self._commit(tables, Record(*(r[:count] for r in rows)), state[2], clock, record)
+        x, x_error, z, p, sides, orders, floors = state
+        self.shelf.surround(z)
+        none = np.zeros(0, dtype=np.int64)
+        after = Outcome(x, p, z, sides, orders, none, none, x_error, floors, np.zeros(0), continuous=False)
+        goes_on = code == FULL or (count > 0 and len(self.shelf.tapes.modes) != len(tapes.modes))
+        end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
+        return Landing(Instant(*clock.tolist()), after, end, instants)
+
+    def _room(self, tables: LinearTables) -> Room:
+        """Scratch arrays of the kernel."""
+        n, widest = self.system.n, tables.values.shape[1]
+        return Room(
+            *(np.zeros(widest, dtype=complex) for _ in range(2)),
+            np.zeros((2, TERMS)),
+            *(np.empty(n) for _ in range(3)),
+            np.empty(len(self.system.automata), dtype=np.int64),
+            np.empty(self.system.layout.size),
+            *(np.empty(n) for _ in range(2)),
+        )
+
+    def _record(self, tables: LinearTables) -> Record:
+        """Fresh arrays for the kernel to write to; the trajectory keeps them."""
+        n, count = self.system.n, len(self.system.automata)
+        return Record(
+            np.empty(_SEGMENTS),
+            np.empty((_SEGMENTS, 2)),
+            np.empty(_SEGMENTS, dtype=np.int64),
+            np.empty((_SEGMENTS, count), dtype=np.int64),
+            np.empty((_SEGMENTS, self.system.layout.size)),
+            np.empty((_SEGMENTS, tables.values.shape[1]), dtype=complex),
+            np.empty(_SEGMENTS, dtype=np.int64),
+            np.empty((_SEGMENTS, 3, n)),
+        )
+
+    def _commit(
+        self,
+        tables: LinearTables,
+        rows: Record,
+        z_after: np.ndarray,
+        clock: np.ndarray,
+        record: Trajectory,
+    ) -> np.ndarray:
+        """Leave what was written to the trajectory; the instants (E, 2) of its events."""
+        ends, origins, numbers, modes, vectors, coordinates, fired, jumps = rows
+        count = len(ends)
+        if not count:
+            return np.empty((0, 2))
+        system, counters = self.system, record.counters
+        record.segments.add(
+            ClosedFormBlock(system, tables, numbers, ends, coordinates, origins, modes, vectors, jumps)
+        )
+        counters.steps += count
+        counters.restarts += count
+        events = count if fired[-1] >= 0 else count - 1
+        instants = np.concatenate([origins[1:], clock[None]])[:events]
+        if events:
+            after = np.concatenate([modes[1:], z_after[None]])[:events]
+            crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events, 1:])
+            counters.events += len(crossings)
+            record.occurrences.add(crossings)
+        return instants

@@ -1,0 +1,250 @@
+"""Which modes are linear, read off the tape: each register as a linear form over states and functions of time.
+
+A register that depends on time alone is a polynomial over atoms: local time, sines and cosines of angles that grow
+linearly, exponentials of linear time, and values that are constant in a segment. Derivatives of such polynomials are
+such polynomials, so the states and the monomials that occur obey one linear system with constant coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybridsim.engine.tape import (
+    ABS,
+    ADD,
+    COPY,
+    DIV,
+    EXP,
+    MUL,
+    NEG,
+    NOT,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+from hybridsim.engine.taylor import advance
+
+TIME, VALUE, ANGLE, GROWTH = range(4)  # kinds of atoms
+Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else 0
+Monomial = tuple[Factor, ...]  # sorted; () is 1
+Key = int | Monomial  # a state's index, or a monomial over atoms
+Form = dict[Key, float]
+
+_ONE: Monomial = ()
+_PAIRED = (SINCOS, SINHCOSH, TANGENT)
+_SINGLE = (NEG, ABS, SIGN, NOT, EXP, SQRT, SINCOS, SINHCOSH, TANGENT)
+_HIGHEST = 8  # degree of a monomial; beyond it the closure under derivatives would be large
+
+
+class NotLinear(Exception):
+    """A rate or a guard that is no linear form; the message says which kind of operation is in the way."""
+
+
+@dataclass(frozen=True)
+class Atom:
+    """An angle or exponent rate*s + offset + sum of weights*p[source], a value, or local time (rate 1)."""
+
+    kind: int
+    rate: float
+    offset: float
+    terms: tuple[tuple[int, float], ...]  # (source in p, weight)
+
+
+class Atoms:
+    """The atoms met so far, numbered; number 0 is local time."""
+
+    def __init__(self) -> None:
+        self.known: list[Atom] = [Atom(TIME, 1.0, 0.0, ())]
+
+    def number(self, atom: Atom) -> int:
+        """The number of an atom, a new one where it has not been met."""
+        if atom not in self.known:
+            self.known.append(atom)
+        return self.known.index(atom)
+
+    def derivative(self, monomial: Monomial) -> Form:
+        """d/dt of a monomial."""
+        result: Form = {}
+        for i, (a, part) in enumerate(monomial):
+            rest, atom = monomial[:i] + monomial[i + 1 :], self.known[a]
+            if atom.kind == TIME:
+                _accumulate(result, rest, 1.0)
+            elif atom.kind == GROWTH:
+                _accumulate(result, monomial, atom.rate)
+            elif atom.kind == ANGLE:
+                other = tuple(sorted((*rest, (a, 1 - part))))
+                _accumulate(result, other, atom.rate if part == 0 else -atom.rate)
+        return result
+
+    def closure(self, monomials: Iterable[Monomial]) -> list[Monomial]:
+        """These monomials and all that their derivatives are made of."""
+        found: list[Monomial] = []
+        waiting = sorted(set(monomials))
+        while waiting:
+            monomial = waiting.pop()
+            if monomial not in found:
+                found.append(monomial)
+                waiting += [m for m in self.derivative(monomial) if isinstance(m, tuple)]
+        return sorted(found, key=lambda m: (len(m), m))
+
+
+def _accumulate(form: Form, key: Key, weight: float) -> None:
+    form[key] = form.get(key, 0.0) + weight
+    if form[key] == 0.0:
+        del form[key]
+
+
+class LinearReader:
+    """Linear forms of the registers of one tape, at given values of the parameters.
+
+    constants: (register, value); parameters: (register, source in p); varying: sources that differ from segment to
+    segment; p: the run-time vector, of which only the other sources are read.
+    """
+
+    def __init__(
+        self,
+        atoms: Atoms,
+        time: int,
+        states: Iterable[int],
+        constants: Iterable[tuple[int, float]],
+        parameters: Iterable[tuple[int, int]],
+        varying: range,
+        p: np.ndarray,
+    ) -> None:
+        self.atoms = atoms
+        self.forms: dict[int, Form | NotLinear] = {time: {((0, 0),): 1.0}}
+        self.forms |= {register: {i: 1.0} for i, register in enumerate(states)}
+        for register, value in constants:
+            self.forms[register] = _constant(value)
+        for register, source in parameters:
+            if source in varying:
+                value_of = Atom(VALUE, 0.0, 0.0, ((source, 1.0),))
+                self.forms[register] = {((atoms.number(value_of), 0),): 1.0}
+            else:
+                self.forms[register] = _constant(float(p[source]))
+
+    def read(self, rows: Iterable[tuple[int, ...]]) -> None:
+        """Add the results of these rows; what is no linear form is kept as the reason."""
+        for op, a, b, c, out in rows:
+            try:
+                found = self._apply(op, a, b, c)
+            except NotLinear as reason:
+                self.forms[out] = reason
+                if op in _PAIRED:
+                    self.forms[out + 1] = reason
+                continue
+            self.forms[out] = found[0]
+            if len(found) > 1:
+                self.forms[out + 1] = found[1]
+
+    def form(self, register: int) -> Form:
+        """The linear form of a register; raises NotLinear."""
+        found = self.forms[register]
+        if isinstance(found, NotLinear):
+            raise found
+        return found
+
+    def _apply(self, op: int, a: int, b: int, c: int) -> tuple[Form, ...]:
+        if op == SELECT:
+            condition = _number(self.form(a))
+            if condition is None:
+                raise NotLinear("a condition that changes")
+            return (self.form(b) if condition != 0.0 else self.form(c),)
+        given = [self.form(a)] if op in (COPY, *_SINGLE) else [self.form(a), self.form(b)]
+        numbers = [_number(form) for form in given]
+        if op != COPY and None not in numbers:
+            return self._evaluated(op, b, c, [float(v) for v in numbers if v is not None])
+        if op == COPY:
+            return (given[0],)
+        if op == NEG:
+            return ({key: -weight for key, weight in given[0].items()},)
+        if op in (ADD, SUB):
+            return (_sum(given[0], given[1], 1.0 if op == ADD else -1.0),)
+        if op == MUL:
+            return (_product(given[0], given[1]),)
+        if op == DIV and numbers[1] is not None:
+            return ({key: weight / numbers[1] for key, weight in given[0].items()},)
+        if op == SINCOS:
+            number = self.atoms.number(_linear_atom(ANGLE, given[0], self.atoms))
+            return {((number, 0),): 1.0}, {((number, 1),): 1.0}
+        if op == EXP:
+            return ({((self.atoms.number(_linear_atom(GROWTH, given[0], self.atoms)), 0),): 1.0},)
+        raise NotLinear(_IN_THE_WAY.get(op, "a corner, a jump or another function of what moves"))
+
+    def _evaluated(self, op: int, b: int, c: int, values: list[float]) -> tuple[Form, ...]:
+        """An operation on numbers; b and c are flags where there is one operand."""
+        V = np.zeros((4, 1))
+        V[: len(values), 0] = values
+        advance(np.array([[op, 0, 1 if len(values) > 1 else b, c, 2]], dtype=np.int64), V, 0)
+        return (
+            (_constant(float(V[2, 0])), _constant(float(V[3, 0])))
+            if op in _PAIRED
+            else (_constant(float(V[2, 0])),)
+        )
+
+
+_IN_THE_WAY = {
+    DIV: "a quotient by what moves",
+    SQRT: "a root of what moves",
+    SINHCOSH: "a hyperbolic function of what moves",
+    TANGENT: "a tangent of what moves",
+}
+
+
+def _constant(value: float) -> Form:
+    return {_ONE: value} if value != 0.0 else {}
+
+
+def _number(form: Form) -> float | None:
+    """The value of a form that is one number; None for any other."""
+    if not form:
+        return 0.0
+    return form[_ONE] if len(form) == 1 and _ONE in form else None
+
+
+def _sum(a: Form, b: Form, sign: float) -> Form:
+    result = dict(a)
+    for key, weight in b.items():
+        _accumulate(result, key, sign * weight)
+    return result
+
+
+def _product(a: Form, b: Form) -> Form:
+    """The product of two forms, if it is one."""
+    result: Form = {}
+    for left, u in a.items():
+        for right, v in b.items():
+            if isinstance(left, tuple) and isinstance(right, tuple):
+                monomial = tuple(sorted((*left, *right)))
+                if len(monomial) > _HIGHEST:
+                    raise NotLinear(f"a product of more than {_HIGHEST} functions of time")
+                _accumulate(result, monomial, u * v)
+            elif left == _ONE or right == _ONE:
+                _accumulate(result, right if left == _ONE else left, u * v)
+            elif isinstance(left, tuple) or isinstance(right, tuple):
+                raise NotLinear("a product of a state and what changes in time")
+            else:
+                raise NotLinear("a product of states")
+    return result
+
+
+def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
+    """The atom of an angle or an exponent; it has to be linear in time and free of states."""
+    rate, offset, terms = 0.0, 0.0, []
+    for key, weight in form.items():
+        if key == _ONE:
+            offset = weight
+        elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == TIME:
+            rate = weight
+        elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == VALUE:
+            terms += [(source, weight * w) for source, w in atoms.known[key[0][0]].terms]
+        else:
+            raise NotLinear("a sine or exponential of more than linear time")
+    return Atom(kind, rate, offset, tuple(sorted(terms)))

@@ -1,0 +1,300 @@
+"""Linear modes in compiled code: functions of time, exponentials of blocks, guards' series, first zeros of guards.
+
+Arrays are those of `hybridsim.engine.linear_tables`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jit import inlined, kernel, polynomial_kernel
+from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
+from hybridsim.engine.linear_tables import TERMS
+
+_SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
+_ITERATIONS = 100
+_NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
+_POLISH = 6  # iterations of it from nearby
+_SAFE = 0.95  # to end on the safe side
+
+
+@inlined
+def size_of(z: complex) -> float:
+    """A bound of a complex number's modulus, at most 1.5 times too large and cheaper than a root."""
+    return abs(z.real) + abs(z.imag)
+
+
+@inlined
+def functions_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, w: Any, w_error: Any) -> None:
+    """Monomials at local time s with bounds of their errors. factors: room for (2 A, 2) values and relative errors."""
+    for a in range(lin.kinds.shape[0]):
+        angle, error = lin.offsets[a], UNIT * abs(lin.offsets[a])
+        for i in range(lin.term_start[a], lin.term_start[a + 1]):
+            source = lin.sources[i]
+            term = lin.weights[i] * p[source]
+            angle += term
+            is_phase = lin.phases[0] <= source < lin.phases[1]
+            error += (2.0 * UNIT if is_phase else 0.0) * abs(term)
+            if lin.weights[i] != 1.0 or i > lin.term_start[a]:
+                error += 2.0 * UNIT * abs(term)
+        if lin.kinds[a] == TIME:
+            factors[2 * a, 0], factors[2 * a, 1] = s, s_error
+            continue
+        if lin.rates[a] != 0.0:
+            turned = lin.rates[a] * s
+            angle += turned
+            error += abs(lin.rates[a]) * s_error + UNIT * (abs(turned) + abs(angle))
+        if lin.kinds[a] == ANGLE:
+            sine, cosine = math.sin(angle), math.cos(angle)
+            factors[2 * a, 0], factors[2 * a + 1, 0] = sine, cosine
+            factors[2 * a, 1] = abs(cosine) * error + 0.5 * error * error + 2.0 * UNIT * abs(sine)
+            factors[2 * a + 1, 1] = abs(sine) * error + 0.5 * error * error + 2.0 * UNIT * abs(cosine)
+        elif lin.kinds[a] == GROWTH:
+            value = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises where it overflows
+            factors[2 * a, 0], factors[2 * a, 1] = value, value * (error + 2.0 * UNIT)
+        else:
+            factors[2 * a, 0], factors[2 * a, 1] = angle, error
+    for m in range(w.shape[0]):
+        value, error = 1.0, 0.0
+        for i in range(lin.factor_start[m], lin.factor_start[m + 1]):
+            v, e = factors[lin.factors[i], 0], factors[lin.factors[i], 1]
+            error = error * (abs(v) + e) + abs(value) * e
+            value *= v
+            if i > lin.factor_start[m]:
+                error += UNIT * abs(value)
+        w[m], w_error[m] = value, error
+
+
+@inlined
+def linear_series(
+    lin: Any, tapes: Any, k: int, x: Any, x_error: Any, w: Any, w_error: Any, values: Any, bounds: Any
+) -> None:
+    """Taylor coefficients of the active guards of the modes in row k at y = (x, w), with bounds."""
+    n = x.shape[0]
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        for j in range(ORDER + 1):
+            values[g, j], bounds[g, j] = 0.0, 0.0
+        for m in range(n + w.shape[0]):
+            y, error = (x[m], x_error[m]) if m < n else (w[m - n], w_error[m - n])
+            size = abs(y) + error
+            for j in range(ORDER + 1):
+                row = lin.series[k, g, m, j]
+                values[g, j] += row * y
+                bounds[g, j] += abs(row) * error + lin.roundings[k, g, m, j] * size
+
+
+@inlined
+def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
+    """Modal coordinates of y = (x, w)."""
+    n = x.shape[0]
+    for j in range(lin.counts[k]):
+        total = 0.0 + 0.0j
+        for m in range(n):
+            total += lin.inverse[k, j, m] * x[m]
+        for m in range(w.shape[0]):
+            total += lin.inverse[k, j, n + m] * w[m]
+        c[j] = total
+
+
+@inlined
+def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
+    """Modal coordinates after a time d: exp(B d) c."""
+    j = 0
+    while j < lin.counts[k]:
+        end = lin.ends[k, j]
+        if end == j + 1:
+            value = lin.values[k, j]
+            if value == 0.0:
+                out[j] = c[j]
+            else:
+                size = math.exp(min(value.real * d, 709.0))
+                angle = value.imag * d
+                out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
+        else:
+            _move_block(lin, k, j, end, c, d, out)
+        j = end
+
+
+@kernel
+def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
+    """A block of several coordinates: exp(mean d) times the series of the rest, in parts where that is large."""
+    size = end - first
+    mean = 0.0 + 0.0j
+    for j in range(first, end):
+        mean += lin.values[k, j] / size
+    spread = 0.0
+    for j in range(first, end):
+        row = abs(lin.values[k, j] - mean)
+        for i in range(j + 1, end):
+            row += abs(lin.upper[k, j, i])
+        spread = max(spread, row)
+    parts = max(1, math.ceil(spread * abs(d) / _SPREAD))
+    h = d / parts
+    factor = np.exp(mean * h)
+    term, total = np.empty(size, dtype=np.complex128), np.empty(size, dtype=np.complex128)
+    for j in range(size):
+        out[first + j] = c[first + j]
+    for _ in range(parts):
+        for j in range(size):
+            total[j] = term[j] = out[first + j]
+        for order in range(1, _ITERATIONS):
+            grown, whole = 0.0, 0.0
+            for j in range(size):  # upper triangular: row j needs no term before it
+                value = (lin.values[k, first + j] - mean) * term[j]
+                for i in range(j + 1, size):
+                    value += lin.upper[k, first + j, first + i] * term[i]
+                term[j] = value * (h / order)
+                total[j] += term[j]
+                grown, whole = grown + size_of(term[j]), whole + size_of(total[j])
+            if not grown > 0.125 * UNIT * whole:
+                break
+        for j in range(size):
+            out[first + j] = factor * total[j]
+
+
+@inlined
+def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
+    """States at modal coordinates c."""
+    for i in range(x.shape[0]):
+        total = 0.0
+        for j in range(lin.counts[k]):
+            b = lin.basis[k, i, j]
+            total += b.real * c[j].real - b.imag * c[j].imag
+        x[i] = total
+
+
+@inlined
+def state_sizes(lin: Any, k: int, c: Any, scale: Any) -> None:
+    """What the states are summed from, in size: at least so large is a rounding error relative to a unit roundoff."""
+    for i in range(scale.shape[0]):
+        total = 0.0
+        for j in range(lin.counts[k]):
+            total += size_of(lin.basis[k, i, j]) * size_of(c[j])
+        scale[i] = max(scale[i], total)
+
+
+@inlined
+def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, float]:
+    """Taylor coefficients of a guard at c into `terms`; (a bound of its size, of the first coefficient left out).
+
+    The latter holds from here on as long as no block grows: |gamma| |B**m| |c|/m!, block by block.
+    """
+    size, rest = 0.0, 0.0
+    for i in range(TERMS):
+        terms[i] = 0.0
+    for j in range(lin.counts[k]):
+        real, imaginary = c[j].real, c[j].imag
+        modulus = abs(real) + abs(imaginary)
+        size += lin.sizes[k, g, j] * modulus
+        rest += lin.rests[k, g, j] * modulus
+        for i in range(TERMS):
+            terms[i] += lin.terms[k, g, j, 0, i] * real - lin.terms[k, g, j, 1, i] * imaginary
+    return size, rest
+
+
+@polynomial_kernel
+def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
+    """A polynomial of d and its derivative: Horner's rule on `start` and then the coefficients, highest first."""
+    value, slope = start, 0.0
+    for i in range(count):
+        slope = slope * d + value
+        value = value * d + backward[i]
+    return value, slope
+
+
+@inlined
+def safe_step(terms: Any, first: int, rest: float, longest: float, lower: Any) -> float:
+    """A step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] > 0, m the number of terms.
+
+    Positive terms after the first negative one are left out, so that the bound has one zero (Descartes' rule), and is
+    positive before every point at which it is. lower: room for its terms.
+    """
+    m = TERMS - first
+    is_down = False
+    for i in range(m):
+        a = terms[first + i]
+        is_down = is_down or a < 0.0
+        lower[m - 1 - i] = min(a, 0.0) if is_down else a
+    d = longest
+    a, b, c = lower[m - 1], lower[m - 2], lower[m - 3]
+    if b < 0.0 or c < 0.0:  # the zero of three terms is a good guess
+        d = min(d, 2.0 * a / (math.sqrt(b * b - 4.0 * a * c) - b))
+    for _ in range(_ITERATIONS):
+        value, slope = value_and_slope(lower, m, d, -rest)
+        if value > 0.0:
+            return d
+        closer = (d - value / slope) * _SAFE if slope < 0.0 else 0.0
+        d = closer if 0.0 < closer < d else 0.5 * d
+    return 0.0
+
+
+@inlined
+def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
+    """The zero just ahead of a guard that falls, by its Taylor polynomial; NaN where that is not good to rounding."""
+    if not terms[1] < 0.0:
+        return math.nan
+    d = -terms[0] / terms[1]
+    left_out = rest
+    for _ in range(TERMS):
+        left_out *= abs(d)
+    if not left_out <= 0.25 * UNIT * size:
+        return math.nan
+    for i in range(TERMS):
+        backward[i] = terms[TERMS - 1 - i]
+    for _ in range(_POLISH):
+        value, slope = value_and_slope(backward, TERMS, d, 0.0)
+        if not slope < 0.5 * terms[1]:
+            return math.nan
+        change = value / slope
+        d -= change
+        if abs(change) <= _NEAR * abs(d):
+            break
+    left_out = rest
+    for _ in range(TERMS):
+        left_out *= abs(d)
+    return d if left_out <= 0.25 * UNIT * size else math.nan
+
+
+@kernel
+def first_zero(
+    lin: Any, k: int, g: int, c: Any, bound: float, side: int, order: int, floor: float, room: Any, v: Any
+) -> tuple[int, float]:
+    """When a guard first goes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s): a question of rounding.
+
+    The guard is positive just after 0; its first `order` coefficients are zero by decree, to within `floor`. From point
+    to point it is bounded from below by its Taylor polynomial less the largest remainder, so that no zero is jumped
+    over; once the polynomial holds to rounding up to the zero, that is the polynomial's. room (2, TERMS), v: scratch.
+    """
+    terms, lower = room[0], room[1]
+    size, rest = guard_terms(lin, k, g, c, terms)
+    if not size < math.inf:
+        return OPEN, 0.0
+    if size == 0.0 and side >= 0:
+        return NEVER, bound
+    if side <= 0 or order >= TERMS - 3 or not terms[order] > 0.0:
+        return OPEN, 0.0
+    farthest, grown = lin.farthest[k, g], lin.grown[k, g]
+    s = 0.0
+    while True:
+        d = safe_step(terms, order, grown * rest, min(bound - s, farthest), lower)
+        if d >= bound - s:
+            return NEVER, bound
+        if not s + d > s:
+            return OPEN, s
+        s += d
+        moved(lin, k, c, s, v)
+        size, rest = guard_terms(lin, k, g, v, terms)
+        error = (16.0 + 2.0 * lin.counts[k]) * UNIT * size + floor
+        order, floor = 0, 0.0
+        d = zero_of_terms(terms, grown * rest, size, lower)
+        # beyond the zero the guard has to go below what its error could hide
+        if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
+            return (FOUND, s + d) if s + d <= bound else (NEVER, bound)
+        if not terms[0] > error:
+            return OPEN, s

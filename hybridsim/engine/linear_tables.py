@@ -1,0 +1,249 @@
+"""Linear modes as arrays for compiled loops: functions of time, series of guards, block diagonal flows."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.linear_form import Atoms, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.modal import Modal, modal
+from hybridsim.engine.packs import packed
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.errors import UsageError
+
+TERMS = 10  # of the series that bounds a guard from below
+_FARTHEST = 6.0  # in units of the fastest rate: the bound by so few terms ends before
+_KEPT = 64  # tables of a structure, one for each set of parameter values
+_ROUNDINGS = (
+    8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
+)
+
+
+class LinearTables(NamedTuple):
+    """One row for each vector of modes, in the order of the shelf; y = (states, monomials) has n + M entries.
+
+    kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factor_start (M + 1,), factors: the
+    monomials, 2*atom + part. phases (2,): the sources in p that are angles known to rounding only.
+    series (K, G, n + M, 4): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
+    y of size 1. counts (K,), values (K, J), upper (K, J, J), ends (K, J): the flow in modal coordinates; basis (K, n,
+    J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards in
+    modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of the
+    first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor.
+    """
+
+    kinds: np.ndarray
+    rates: np.ndarray
+    offsets: np.ndarray
+    term_start: np.ndarray
+    sources: np.ndarray
+    weights: np.ndarray
+    factor_start: np.ndarray
+    factors: np.ndarray
+    phases: np.ndarray
+    series: np.ndarray
+    roundings: np.ndarray
+    counts: np.ndarray
+    values: np.ndarray
+    upper: np.ndarray
+    ends: np.ndarray
+    basis: np.ndarray
+    inverse: np.ndarray
+    terms: np.ndarray
+    sizes: np.ndarray
+    rests: np.ndarray
+    farthest: np.ndarray
+    grown: np.ndarray
+
+
+class LinearMode:
+    """Forms of the rates and active guards of one vector of modes; raises NotLinear with what is in the way."""
+
+    def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: np.ndarray) -> None:
+        tape, layout = system.code.data["tape"], system.layout
+        varying = range(layout.discrete_at, layout.size)
+        parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
+        constants = [(r, v) for r, v, _ in tape["constants"]]
+        constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
+        reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
+        reader.read(system.mode_rows(z))
+        self.rates: list[Form] = []
+        for name, register in zip(system.names, tape["derivatives"], strict=True):
+            self.rates.append(_named(reader, register, f"the rate of {name}"))
+        self.guards: dict[int, Form] = {}
+        for g in map(int, np.flatnonzero(system.active(z))):
+            self.guards[g] = _named(reader, tape["guards"][g], system.guard_title(g, z))
+
+    def monomials(self) -> set[Monomial]:
+        """The functions of time in it."""
+        forms = [*self.rates, *self.guards.values()]
+        return {key for form in forms for key in form if isinstance(key, tuple)}
+
+
+def _named(reader: LinearReader, register: int, title: str) -> Form:
+    try:
+        return reader.form(register)
+    except NotLinear as reason:
+        raise NotLinear(f"{title} has {reason}") from None
+
+
+def no_tables() -> LinearTables:
+    """Tables of a loop whose modes are not linear: empty."""
+    i, f, c = np.int64, np.float64, np.complex128
+    tables: LinearTables = packed(LinearTables(
+        np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros(1, i),
+        np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f), np.zeros(0, i),
+        np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
+        np.zeros((0, 0, 0), c), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
+        np.zeros((0, 0)), np.zeros((0, 0)),
+    ))  # fmt: skip
+    return tables
+
+
+def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray) -> LinearTables:
+    """Tables of the vectors of modes met so far, at the parameters in p."""
+    atoms = Atoms()
+    modes = [LinearMode(system, atoms, z, p) for z in met]
+    monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
+    n, size = system.n, system.n + len(monomials)
+    place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
+    motion = np.zeros((size, size))  # of the monomials, the same in all modes
+    for monomial in monomials:
+        for key, weight in atoms.derivative(monomial).items():
+            motion[place[monomial], place[key]] = weight
+    matrices = []
+    for mode in modes:
+        A = motion.copy()
+        for i, form in enumerate(mode.rates):
+            for key, weight in form.items():
+                A[i, place[key]] = weight
+        matrices.append(A)
+    flows = [modal(A) for A in matrices]
+    widest = max((len(f.values) for f in flows), default=0)
+    count, guards = len(met), system.guard_count
+    series, roundings = (np.zeros((count, guards, size, ORDER + 1)) for _ in range(2))
+    terms = np.zeros((count, guards, widest, 2, TERMS))
+    sizes, rests = np.zeros((count, guards, widest)), np.zeros((count, guards, widest))
+    farthest, grown = np.full((count, guards), np.inf), np.ones((count, guards))
+    for k, (mode, A, flow) in enumerate(zip(modes, matrices, flows, strict=True)):
+        for g, form in mode.guards.items():
+            row = np.zeros(size)
+            for key, weight in form.items():
+                row[place[key]] = weight
+            _guard_series(row, A, series[k, g], roundings[k, g])
+            J = len(flow.values)
+            gamma = row @ flow.full_basis
+            _modal_terms(gamma, flow, terms[k, g, :J])
+            sizes[k, g, :J], rests[k, g, :J] = np.abs(gamma), _first_left_out(gamma, flow)
+            seen = np.abs(gamma) > 0.0
+            fastest, growth = max(flow.speeds[seen], default=0.0), max(flow.growth[seen], default=0.0)
+            if fastest > 0.0:
+                farthest[k, g] = _FARTHEST / fastest
+            if growth > 0.0:
+                farthest[k, g], grown[k, g] = min(farthest[k, g], math.log(2.0) / growth), 2.0
+    tables: LinearTables = packed(
+        LinearTables(
+            *_atom_arrays(atoms, monomials),
+            np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
+            series,
+            roundings,
+            np.array([len(f.values) for f in flows], dtype=np.int64),
+            _stack([f.values for f in flows], (widest,), complex),
+            _stack([f.upper for f in flows], (widest, widest), complex),
+            _stack([f.ends for f in flows], (widest,), np.int64),
+            _stack([f.full_basis[:n] for f in flows], (n, widest), complex),
+            _stack([f.inverse for f in flows], (widest, size), complex),
+            terms,
+            sizes,
+            rests,
+            farthest,
+            grown,
+        )
+    )
+    return tables
+
+
+def _guard_series(row: np.ndarray, A: np.ndarray, series: np.ndarray, roundings: np.ndarray) -> None:
+    """Rows of the Taylor coefficients of row @ y along y' = A y, and what rounding makes of each entry."""
+    size, bound = len(row), np.abs(row)
+    for k in range(ORDER + 1):
+        series[:, k] = row
+        roundings[:, k] = (size + (k + 1) * (_ROUNDINGS + size)) * UNIT * bound
+        row, bound = row @ A / (k + 1), bound @ np.abs(A) / (k + 1)
+
+
+def _modal_terms(gamma: np.ndarray, flow: Modal, terms: np.ndarray) -> None:
+    """Taylor coefficients of Re(gamma c) along c' = B c: factors of the real and the imaginary parts of c."""
+    B = np.diag(flow.values) + flow.upper
+    for m in range(TERMS):
+        terms[:, 0, m], terms[:, 1, m] = gamma.real, gamma.imag
+        gamma = gamma @ B / (m + 1)
+
+
+def _first_left_out(gamma: np.ndarray, flow: Modal) -> np.ndarray:
+    """Factors of |c| in a bound of the coefficient TERMS of Re(gamma c): |gamma| |B**TERMS|/TERMS! of each block."""
+    factors, first = np.empty(len(gamma)), 0
+    while first < len(gamma):
+        here = slice(first, int(flow.ends[first]))
+        block = np.diag(flow.values[here]) + flow.upper[here, here]
+        power = np.linalg.norm(np.linalg.matrix_power(block, TERMS), 2)
+        factors[here] = np.linalg.norm(gamma[here]) * power / math.factorial(TERMS)
+        first = here.stop
+    return factors
+
+
+def _atom_arrays(atoms: Atoms, monomials: list[Monomial]) -> tuple[np.ndarray, ...]:
+    known = atoms.known
+    terms = np.cumsum([0, *(len(a.terms) for a in known)])
+    factors = np.cumsum([0, *(len(m) for m in monomials)])
+    return (
+        np.array([a.kind for a in known], dtype=np.int64),
+        np.array([a.rate for a in known]),
+        np.array([a.offset for a in known]),
+        terms.astype(np.int64),
+        np.array([source for a in known for source, _ in a.terms], dtype=np.int64),
+        np.array([weight for a in known for _, weight in a.terms], dtype=float),
+        factors.astype(np.int64),
+        np.array([2 * a + part for m in monomials for a, part in m], dtype=np.int64),
+    )
+
+
+def _stack(parts: list[np.ndarray], shape: tuple[int, ...], kind: Any) -> np.ndarray:
+    """Arrays of different sizes in one, filled up with zeros."""
+    out = np.zeros((len(parts), *shape), dtype=kind)
+    for k, part in enumerate(parts):
+        out[(k, *(slice(0, m) for m in part.shape))] = part
+    return out
+
+
+def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> LinearTables:
+    """Tables of these vectors of modes (K, components); made once for each set of parameter values."""
+    kept: dict[bytes, LinearTables] = system.code.shared("linear", dict)
+    key = p[: system.layout.parameters].tobytes() + modes.tobytes()
+    if key not in kept:
+        if len(kept) >= _KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = linear_tables(system, list(modes), p)
+    return kept[key]
+
+
+def refuse_nonlinear(system: System) -> None:
+    """Refuse a model of which some mode is not linear; other combinations of modes are met when they are entered."""
+    p = system.vector(Instant(0.0), np.zeros(system.layout.discrete))
+    count = len(system.automata)
+    for c, automaton in enumerate(system.automata):
+        for m in range(len(automaton.modes)):
+            z = np.zeros(count, dtype=np.int64)
+            z[c] = m
+            try:
+                LinearMode(system, Atoms(), z, p)
+            except NotLinear as reason:
+                mode = f"{automaton.name}.{automaton.modes[m]}"
+                raise UsageError(
+                    f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
+                    f"and in {mode} {reason}",
+                    remedy="choose taylor or dop853",
+                ) from None
