@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +21,9 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
 
 _STEPS, _SEGMENTS = 4096, 1024  # room for one call
-_ROOM, _FEWEST = (
-    1 << 19,
-    64,
-)  # doubles for the series of one call, as far as that leaves room for so many steps
-_FROM_NOTHING = np.zeros(1, dtype=np.int64)
+# doubles for the series of one call, and how many steps there is room for in any case
+_ROOM, _FEWEST = 1 << 19, 64
+_NONE = np.zeros(0, dtype=np.int64)  # the model has no monitors
 _TIGHTEST = 1e-15
 
 
@@ -60,51 +60,55 @@ class Leaper:
     """Leaps of one run."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        self.system = system
-        n, layout, guards = system.n, system.layout, system.guard_count
+        self.system, layout = system, system.layout
         rtol = max(tolerances.rtol, _TIGHTEST)
-        order = series_order(rtol, system.is_linear)
-        registers = system.registers
+        self.order = series_order(rtol, system.is_linear)
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.functions = functions_of(system)
-        self.inputs = registers.inputs
+        self.inputs = system.registers.inputs
         self.places = (
-            np.asarray(system.rates),
+            system.rates,
             layout.origin_at,
             layout.phases_at,
             layout.discrete_at,
             layout.discrete,
         )
-        self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest)
-        self.work = work_space(system)
-        count = len(system.automata)
-        self.room = (
-            np.zeros((registers.count, order + 1)),
-            np.zeros((registers.count, order + 1)),
+        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
+        # scratch arrays, handed on from run to run; each leap takes a pair of its own
+        self.spare: deque[Any] = system.code.shared(f"scratch of order {self.order}", deque)
+        self._renew()
+
+    def _scratch(self) -> tuple[Any, Any]:
+        """Work space and room of one leap."""
+        system, order, n = self.system, self.order, self.system.n
+        registers, count, guards = system.registers.count, len(system.automata), system.guard_count
+        room = (
+            np.zeros((registers, order + 1)),
+            np.zeros((registers, order + 1)),
             *(np.empty(order + 1) for _ in range(2)),
             np.empty((64, order + 1)),
             *(np.empty(n) for _ in range(3)),
             np.empty(count, dtype=np.int64),
-            np.empty(layout.size),
+            np.empty(system.layout.size),
             *(np.empty(n) for _ in range(2)),
             np.empty(guards, dtype=np.int64),
             np.empty(guards, dtype=np.int64),
             np.empty(guards),
         )
-        self.order = order
-        self._renew()
+        return work_space(system), room
 
     def _renew(self) -> None:
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
         n, count = self.system.n, len(self.system.automata)
         steps = min(max(_ROOM // (n * (self.order + 1)), _FEWEST), _STEPS)
-        self.used = (0, 0)  # steps and segments
+        self.used = (0, 0)  # rows of steps, rows of segments
+        # one row more of segments: where each begins and where the last one ends
         self.record = (
             np.empty((steps, 2)),
             np.empty((steps, n, self.order + 1)),
-            np.empty(_SEGMENTS, dtype=np.int64),
-            np.empty((_SEGMENTS, 2)),
-            np.empty((_SEGMENTS, count), dtype=np.int64),
+            np.empty(_SEGMENTS + 1, dtype=np.int64),
+            np.empty((_SEGMENTS + 1, 2)),
+            np.empty((_SEGMENTS + 1, count), dtype=np.int64),
             np.empty((_SEGMENTS, self.system.layout.size)),
             np.empty(_SEGMENTS, dtype=np.int64),
             np.empty((_SEGMENTS, 2, n)),
@@ -115,7 +119,7 @@ class Leaper:
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
         self.shelf.surround(outcome.z)
-        clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
+        clock, to = np.array(origin), np.array(target)
         state = (
             outcome.x.copy(),
             outcome.x_error.copy(),
@@ -125,60 +129,77 @@ class Leaper:
             outcome.orders.copy(),
             outcome.guard_floors.copy(),
         )
+        try:
+            scratch = self.spare.pop()
+        except IndexError:
+            scratch = self._scratch()
         instants = []
         while True:
-            rows = tuple(part[u:] for part, u in zip(self.record, self._offsets(), strict=True))
+            rows = self._rows()
             code, steps, count = leap(
                 self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
-                to, clock, state, self.work, self.room, rows,
+                to, clock, state, *scratch, rows,
             )  # fmt: skip
-            instants.append(self._commit(rows, steps, count, state[2], clock, record))
             is_full = code == FULL and (count > 0 or self.used != (0, 0))
+            if count:
+                instants.append(self._commit(steps, count, state[2], clock, record))
             if is_full:
                 self._renew()
             known = len(self.shelf.tapes.modes)
             self.shelf.surround(state[2])
             if is_full or len(self.shelf.tapes.modes) == known:
                 break
+        self.spare.append(scratch)
         x, x_error, z, p, sides, orders, floors = state
-        none = np.zeros(0, dtype=np.int64)
-        after = Outcome(x, p, z, sides, orders, none, none, x_error, floors, np.zeros(0), continuous=False)
-        reached = Instant(*clock.tolist())
+        after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
-        return Landing(reached, after, end, instants[0] if len(instants) == 1 else np.concatenate(instants))
+        return Landing(
+            Instant(*clock.tolist()), after, end, instants[0] if len(instants) == 1 else _joined(instants)
+        )
 
-    def _offsets(self) -> tuple[int, ...]:
-        """Where the next call writes, in each array of the record."""
-        steps, segments = self.used
-        return (steps, steps, *(segments for _ in self.record[2:]))
+    def _rows(self) -> tuple[np.ndarray, ...]:
+        """The rows that the next call writes to."""
+        steps, first = self.used
+        lengths, series, ends, *others = self.record
+        return (lengths[steps:], series[steps:], ends[first + 1 :], *(part[first:] for part in others))
 
     def _commit(
-        self,
-        rows: tuple[np.ndarray, ...],
-        steps: int,
-        count: int,
-        z_after: np.ndarray,
-        clock: np.ndarray,
-        record: Trajectory,
+        self, steps: int, count: int, z: np.ndarray, clock: np.ndarray, record: Trajectory
     ) -> np.ndarray:
-        """Leave the used part of the record to the trajectory; the instants (E, 2) of its events."""
-        if not count:
-            return np.empty((0, 2))
-        lengths, series, ends, origins, modes, vectors, fired, jumps = (
-            part[: steps if k < 2 else count] for k, part in enumerate(rows)
-        )
-        self.used = (self.used[0] + steps, self.used[1] + count)
-        starts = np.concatenate([_FROM_NOTHING, ends])
+        """Leave what one call has written to the trajectory; the instants (E, 2) of its events.
+
+        z and clock hold after the last segment, the E-th where an event ended it.
+        """
+        first_step, first = self.used
+        last_step, last = self.used = (first_step + steps, first + count + 1)
+        lengths, series, ends, origins, modes, vectors, fired, jumps = self.record
+        ends[first], origins[last - 1], modes[last - 1] = 0, clock, z
+        begun = slice(first, last - 1)
         system, counters = self.system, record.counters
-        record.segments.add(SeriesBlock(system, starts, lengths, series, origins, modes, vectors, jumps))
+        record.segments.add(
+            SeriesBlock(
+                system,
+                ends[first:last],
+                lengths[first_step:last_step],
+                series[first_step:last_step],
+                origins[begun],
+                modes[begun],
+                vectors[begun],
+                jumps[begun],
+            )
+        )
         counters.steps += steps
         counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end
         counters.restarts += count
-        events = count if fired[-1] >= 0 else count - 1
-        instants = np.concatenate([origins[1:], clock[None]])[:events]
+        events = count if fired[last - 2] >= 0 else count - 1
+        ended, after = slice(first, first + events), slice(first + 1, first + events + 1)
+        instants = origins[after]
         if events:
-            after = np.concatenate([modes[1:], z_after[None]])[:events]
-            crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events])
+            crossings = Crossings(system, instants, fired[ended], modes[ended], modes[after], jumps[ended])
             counters.events += len(crossings)
             record.occurrences.add(crossings)
         return instants
+
+
+def _joined(instants: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate([np.empty((0, 2)), *instants])

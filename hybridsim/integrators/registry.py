@@ -65,6 +65,7 @@ def integrator_class(name: str) -> type[Integrator]:
     return found[name]
 
 
+@cache
 def option_names(cls: type[Any]) -> tuple[str, ...]:
     """The options of an integrator: the fields of its dataclass."""
     return tuple(f.name for f in fields(cls))
