@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.leap import AT_TARGET, FULL, leap
 from hybridsim.engine.mode_tables import automata_of, shelf_of
@@ -15,7 +18,7 @@ from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.settle import Outcome
-from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
@@ -27,15 +30,17 @@ _NONE = np.zeros(0, dtype=np.int64)  # the model has no monitors
 _TIGHTEST = 1e-15
 
 
-_compiled: list[bool] = []
+Maker = Callable[[System, Tolerances, float], "Leaper"]  # for a run whose segments are no longer than that
+
+_compiled: list[Maker] = []
 
 
-def compile_leaps(system: System) -> None:
-    """Have ready what leaps call: functions of this system, and the loop itself, the same for all, once a process."""
+def compile_leaps(system: System, make: Maker) -> None:
+    """Have ready what leaps call: functions of this system, and their loop, the same for all, once a process."""
     functions_of(system)
-    if _compiled or not system.n:
+    if make in _compiled or not system.n:
         return
-    leaper = Leaper(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
+    leaper = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
     nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
     guards, n = system.guard_count, system.n
     modes = np.zeros(len(system.automata), dtype=np.int64)
@@ -53,16 +58,20 @@ def compile_leaps(system: System) -> None:
         np.zeros(0),
     )
     leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
-    _compiled.append(True)
+    _compiled.append(make)
 
 
-class Leaper:
-    """Leaps of one run."""
+class Leaper(ABC):
+    """Leaps of one run; what differs between kernels is left open.
 
-    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        self.system, layout = system, system.layout
-        rtol = max(tolerances.rtol, _TIGHTEST)
-        self.order = series_order(rtol, system.is_linear)
+    Parameters
+    ----------
+    columns : of what the kernel records of each step and state.
+    kind : names the scratch arrays, which are handed on from run to run; each leap takes a pair of its own.
+    """
+
+    def __init__(self, system: System, columns: int, kind: str) -> None:
+        self.system, self.columns, layout = system, columns, system.layout
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.functions = functions_of(system)
         self.inputs = system.registers.inputs
@@ -73,39 +82,42 @@ class Leaper:
             layout.discrete_at,
             layout.discrete,
         )
-        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
-        # scratch arrays, handed on from run to run; each leap takes a pair of its own
-        self.spare: deque[Any] = system.code.shared(f"scratch of order {self.order}", deque)
+        self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
         self._renew()
 
-    def _scratch(self) -> tuple[Any, Any]:
-        """Work space and room of one leap."""
-        system, order, n = self.system, self.order, self.system.n
-        registers, count, guards = system.registers.count, len(system.automata), system.guard_count
-        room = (
-            np.zeros((registers, order + 1)),
-            np.zeros((registers, order + 1)),
-            *(np.empty(order + 1) for _ in range(2)),
-            np.empty((64, order + 1)),
-            *(np.empty(n) for _ in range(3)),
-            np.empty(count, dtype=np.int64),
-            np.empty(system.layout.size),
-            *(np.empty(n) for _ in range(2)),
-            np.empty(guards, dtype=np.int64),
-            np.empty(guards, dtype=np.int64),
-            np.empty(guards),
-        )
-        return work_space(system), room
+    @abstractmethod
+    def _room(self) -> Any:
+        """Scratch arrays of the kernel for one leap."""
+
+    @abstractmethod
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: tuple[np.ndarray, ...],
+        work: Any,
+        room: Any,
+        rows: tuple[np.ndarray, ...],
+    ) -> tuple[int, int, int]:
+        """Run the kernel, which writes to rows of the record: why it ended, how many steps and segments there are."""
+
+    @abstractmethod
+    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+        """Count what so many steps have cost, beside themselves."""
+
+    def _block(self, *arrays: np.ndarray) -> SegmentBlock:
+        """The segments in the arrays of a `SeriesBlock`."""
+        return SeriesBlock(self.system, *arrays)
 
     def _renew(self) -> None:
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
         n, count = self.system.n, len(self.system.automata)
-        steps = min(max(_ROOM // (n * (self.order + 1)), _FEWEST), _STEPS)
+        steps = min(max(_ROOM // (n * self.columns), _FEWEST), _STEPS)
         self.used = (0, 0)  # rows of steps, rows of segments
         # one row more of segments: where each begins and where the last one ends
         self.record = (
             np.empty((steps, 2)),
-            np.empty((steps, n, self.order + 1)),
+            np.empty((steps, n, self.columns)),
             np.empty(_SEGMENTS + 1, dtype=np.int64),
             np.empty((_SEGMENTS + 1, 2)),
             np.empty((_SEGMENTS + 1, count), dtype=np.int64),
@@ -130,16 +142,14 @@ class Leaper:
             outcome.guard_floors.copy(),
         )
         try:
-            scratch = self.spare.pop()
+            work, room = self.spare.pop()
         except IndexError:
-            scratch = self._scratch()
+            work, room = work_space(self.system), self._room()
         instants = []
         while True:
             rows = self._rows()
-            code, steps, count = leap(
-                self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
-                to, clock, state, *scratch, rows,
-            )  # fmt: skip
+            code, steps, count = self._go(to, clock, state, work, room, rows)
+            self._count(record.counters, steps, room)
             is_full = code == FULL and (count > 0 or self.used != (0, 0))
             if count:
                 instants.append(self._commit(steps, count, state[2], clock, record))
@@ -149,7 +159,7 @@ class Leaper:
             self.shelf.surround(state[2])
             if is_full or len(self.shelf.tapes.modes) == known:
                 break
-        self.spare.append(scratch)
+        self.spare.append((work, room))
         x, x_error, z, p, sides, orders, floors = state
         after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
@@ -177,8 +187,7 @@ class Leaper:
         begun = slice(first, last - 1)
         system, counters = self.system, record.counters
         record.segments.add(
-            SeriesBlock(
-                system,
+            self._block(
                 ends[first:last],
                 lengths[first_step:last_step],
                 series[first_step:last_step],
@@ -189,7 +198,6 @@ class Leaper:
             )
         )
         counters.steps += steps
-        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end
         counters.restarts += count
         events = count if fired[last - 2] >= 0 else count - 1
         ended, after = slice(first, first + events), slice(first + 1, first + events + 1)
@@ -203,3 +211,48 @@ class Leaper:
 
 def _joined(instants: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([np.empty((0, 2)), *instants])
+
+
+class TaylorLeaper(Leaper):
+    """Leaps of Taylor series."""
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        rtol = max(tolerances.rtol, _TIGHTEST)
+        self.order = series_order(rtol, system.is_linear)
+        super().__init__(system, self.order + 1, f"order {self.order}")
+        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
+
+    def _room(self) -> Any:
+        system, order, n = self.system, self.order, self.system.n
+        registers, count, guards = system.registers.count, len(system.automata), system.guard_count
+        return (
+            np.zeros((registers, order + 1)),
+            np.zeros((registers, order + 1)),
+            *(np.empty(order + 1) for _ in range(2)),
+            np.empty((64, order + 1)),
+            *(np.empty(n) for _ in range(3)),
+            np.empty(count, dtype=np.int64),
+            np.empty(system.layout.size),
+            *(np.empty(n) for _ in range(2)),
+            np.empty(guards, dtype=np.int64),
+            np.empty(guards, dtype=np.int64),
+            np.empty(guards),
+        )
+
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: tuple[np.ndarray, ...],
+        work: Any,
+        room: Any,
+        rows: tuple[np.ndarray, ...],
+    ) -> tuple[int, int, int]:
+        code, steps, count = leap(
+            self.functions, self.automata, self.shelf.tapes, self.inputs, self.places, self.control,
+            to, clock, state, work, room, rows,
+        )  # fmt: skip
+        return code, steps, count
+
+    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end

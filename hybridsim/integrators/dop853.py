@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
+from hybridsim.engine.leaper import compile_leaps
+from hybridsim.engine.rk_leaper import RungeKuttaLeaper
+from hybridsim.engine.rk_step import Tableau
 from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.dop853_coefficients import E3, E5, A, B, C
-from hybridsim.integrators.runge_kutta import RungeKuttaStepper, Tableau
+from hybridsim.integrators.runge_kutta import RungeKuttaStepper
 
 TABLEAU = Tableau(c=C, a=A, b=B, e=E5, e_low=E3, order=8, error_order=8)
+_leaper = partial(RungeKuttaLeaper, tableau=TABLEAU)
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,17 @@ class Dop853(Integrator):
     reference: ClassVar[str] = "Hairer, Norsett and Wanner 1993, doi:10.1007/978-3-540-78862-1, section II.10"
     when: ClassVar[str] = "the default: smooth modes, not stiff"
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+
+    leaps: ClassVar[bool] = True
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        if not system.has_corners:
+            compile_leaps(system, _leaper)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
+        """The compiled mode loop, for models without corners: it looks at guards through their series."""
+        return None if system.has_corners else _leaper(system, tolerances, longest)
 
     def start(
         self,
