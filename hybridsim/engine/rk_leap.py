@@ -290,7 +290,9 @@ def rk_leap(
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
                 return FULL, first_step, n_segments
-            is_last = h >= bound - s
+            is_last = (
+                h >= bound - s - SMALLEST * 2.0**-52 * bound
+            )  # what would be left is too short for a step
             d = bound - s if is_last else h
             if s > longest or not d > SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments

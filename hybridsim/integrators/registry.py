@@ -15,6 +15,7 @@ from hybridsim.integrators.options import fits, in_words
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
+    "tsit5:Tsit5",
     "taylor:Taylor",
     "scipy_solvers:ScipyDOP853",
     "scipy_solvers:ScipyRK45",

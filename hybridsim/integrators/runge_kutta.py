@@ -1,18 +1,24 @@
-"""Embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
+"""Explicit embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
 from hybridsim.engine.hermite import hermite
+from hybridsim.engine.leaper import compile_leaps
+from hybridsim.engine.rk_leaper import RungeKuttaLeaper
 from hybridsim.engine.rk_step import SMALLEST, Tableau, attempt, next_length
-from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
+from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Pieces
+from hybridsim.integrators.base import Integrator
 
-__all__ = ["RungeKuttaStepper", "Tableau"]
+__all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
 
 _MOST_PARTS = 64  # of a step that is repeated up to an event
 
@@ -50,7 +56,8 @@ class RungeKuttaStepper:
         direction = math.copysign(1.0, self.bound)
         while True:
             h = min(self.h, self.tolerances.max_step)
-            last = h >= abs(self.bound - self.s)
+            # what would be left is too short for a step of its own
+            last = h >= abs(self.bound - self.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - self.s) if last else h
             if not h >= SMALLEST * math.ulp(self.s):
                 raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
@@ -129,3 +136,41 @@ class RungeKuttaStepper:
         # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
         smallest = 1e-9 * abs(self.bound)
         return max(min(100.0 * h0, h1, abs(self.bound)), smallest) if math.isfinite(h1) else smallest
+
+
+@dataclass(frozen=True)
+class RungeKuttaIntegrator(Integrator):
+    """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
+
+    Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
+    corners inside a mode do, since it looks at guards through their series.
+    """
+
+    tableau: ClassVar[Tableau]
+    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    leaps: ClassVar[bool] = True
+
+    @classmethod
+    def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
+        return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        if not system.has_corners:
+            compile_leaps(system, self._leaper)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
+        """The compiled mode loop; None for a model with corners."""
+        return None if system.has_corners else self._leaper(system, tolerances, longest)
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return RungeKuttaStepper(self.tableau, flow, x0, s_bound, tolerances, first_step)

@@ -16,10 +16,10 @@ from hybridsim.engine import loop
 from hybridsim.engine.hermite import bernstein_weights, fit_all, hermite, right_system, shift_matrix
 from hybridsim.engine.rk_leap import first_length, stays_positive
 from hybridsim.engine.rk_step import forget, next_length
-from hybridsim.integrators.dop853 import TABLEAU as DOP853
+from hybridsim.integrators.dop853 import Dop853
 from hybridsim.integrators.registry import integrator_class
 
-METHODS = ("dop853",)
+METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 WEIGHTS = bernstein_weights(4)
 
@@ -76,21 +76,21 @@ def test_first_estimate_of_dop853() -> None:
 
     def estimate(h: float, e: np.ndarray) -> float:
         k: list[float] = []
-        for row in DOP853.a:
+        for row in Dop853.tableau.a:
             k.append(1.0 + h * sum(w * slope for w, slope in zip(row, k, strict=False)))
         return abs(h * sum(w * slope for w, slope in zip(e, k, strict=True)))
 
-    q, c, c_next, q_low, c_low = DOP853.leading_terms
+    q, c, c_next, q_low, c_low = Dop853.tableau.leading_terms
     assert (q, q_low) == (6, 4)
     h = 1e-2
-    main = estimate(h, DOP853.e)
+    main = estimate(h, Dop853.tableau.e)
     assert main == pytest.approx(h**q * (c / math.factorial(q)), rel=0.1)
-    low = estimate(h, DOP853.e_low)
+    low = estimate(h, Dop853.tableau.e_low)
     assert low == pytest.approx(h**q_low * c_low / math.factorial(q_low), rel=0.1)
     V = np.array([[1 / math.factorial(k) for k in range(q + 2)]])
     control = (1e-9, np.zeros(1))
     h = first_length((q, c, c_next, q_low, c_low), np.ones(1), control, np.zeros(1, dtype=np.int64), V, 9.0)
-    main, low = estimate(h, DOP853.e), estimate(h, DOP853.e_low)
+    main, low = estimate(h, Dop853.tableau.e), estimate(h, Dop853.tableau.e_low)
     assert 0.2 < main**2 / math.hypot(main, 0.1 * low) / (1e-9 * math.exp(h)) <= 1.0
 
 
