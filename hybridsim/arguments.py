@@ -32,6 +32,8 @@ def number(value: Any, what: str, remedy: str = "give a number") -> float:
 
 def is_row(value: Any) -> bool:
     """Whether a value has items in a row: a text, a mapping and an array of no dimension have none."""
+    if type(value) in (tuple, list):
+        return True
     if isinstance(value, np.ndarray):
         return value.ndim > 0
     return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
@@ -161,7 +163,9 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
             values[names.index(name)] = number(value, f"atol of {name}")
     elif is_row(atol):
         values = numbers(atol, "atol", remedy)
-    elif atol is not None:
+    elif atol is None:
+        return values
+    else:
         values[:] = number(atol, "atol", remedy)
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
         raise UsageError(f"atol is {atol!r}", remedy=remedy)

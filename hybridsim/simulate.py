@@ -72,17 +72,16 @@ def simulate(
     """
     model = arguments.chosen_model(model, params)
     x0_states, model = arguments.start_values(model, x0)
-    model.validate()
     span = arguments.time_span(t_span)
     from hybridsim.engine.jit import announce_compilation
-    from hybridsim.engine.system import System
+    from hybridsim.engine.recent import system_of
     from hybridsim.integrators.registry import make_integrator
 
     announce_compilation()
     method = make_integrator(arguments.integrator_name(integrator), options)
     arguments.refuse_unused(method, rtol=rtol, atol=atol)
     began = time.perf_counter()
-    system = System(model)
+    system = system_of(model)
     for name in system.hot_functions():
         system.address(name)
     method.prepare(system)
@@ -133,7 +132,7 @@ def _run(
         arguments.step_bound(max_step, "max_step"),
         None if first_step is None else arguments.step_bound(first_step, "first_step"),
     )
-    discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
+    discrete = system.discrete_start
     task = Task(span[0], span[1], start, z0, tolerances, discrete)
     grid = arguments.time_grid(t_eval, span)
     refuse_driving(system, span[0], start, discrete, z0)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
@@ -17,6 +19,26 @@ _FEW = 4  # intervals after which one may be on its way
 _SAME_FACTOR = 1e-3
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
 _ULPS = 16.0
+
+
+@kernel
+def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: float) -> int:
+    """How many times in a row an interval is shorter than the one before it, or next to nothing.
+
+    gaps (k,): intervals up to the instant (high, low), after which the instants (E, 2) follow.
+    """
+    longest, falls, before = 0, 0, math.inf
+    known = gaps.shape[0]
+    for i in range(known + instants.shape[0]):
+        if i < known:
+            gap = gaps[i]
+        else:
+            gap = abs((instants[i - known, 0] - high) + (instants[i - known, 1] - low))
+            high, low = instants[i - known, 0], instants[i - known, 1]
+        falls = falls + 1 if gap < before or gap <= max(shortest, _ULPS * 2.0**-52 * abs(high)) else 0
+        longest = max(longest, falls)
+        before = gap
+    return longest
 
 
 class Accumulation:
@@ -41,19 +63,16 @@ class Accumulation:
 
     def limit_of_all(self, instants: np.ndarray) -> float | None:
         """Note events (E, 2) in a row; the limit time as soon as there is one, else None."""
-        if len(instants) <= _TERMS:
+        if len(instants) <= _TERMS + 2:
             return self._one_by_one(instants)
         if self.last is None:
             self.last, instants = Instant(*instants[0].tolist()), instants[1:]
-        times = np.concatenate([[self.last], instants])
-        steps = times[1:] - times[:-1]
-        gaps = np.concatenate([self.intervals, np.abs(steps[:, 0] + steps[:, 1])])
-        shortest = max(self.shortest, _ULPS * float(np.spacing(np.max(np.abs(times[:, 0])))))
-        grows = np.flatnonzero((gaps[1:] >= gaps[:-1]) & (gaps[1:] > shortest))
-        falls = np.diff(np.concatenate([[-1], grows, [len(gaps) - 1]])) - 1
-        if falls.max() >= _TERMS:  # so many in a row are worth a closer look
-            return self._one_by_one(instants)
-        self.intervals.extend(gaps[-_TERMS - 1 :].tolist())
+        gaps = np.array(self.intervals)
+        if longest_fall(gaps, self.last.high, self.last.low, instants, self.shortest) >= _TERMS:
+            return self._one_by_one(instants)  # worth a closer look
+        tail = instants[-_TERMS - 2 :]
+        steps = tail[1:] - tail[:-1]
+        self.intervals.extend(np.abs(steps[:, 0] + steps[:, 1]).tolist())
         self.last = Instant(*instants[-1].tolist())
         return None
 

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.jit import kernel
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.timepair import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
+
+
+@kernel
+def _taking_part(fired: Any, before: Any, after: Any, owner: Any, has_surface: Any) -> int:
+    """How many changes of mode there are, and resets that change none."""
+    count = 0
+    for e in range(fired.shape[0]):
+        for c in range(before.shape[1]):
+            count += before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c])
+    return count
 
 
 class Crossings(Sequence[Occurrence]):
@@ -36,50 +49,57 @@ class Crossings(Sequence[Occurrence]):
     ) -> None:
         self._system, self._instants, self._fired = system, instants, fired
         self._before, self._after, self._states = before, after, states
-        owners = system.owner[fired]
-        taking_part = before != after
-        taking_part[np.arange(len(fired)), owners] |= ~system.has_surface[owners]
-        self._event, self._component = np.nonzero(taking_part)
+        self._first = 0
+        self._count = int(_taking_part(fired, before, after, system.owner, system.has_surface))
 
     def __len__(self) -> int:
-        return len(self._event)
+        return self._count - self._first
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Event and component of each occurrence."""
+        owners = self._system.owner[self._fired]
+        taking_part = self._before != self._after
+        taking_part[np.arange(len(owners)), owners] |= ~self._system.has_surface[owners]
+        events, components = np.nonzero(taking_part)
+        return events[self._first :], components[self._first :]
 
     @property
     def until(self) -> Instant:
         """Time of the last one."""
-        high, low = self._instants[self._event[-1]].tolist()
-        return Instant(high, low)
+        return Instant(*self._instants[-1].tolist())
 
     @property
     def times(self) -> np.ndarray:
         """Times rounded to doubles."""
-        return (self._instants[:, 0] + self._instants[:, 1])[self._event]
+        return (self._instants[:, 0] + self._instants[:, 1])[self._places[0]]
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component; all are transitions."""
         names = [a.name for a in self._system.automata]
         if component not in names or kind not in (None, "transition"):
             return np.zeros(len(self), dtype=np.bool_)
-        return self._component == names.index(component)
+        return self._places[1] == names.index(component)
 
     def since(self, first: int) -> Crossings:
         """Those from the first on."""
-        later = object.__new__(Crossings)
-        vars(later).update(vars(self), _event=self._event[first:], _component=self._component[first:])
+        later = copy(self)
+        vars(later).pop("_places", None)
+        later._first += first
         return later
 
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
-        e, c = int(self._event[i]), int(self._component[i])
+        events, components = self._places
+        e, c = int(events[i]), int(components[i])
         automaton, fired = self._system.automata[c], int(self._fired[e])
         source, target = int(self._before[e, c]), int(self._after[e, c])
         guard = ""
         if c == self._system.owner[fired]:
             guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
-        high, low = self._instants[e].tolist()
         return Occurrence(
-            Instant(high, low),
+            Instant(*self._instants[e].tolist()),
             "transition",
             automaton.name,
             guard,

@@ -8,9 +8,14 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import ModelError
 
+_MOST = 64  # starts that a system remembers to have been looked at
+
 
 def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
     """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
+    start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
+    if start in system.opposed:
+        return
     try:
         effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
     except (ZeroDivisionError, ValueError, OverflowError):
@@ -25,3 +30,5 @@ def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarra
                 place=place,
                 remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
             )
+    if len(system.opposed) < _MOST:
+        system.opposed.add(start)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, OPEN
-from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_kernels import (
@@ -22,16 +22,14 @@ from hybridsim.engine.linear_kernels import (
     states_of,
     to_modal,
 )
-from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, put, settle_ordinary
-from hybridsim.engine.timepair import two_sum
+from hybridsim.engine.ordinary_event import Before, find_modes, put
+from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
 
-_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
-_ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
 class Room(NamedTuple):
-    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), and a state."""
+    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), a state."""
 
     c: np.ndarray
     v: np.ndarray
@@ -43,11 +41,12 @@ class Room(NamedTuple):
     p: np.ndarray
     scale: np.ndarray
     slopes: np.ndarray
+    pace: np.ndarray
 
 
 class Record(NamedTuple):
     """What is committed of each segment: its end in local time, origin (2,), row of the tables, modes, run-time vector,
-    modal coordinates at its start, the guard that fired (-1: none), states at start and on both sides of its end (3, n).
+    modal coordinates at its start, the guard that fired (-1: none), states at start and both sides of its end (3, n).
     """
 
     ends: np.ndarray
@@ -125,7 +124,8 @@ def exact_leap(
     ends, clocks, rows, modes = record.ends, record.clocks, record.rows, record.modes
     vectors, coordinates, fires, jumps = record.vectors, record.coordinates, record.fires, record.jumps
     n, n_segments = x.shape[0], 0
-    last_gap, last_ratio, steady = math.inf, math.inf, 0
+    pace = room.pace
+    pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
         k = find_modes(tapes.modes, z)
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
@@ -155,7 +155,6 @@ def exact_leap(
         for i in range(n):
             if not abs(y[i]) < math.inf:
                 return STOPPED, n_segments
-        gap = s
         ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
         rows[n_segments], fires[n_segments] = k, fired
         put(z, modes[n_segments])
@@ -170,52 +169,22 @@ def exact_leap(
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
             clock[0], clock[1] = target[0], target[1]
             return AT_TARGET, n_segments + 1
-        ratio = gap / last_gap
-        steady = steady + 1 if ratio < _SHRINKING and abs(ratio - last_ratio) <= _STEADY * ratio else 0
-        last_gap, last_ratio = gap, ratio
-        if steady > 2 or gap <= _ULPS * 2.0**-52 * abs(clock[0]):
+        if is_crowded(s, clock, pace):
             return STOPPED, n_segments
         s_error = 2.0 * 2.0**-52 * s
         functions_of_time(lin, s, 0.0, p, work.factors, work.w, work.w_error)
         value, slope = _value_and_slope(lin, k, fired, y, work.w)
         if slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
-        call(functions.flow, s, y, p, z, slopes)
-        for i in range(n):
-            y_error[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
-        for m in range(z.shape[0]):
-            if automata.hold[m] >= 0 and z[m] == automata.hold[m]:
-                y_error[automata.pin[m]] = UNIT * abs(y[automata.pin[m]])
-        at_event = Before(s, s_error, y, y_error, p, z)
-        outcome, _ = settle_ordinary(
-            functions,
-            automata,
-            tapes,
-            inputs,
-            lin,
-            at_event,
-            fired,
-            n_discrete,
-            discrete_at,
-            y1,
-            slopes,
-            z1,
-            p1,
-            work,
-        )
-        if outcome != SETTLED:
+        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, y_error)
+        event = Before(s, s_error, y, y_error, p, z)
+        if not settle_and_move_on(
+            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,
+            (y1, slopes, z1, p1),
+        ):  # fmt: skip
             return STOPPED, n_segments
         put(y1, jumps[n_segments, 2])
         n_segments += 1
-        put(y1, x)
-        put(slopes, x_error)
-        put(z1, z)
-        put(p1, p)
-        for g in range(sides.shape[0]):
-            sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
-            floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
-        high, low = two_sum(clock[0], s)
-        clock[0], clock[1] = two_sum(high, low + clock[1])
 
 
 @inlined

@@ -7,13 +7,14 @@ import numpy as np
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.exact_leap import Record, Room, exact_leap
-from hybridsim.engine.leap import AT_TARGET, FULL, State
+from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.linear_tables import TERMS, LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.packs import packed
+from hybridsim.engine.segment_end import State
 from hybridsim.engine.settle import Outcome
-from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
@@ -21,30 +22,10 @@ from hybridsim.engine.trajectory import Trajectory
 _SEGMENTS = 1024  # room for one call
 
 
-_compiled: list[bool] = []
-
-
-def compile_exact_leaps(system: System) -> None:
-    """Have ready what leaps call: functions of this system, and the loop itself, the same for all, once a process."""
-    functions_of(system)
-    if _compiled or not system.n:
-        return
-    guards, n, none = system.guard_count, system.n, np.zeros(0, dtype=np.int64)
-    modes = np.zeros(len(system.automata), dtype=np.int64)
-    nowhere = Instant(0.0)
-    p = system.vector(nowhere, np.zeros(system.layout.discrete))
-    sides, orders = np.ones(guards, dtype=np.int64), np.zeros(guards, dtype=np.int64)
-    still = Outcome(
-        np.zeros(n), p, modes, sides, orders, none, none, np.zeros(n), np.zeros(guards), np.zeros(0)
-    )
-    ExactLeaper(system, np.inf).leap(nowhere, still, p, nowhere, Trajectory(system))
-    _compiled.append(True)
-
-
 class ExactLeaper:
     """Leaps of one run."""
 
-    def __init__(self, system: System, longest: float) -> None:
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.shelf, self.automata, self.functions = (
             shelf_of(system),
@@ -96,12 +77,13 @@ class ExactLeaper:
         """Scratch arrays of the kernel."""
         n, widest = self.system.n, tables.values.shape[1]
         return Room(
-            *(np.zeros(widest, dtype=complex) for _ in range(2)),
-            np.zeros((2, TERMS)),
-            *(np.empty(n) for _ in range(3)),
-            np.empty(len(self.system.automata), dtype=np.int64),
-            np.empty(self.system.layout.size),
-            *(np.empty(n) for _ in range(2)),
+            c=np.zeros(widest, dtype=complex),
+            v=np.zeros(widest, dtype=complex),
+            terms=np.zeros((2, TERMS)),
+            z=np.empty(len(self.system.automata), dtype=np.int64),
+            p=np.empty(self.system.layout.size),
+            pace=np.empty(3),
+            **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes")},
         )
 
     def _record(self, tables: LinearTables) -> Record:

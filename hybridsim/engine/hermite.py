@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -12,23 +14,35 @@ from hybridsim.engine.stepping import Dense
 
 
 @cache
-def _right_system(count: int) -> np.ndarray:
+def right_system(count: int) -> np.ndarray:
     """Inverse of the map from the coefficients of theta**count * q to the derivatives (over k!) at theta = 1."""
     rows = [[comb(count + j, k) for j in range(count)] for k in range(count)]
     return np.linalg.inv(np.array(rows, dtype=float))
 
 
 @cache
-def _shift(count: int) -> np.ndarray:
+def shift_matrix(count: int) -> np.ndarray:
     """Taylor shift by one: coefficients at theta = 0 to those at theta = 1."""
     return np.array([[comb(j, k) for k in range(count)] for j in range(count)], dtype=float)
 
 
+@cache
+def bernstein_weights(count: int) -> np.ndarray:
+    """From the Taylor coefficients at an end (in theta) to the `count` Bernstein coefficients of degree 2 K - 1 there.
+
+    On the right the signs of odd coefficients change, since theta runs backward from there.
+    """
+    degree = 2 * count - 1
+    return np.array([[comb(j, k) / comb(degree, k) for k in range(count)] for j in range(count)])
+
+
 @kernel
-def _fit(left: np.ndarray, right: np.ndarray, h: float, shift: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-    """Coefficients (n, 2 K) of the polynomial in theta: the left series, then theta**K times a correction."""
+def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> None:
+    """Coefficients (n, 2 K) of the polynomial in theta: the left series, then theta**K times a correction.
+
+    shift, inverse: `shift_matrix` and `right_system` of K; lack (K,) is room.
+    """
     n, count = left.shape
-    out, lack = np.empty((n, 2 * count)), np.empty(count)
     for i in range(n):
         power = 1.0
         for k in range(count):
@@ -43,7 +57,28 @@ def _fit(left: np.ndarray, right: np.ndarray, h: float, shift: np.ndarray, inver
             for j in range(count):
                 total += inverse[k, j] * lack[j]
             out[i, count + k] = total
-    return out
+
+
+@kernel
+def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> bool:
+    """The same in powers of the time from the left end; whether all coefficients are finite."""
+    fit(left, right, h, shift, inverse, lack, out)
+    power, total = 1.0, 0.0
+    for k in range(out.shape[1]):
+        for i in range(out.shape[0]):
+            out[i, k] /= power
+            total += abs(out[i, k])
+        power *= h
+    return total < math.inf
+
+
+@kernel
+def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
+    """`fit_in_time` for many steps: steps (m, 2) with lengths last, ends (m, n, 2 K) left series and then right."""
+    count = shift.shape[0]
+    lack = np.empty(count)
+    for i in range(ends.shape[0]):
+        fit_in_time(ends[i, :, :count], ends[i, :, count:], steps[i, 1], shift, inverse, lack, out[i])
 
 
 @kernel
@@ -75,8 +110,9 @@ def hermite(s0: float, s1: float, left: np.ndarray, right: np.ndarray) -> Dense:
     left, right : (n, K) coefficients x^(k)/k!, k = 0..K-1. K = 2 is the cubic of value and slope; its error is
         h^4 x''''/384, that of K = 4 is h^8 x^(8)/(256 8!).
     """
-    count = left.shape[1]
-    coefficients = _fit(left, right, s1 - s0, _shift(count), _right_system(count))
+    n, count = left.shape
+    coefficients = np.empty((n, 2 * count))
+    fit(left, right, s1 - s0, shift_matrix(count), right_system(count), np.empty(count), coefficients)
 
     def dense(s: np.ndarray) -> np.ndarray:
         return _evaluate(coefficients, s0, s1, left, right, np.asarray(s, dtype=float))

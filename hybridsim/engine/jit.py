@@ -11,6 +11,7 @@ import math
 import os
 import sys
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from hybridsim.engine.cache import kernel_folder
@@ -117,6 +118,7 @@ else:
         return function(t, x, p, z, out)
 
 
+@cache
 def announce_compilation() -> None:
     """Say once, on stderr, that the engine is being compiled, if no run of it has been announced here yet."""
     # the folder alone proves nothing: numba makes it as soon as a kernel is defined

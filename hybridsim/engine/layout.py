@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 SIGNAL_SLOTS = 6  # with d = t - c4: c0 + d (c1 + d (c2 + d c3)), or c5 + c3 sin(c0 + d (c1 + d c2))
 
@@ -16,37 +17,37 @@ class Layout:
     phases: int
     signals: int
 
-    @property
+    @cached_property
     def discrete_at(self) -> int:
         """First discrete state."""
         return self.parameters
 
-    @property
+    @cached_property
     def discrete_slice(self) -> slice:
         """Where the discrete states stand."""
         return slice(self.discrete_at, self.discrete_at + self.discrete)
 
-    @property
+    @cached_property
     def origin_at(self) -> int:
         """The origin that local time is counted from, as a double (for expressions in plain t)."""
         return self.parameters + self.discrete
 
-    @property
+    @cached_property
     def pin_at(self) -> int:
         """1 where states held by a mode are evaluated from their constraint, 0 where they are integrated."""
         return self.origin_at + 1
 
-    @property
+    @cached_property
     def phases_at(self) -> int:
         """Angles rate*origin modulo 2 pi, one for each rate at which an angle grows in time."""
         return self.pin_at + 1
 
-    @property
+    @cached_property
     def signals_at(self) -> int:
         """Coefficients of the current piece of each input."""
         return self.phases_at + self.phases
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of p."""
         return self.signals_at + SIGNAL_SLOTS * self.signals

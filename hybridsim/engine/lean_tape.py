@@ -98,8 +98,8 @@ def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable
     states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
     surfaces, monitors = registers("surfaces"), registers("monitors")
     wanted = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
-    needed = _needed(series_rows, wanted)
-    constants = _needed(constant_rows, wanted | {r for row in needed for r in row[1:4]})
+    needed = needed_rows(series_rows, wanted)
+    constants = needed_rows(constant_rows, wanted | {r for row in needed for r in row[1:4]})
     return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
 
 
@@ -148,7 +148,7 @@ def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, in
     return op, a, b, c
 
 
-def _needed(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
+def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
     """The rows that the wanted registers depend on, in order."""
     wanted = set(wanted)
     kept = []

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
-from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.engine.ordinary_event import SETTLED, Before, find_modes, settle_ordinary
+from hybridsim.engine.ordinary_event import Before, find_modes, put
+from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
 from hybridsim.engine.taylor import advance, expand, reach
-from hybridsim.engine.timepair import phase_of, two_sum
+from hybridsim.engine.timepair import phase_of
 
 AT_TARGET, STOPPED, FULL = 0, 1, 2
 _DEFECT = 100.0  # as in the taylor integrator
@@ -27,20 +28,8 @@ _SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from whic
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
-class State(NamedTuple):
-    """What holds at the start of a segment: x, x_error (n,), z (C,), p, and sides, orders, floors (G,) of guards."""
-
-    x: np.ndarray
-    x_error: np.ndarray
-    z: np.ndarray
-    p: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    floors: np.ndarray
-
-
 class Room(NamedTuple):
-    """Scratch arrays: two sets of series (registers, order + 1), a polynomial, its Bernstein forms, and a state."""
+    """Scratch arrays: two sets of series (registers, order + 1), a polynomial, its Bernstein forms, a state, guards."""
 
     V: np.ndarray
     W: np.ndarray
@@ -57,6 +46,8 @@ class Room(NamedTuple):
     sides: np.ndarray
     orders: np.ndarray
     floors: np.ndarray
+    watched: np.ndarray
+    pace: np.ndarray
 
 
 class Record(NamedTuple):
@@ -235,7 +226,8 @@ def leap(
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
     time, states = inputs.time[0], inputs.states
     n, n_steps, n_segments = x.shape[0], 0, 0
-    last_gap, last_ratio, steady = math.inf, math.inf, 0
+    pace = room.pace
+    pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
         k, first_step = find_modes(tapes.modes, z), n_steps
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
@@ -251,11 +243,14 @@ def leap(
         load(inputs, tapes, k, p, V)
         load(inputs, tapes, k, p, W)
         count = tapes.active_start[k + 1] - tapes.active_start[k]
-        watched = np.empty(count, dtype=np.int64)
+        watched = room.watched[:count]
         for i in range(count):
             watched[i] = tapes.guards[k, tapes.active[tapes.active_start[k] + i]]
-        side_now[:], order_now[:], floor_now[:] = sides, orders, floors
-        s, fired, y[:] = 0.0, -1, x
+        put(sides, side_now)
+        put(orders, order_now)
+        put(floors, floor_now)
+        put(x, y)
+        s, fired = 0.0, -1
         for i in range(n):
             scale[i] = abs(x[i])
         while fired < 0 and s < bound:
@@ -285,65 +280,40 @@ def leap(
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
             if outcome == FOUND:
                 fired = g
-            y[:] = y1
+            put(y1, y)
             for i in range(n):
                 scale[i] = max(scale[i], abs(y1[i]))
             side_now[:], order_now[:], floor_now[:] = 1, 0, 0.0
         if holding(automata, z):
             call(functions.project, s, y, p, z, y1)
-            y[:] = y1
-        gap = s
+            put(y1, y)
         segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
-        modes[n_segments], vectors[n_segments], fires[n_segments] = z, p, fired
-        jumps[n_segments, 0], jumps[n_segments, 1] = y, y
+        fires[n_segments] = fired
+        put(z, modes[n_segments])
+        put(p, vectors[n_segments])
+        put(y, jumps[n_segments, 0])
+        put(y, jumps[n_segments, 1])
         if fired < 0:
-            x[:] = y
+            put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
             clock[0], clock[1] = target[0], target[1]
             return AT_TARGET, n_steps, n_segments + 1
-        ratio = gap / last_gap
-        steady = steady + 1 if ratio < _SHRINKING and abs(ratio - last_ratio) <= _STEADY * ratio else 0
-        last_gap, last_ratio = gap, ratio
-        if steady > 2 or gap <= _ULPS * 2.0**-52 * abs(clock[0]):
+        if is_crowded(s, clock, pace):
             return STOPPED, first_step, n_segments
         s_error = 2.0 * 2.0**-52 * s
         value, slope = value_and_slope(rows, flow_places, tapes.guards[k, fired], s, y, W)
         if slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
-        call(functions.flow, s, y, p, z, slopes)
-        for i in range(n):
-            y_error[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
-        for c in range(z.shape[0]):
-            if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
-                y_error[automata.pin[c]] = UNIT * abs(y[automata.pin[c]])
+        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, y_error)
         at = Before(s, s_error, y, y_error, p, z)
-        outcome, _ = settle_ordinary(
-            functions,
-            automata,
-            tapes,
-            inputs,
-            lin,
-            at,
-            fired,
-            n_discrete,
-            discrete_at,
-            y1,
-            slopes,
-            u,
-            q,
-            work,
-        )
-        if outcome != SETTLED:
+        if not settle_and_move_on(
+            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), at, fired, clock, state, work,
+            (y1, slopes, u, q),
+        ):  # fmt: skip
             return STOPPED, first_step, n_segments
-        jumps[n_segments, 1] = y1
+        put(y1, jumps[n_segments, 1])
         n_segments += 1
-        x[:], x_error[:], z[:], p[:] = y1, slopes, u, q
-        for g in range(sides.shape[0]):
-            sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
-            floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
-        high, low = two_sum(clock[0], s)
-        clock[0], clock[1] = two_sum(high, low + clock[1])
 
 
 @inlined

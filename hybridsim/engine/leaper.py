@@ -3,42 +3,48 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.crossings import Crossings
-from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, State, leap
+from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.packs import packed
+from hybridsim.engine.segment_end import State
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.settle import Outcome
-from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Leaps, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
 
 _STEPS, _SEGMENTS = 4096, 1024  # room for one call
-_ROOM, _FEWEST = (
-    1 << 19,
-    64,
-)  # doubles for the series of one call, as far as that leaves room for so many steps
-_FROM_NOTHING = np.zeros(1, dtype=np.int64)
+# doubles for the series of one call, and how many steps there is room for in any case
+_ROOM, _FEWEST = 1 << 19, 64
+_NONE = np.zeros(0, dtype=np.int64)  # the model has no monitors
 _TIGHTEST = 1e-15
-_NOT_LINEAR = no_tables()
+NOT_LINEAR = no_tables()  # for kernels that take their modes by series
 
 
-_compiled: list[bool] = []
+Maker = Callable[[System, Tolerances, float], Leaps]  # for a run whose segments are no longer than that
+
+_compiled: list[Maker] = []
 
 
-def compile_leaps(system: System) -> None:
-    """Have ready what leaps call: functions of this system, and the loop itself, the same for all, once a process."""
+def compile_leaps(system: System, make: Maker) -> None:
+    """Have ready what leaps call: functions of this system, and their loop, the same for all, once a process."""
     functions_of(system)
-    if _compiled or not system.n:
+    if make in _compiled or not system.n:
         return
-    leaper = Leaper(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
+    leaper = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
     nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
     guards, n = system.guard_count, system.n
     modes = np.zeros(len(system.automata), dtype=np.int64)
@@ -56,60 +62,69 @@ def compile_leaps(system: System) -> None:
         np.zeros(0),
     )
     leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
-    _compiled.append(True)
+    _compiled.append(make)
 
 
-class Leaper:
-    """Leaps of one run."""
+class Leaper(ABC):
+    """Leaps of one run; what differs between kernels is left open.
 
-    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        self.system = system
-        n, layout, guards = system.n, system.layout, system.guard_count
-        rtol = max(tolerances.rtol, _TIGHTEST)
-        order = series_order(rtol, system.is_linear)
-        registers = system.registers
+    Parameters
+    ----------
+    columns : of what the kernel records of each step and state.
+    kind : names the scratch arrays, which are handed on from run to run; each leap takes a pair of its own.
+    """
+
+    def __init__(self, system: System, columns: int, kind: str) -> None:
+        self.system, self.columns, layout = system, columns, system.layout
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.functions = functions_of(system)
-        self.inputs = registers.inputs
+        self.inputs = system.registers.inputs
         self.places = (
-            np.asarray(system.rates),
+            system.rates,
             layout.origin_at,
             layout.phases_at,
             layout.discrete_at,
             layout.discrete,
         )
-        self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest)
-        self.work = work_space(system)
-        count = len(system.automata)
-        self.room = packed(
-            Room(
-                np.zeros((registers.count, order + 1)),
-                np.zeros((registers.count, order + 1)),
-                *(np.empty(order + 1) for _ in range(2)),
-                np.empty((64, order + 1)),
-                *(np.empty(n) for _ in range(3)),
-                np.empty(count, dtype=np.int64),
-                np.empty(layout.size),
-                *(np.empty(n) for _ in range(2)),
-                np.empty(guards, dtype=np.int64),
-                np.empty(guards, dtype=np.int64),
-                np.empty(guards),
-            )
-        )
-        self.order = order
+        self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
         self._renew()
+
+    @abstractmethod
+    def _room(self) -> Any:
+        """Scratch arrays of the kernel for one leap."""
+
+    @abstractmethod
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: Any,
+        work: Any,
+        room: Any,
+        rows: Any,
+    ) -> tuple[int, int, int]:
+        """Run the kernel, which writes to rows of the record: why it ended, how many steps and segments there are."""
+
+    @abstractmethod
+    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+        """Count what so many steps have cost, beside themselves."""
+
+    def _block(self, *arrays: np.ndarray) -> SegmentBlock:
+        """The segments in the arrays of a `SeriesBlock`."""
+        return SeriesBlock(self.system, *arrays)
 
     def _renew(self) -> None:
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
         n, count = self.system.n, len(self.system.automata)
-        steps = min(max(_ROOM // (n * (self.order + 1)), _FEWEST), _STEPS)
-        self.used = (0, 0)  # steps and segments
+        steps = min(max(_ROOM // (n * self.columns), _FEWEST), _STEPS)
+        self.used = (0, 0)  # rows of steps, rows of segments
+        # one row more of segments: where each begins and where the last one ends
         self.record = (
             np.empty((steps, 2)),
-            np.empty((steps, n, self.order + 1)),
-            np.empty(_SEGMENTS, dtype=np.int64),
-            np.empty((_SEGMENTS, 2)),
-            np.empty((_SEGMENTS, count), dtype=np.int64),
+            np.empty((steps, n, self.columns)),
+            np.empty(_SEGMENTS + 1, dtype=np.int64),
+            np.empty((_SEGMENTS + 1, 2)),
+            np.empty((_SEGMENTS + 1, count), dtype=np.int64),
             np.empty((_SEGMENTS, self.system.layout.size)),
             np.empty(_SEGMENTS, dtype=np.int64),
             np.empty((_SEGMENTS, 2, n)),
@@ -120,7 +135,7 @@ class Leaper:
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
         self.shelf.surround(outcome.z)
-        clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
+        clock, to = np.array(origin), np.array(target)
         state = State(
             outcome.x.copy(),
             outcome.x_error.copy(),
@@ -130,60 +145,122 @@ class Leaper:
             outcome.orders.copy(),
             outcome.guard_floors.copy(),
         )
+        as_packed = packed(state)
+        try:
+            work, room = self.spare.pop()
+        except IndexError:
+            work, room = work_space(self.system), self._room()
         instants = []
         while True:
-            rows = Record(*(part[u:] for part, u in zip(self.record, self._offsets(), strict=True)))
-            code, steps, count = leap(
-                self.functions, self.automata, self.shelf.tapes, self.inputs, _NOT_LINEAR, self.places, self.control,
-                to, clock, packed(state), self.work, self.room, packed(rows),
-            )  # fmt: skip
-            instants.append(self._commit(rows, steps, count, state[2], clock, record))
+            rows = self._rows()
+            code, steps, count = self._go(to, clock, as_packed, work, room, packed(rows))
+            self._count(record.counters, steps, room)
             is_full = code == FULL and (count > 0 or self.used != (0, 0))
+            if count:
+                instants.append(self._commit(steps, count, state[2], clock, record))
             if is_full:
                 self._renew()
             known = len(self.shelf.tapes.modes)
             self.shelf.surround(state[2])
             if is_full or len(self.shelf.tapes.modes) == known:
                 break
+        self.spare.append((work, room))
         x, x_error, z, p, sides, orders, floors = state
-        none = np.zeros(0, dtype=np.int64)
-        after = Outcome(x, p, z, sides, orders, none, none, x_error, floors, np.zeros(0), continuous=False)
-        reached = Instant(*clock.tolist())
+        after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
-        return Landing(reached, after, end, instants[0] if len(instants) == 1 else np.concatenate(instants))
+        return Landing(
+            Instant(*clock.tolist()), after, end, instants[0] if len(instants) == 1 else _joined(instants)
+        )
 
-    def _offsets(self) -> tuple[int, ...]:
-        """Where the next call writes, in each array of the record."""
-        steps, segments = self.used
-        return (steps, steps, *(segments for _ in self.record[2:]))
+    def _rows(self) -> Record:
+        """The rows that the next call writes to."""
+        steps, first = self.used
+        lengths, series, ends, *others = self.record
+        return Record(lengths[steps:], series[steps:], ends[first + 1 :], *(part[first:] for part in others))
 
     def _commit(
-        self,
-        rows: tuple[np.ndarray, ...],
-        steps: int,
-        count: int,
-        z_after: np.ndarray,
-        clock: np.ndarray,
-        record: Trajectory,
+        self, steps: int, count: int, z: np.ndarray, clock: np.ndarray, record: Trajectory
     ) -> np.ndarray:
-        """Leave the used part of the record to the trajectory; the instants (E, 2) of its events."""
-        if not count:
-            return np.empty((0, 2))
-        lengths, series, ends, origins, modes, vectors, fired, jumps = (
-            part[: steps if k < 2 else count] for k, part in enumerate(rows)
-        )
-        self.used = (self.used[0] + steps, self.used[1] + count)
-        starts = np.concatenate([_FROM_NOTHING, ends])
+        """Leave what one call has written to the trajectory; the instants (E, 2) of its events.
+
+        z and clock hold after the last segment, the E-th where an event ended it.
+        """
+        first_step, first = self.used
+        last_step, last = self.used = (first_step + steps, first + count + 1)
+        lengths, series, ends, origins, modes, vectors, fired, jumps = self.record
+        ends[first], origins[last - 1], modes[last - 1] = 0, clock, z
+        begun = slice(first, last - 1)
         system, counters = self.system, record.counters
-        record.segments.add(SeriesBlock(system, starts, lengths, series, origins, modes, vectors, jumps))
+        record.segments.add(
+            self._block(
+                ends[first:last],
+                lengths[first_step:last_step],
+                series[first_step:last_step],
+                origins[begun],
+                modes[begun],
+                vectors[begun],
+                jumps[begun],
+            )
+        )
         counters.steps += steps
-        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end
         counters.restarts += count
-        events = count if fired[-1] >= 0 else count - 1
-        instants = np.concatenate([origins[1:], clock[None]])[:events]
+        events = count if fired[last - 2] >= 0 else count - 1
+        ended, after = slice(first, first + events), slice(first + 1, first + events + 1)
+        instants = origins[after]
         if events:
-            after = np.concatenate([modes[1:], z_after[None]])[:events]
-            crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events])
+            crossings = Crossings(system, instants, fired[ended], modes[ended], modes[after], jumps[ended])
             counters.events += len(crossings)
             record.occurrences.add(crossings)
         return instants
+
+
+def _joined(instants: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate([np.empty((0, 2)), *instants])
+
+
+class TaylorLeaper(Leaper):
+    """Leaps of Taylor series."""
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        rtol = max(tolerances.rtol, _TIGHTEST)
+        self.order = series_order(rtol, system.is_linear)
+        super().__init__(system, self.order + 1, f"order {self.order}")
+        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
+
+    def _room(self) -> Any:
+        system, order, n = self.system, self.order, self.system.n
+        registers, count, guards = system.registers.count, len(system.automata), system.guard_count
+        room: Room = packed(
+            Room(
+                V=np.zeros((registers, order + 1)),
+                W=np.zeros((registers, order + 1)),
+                a=np.empty(order + 1),
+                b=np.empty(order + 1),
+                stack=np.empty((64, order + 1)),
+                z=np.empty(count, dtype=np.int64),
+                p=np.empty(system.layout.size),
+                floors=np.empty(guards),
+                pace=np.empty(3),
+                **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes")},
+                **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "watched")},
+            )
+        )
+        return room
+
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: Any,
+        work: Any,
+        room: Any,
+        rows: Any,
+    ) -> tuple[int, int, int]:
+        code, steps, count = leap(
+            self.functions, self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, self.places, self.control,
+            to, clock, state, work, room, rows,
+        )  # fmt: skip
+        return code, steps, count
+
+    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end

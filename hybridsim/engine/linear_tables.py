@@ -30,9 +30,9 @@ class LinearTables(NamedTuple):
     monomials, 2*atom + part. phases (2,): the sources in p that are angles known to rounding only.
     series (K, G, n + M, 4): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
     y of size 1. counts (K,), values (K, J), upper (K, J, J), ends (K, J): the flow in modal coordinates; basis (K, n,
-    J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards in
-    modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of the
-    first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor.
+    J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
+    in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
+    the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor.
     """
 
     kinds: np.ndarray
@@ -146,21 +146,21 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray) -> Linea
                 farthest[k, g], grown[k, g] = min(farthest[k, g], math.log(2.0) / growth), 2.0
     tables: LinearTables = packed(
         LinearTables(
-            *_atom_arrays(atoms, monomials),
-            np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
-            series,
-            roundings,
-            np.array([len(f.values) for f in flows], dtype=np.int64),
-            _stack([f.values for f in flows], (widest,), complex),
-            _stack([f.upper for f in flows], (widest, widest), complex),
-            _stack([f.ends for f in flows], (widest,), np.int64),
-            _stack([f.full_basis[:n] for f in flows], (n, widest), complex),
-            _stack([f.inverse for f in flows], (widest, size), complex),
-            terms,
-            sizes,
-            rests,
-            farthest,
-            grown,
+            **_atom_arrays(atoms, monomials),
+            phases=np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
+            series=series,
+            roundings=roundings,
+            counts=np.array([len(f.values) for f in flows], dtype=np.int64),
+            values=_stack([f.values for f in flows], (widest,), complex),
+            upper=_stack([f.upper for f in flows], (widest, widest), complex),
+            ends=_stack([f.ends for f in flows], (widest,), np.int64),
+            basis=_stack([f.full_basis[:n] for f in flows], (n, widest), complex),
+            inverse=_stack([f.inverse for f in flows], (widest, size), complex),
+            terms=terms,
+            sizes=sizes,
+            rests=rests,
+            farthest=farthest,
+            grown=grown,
         )
     )
     return tables
@@ -195,27 +195,27 @@ def _first_left_out(gamma: np.ndarray, flow: Modal) -> np.ndarray:
     return factors
 
 
-def _atom_arrays(atoms: Atoms, monomials: list[Monomial]) -> tuple[np.ndarray, ...]:
+def _atom_arrays(atoms: Atoms, monomials: list[Monomial]) -> dict[str, np.ndarray]:
     known = atoms.known
     terms = np.cumsum([0, *(len(a.terms) for a in known)])
     factors = np.cumsum([0, *(len(m) for m in monomials)])
-    return (
-        np.array([a.kind for a in known], dtype=np.int64),
-        np.array([a.rate for a in known]),
-        np.array([a.offset for a in known]),
-        terms.astype(np.int64),
-        np.array([source for a in known for source, _ in a.terms], dtype=np.int64),
-        np.array([weight for a in known for _, weight in a.terms], dtype=float),
-        factors.astype(np.int64),
-        np.array([2 * a + part for m in monomials for a, part in m], dtype=np.int64),
-    )
+    return {
+        "kinds": np.array([a.kind for a in known], dtype=np.int64),
+        "rates": np.array([a.rate for a in known]),
+        "offsets": np.array([a.offset for a in known]),
+        "term_start": terms.astype(np.int64),
+        "sources": np.array([source for a in known for source, _ in a.terms], dtype=np.int64),
+        "weights": np.array([weight for a in known for _, weight in a.terms], dtype=float),
+        "factor_start": factors.astype(np.int64),
+        "factors": np.array([2 * a + part for m in monomials for a, part in m], dtype=np.int64),
+    }
 
 
 def _stack(parts: list[np.ndarray], shape: tuple[int, ...], kind: Any) -> np.ndarray:
     """Arrays of different sizes in one, filled up with zeros."""
     out = np.zeros((len(parts), *shape), dtype=kind)
     for k, part in enumerate(parts):
-        out[(k, *(slice(0, m) for m in part.shape))] = part
+        out[k][tuple(slice(0, m) for m in part.shape)] = part
     return out
 
 

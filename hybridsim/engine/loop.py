@@ -14,6 +14,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.start import settled_start
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -80,9 +81,7 @@ class ModeLoop:
         p = system.vector(self.origin, task.discrete, self.forward)
         due = self.timetable.due_at_start(self.origin) if self.forward else ()
         self.timetable.kept(self.origin)
-        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
-        outcome = Settling(system, at, task.z0.copy(), self.forward).run((), [("schedule", k) for k in due])
-        stop = self._adopt(self.origin, outcome, task.x0, due, ())
+        stop = self._adopt(self.origin, settled_start(system, task, p, due), task.x0, due, ())
         step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             appointment = self.timetable.next(self.origin, self.forward)

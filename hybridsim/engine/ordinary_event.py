@@ -423,6 +423,10 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
 
 def functions_of(system: Any) -> Functions:
     """The functions that a compiled loop calls."""
+    return system.code.shared("loop functions", lambda: _functions(system))
+
+
+def _functions(system: Any) -> Functions:
     has_surface = any(a.has_surface for a in system.automata)
     has_choice = any(not a.has_surface for a in system.automata)
     none: Any = system.address("flow")  # never called

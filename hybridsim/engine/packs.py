@@ -106,7 +106,8 @@ if ENABLED:
         array = context.make_array(array_type)(context, builder)
         size = context.get_abi_sizeof(context.get_data_type(array_type.dtype))
         shape = [loaded(1 + i) for i in range(array_type.ndim)]
-        strides, step = [], word(size)
+        strides: list[Any] = []
+        step = word(size)
         for length in reversed(shape):
             strides.insert(0, step)
             step = builder.mul(step, length)

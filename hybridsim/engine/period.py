@@ -17,7 +17,7 @@ _COMMENSURATE = 1e-9
 
 def system_period(system: System) -> float | None:
     """Period of everything that varies in time in a known way: the longest, if the others divide it; else None."""
-    values = system.model.parameter_values()
+    values = system.values
     periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
     for declared in system.model.inputs:
         if declared.kind != "wave" or declared.period is None:

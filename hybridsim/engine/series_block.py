@@ -92,6 +92,11 @@ class SeriesBlock(Sequence[Segment]):
     def __len__(self) -> int:
         return len(self.ends) - 1
 
+    @property
+    def polynomials(self) -> np.ndarray:
+        """Coefficients of the dense output in powers of the time since the step's start (steps, n, degree + 1)."""
+        return self.series
+
     @cached_property
     def spans(self) -> np.ndarray:
         """Local times of start and end (N, 2)."""
@@ -108,7 +113,7 @@ class SeriesBlock(Sequence[Segment]):
         out, pinned = np.empty((len(s), self.system.n)), bool(self.system.pins)
         project = self.system.address("project" if pinned else "flow")
         record = (self.modes, self.vectors, self.jumps)
-        series_states(project, pinned, index, s, self.ends, self.steps, self.series, record, out)
+        series_states(project, pinned, index, s, self.ends, self.steps, self.polynomials, record, out)
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -125,9 +130,7 @@ class SeriesBlock(Sequence[Segment]):
     def since(self, first: int) -> SeriesBlock:
         """Those from the first on."""
         rows = (self.origins, self.modes, self.vectors, self.jumps)
-        return SeriesBlock(
-            self.system, self.ends[first:], self.steps, self.series, *(r[first:] for r in rows)
-        )
+        return type(self)(self.system, self.ends[first:], self.steps, self.series, *(r[first:] for r in rows))
 
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
@@ -136,5 +139,5 @@ class SeriesBlock(Sequence[Segment]):
         s = np.append(self.steps[first:last, 0], self.spans[i, 1])
         x = self.states(np.full(len(s), i), s)
         high, low = self.origins[i].tolist()
-        dense = SeriesPieces(s, self.series[first:last])
+        dense = SeriesPieces(s, self.polynomials[first:last])
         return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)

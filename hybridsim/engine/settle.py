@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,11 @@ class Outcome:
     status: str = ""
     message: str = ""
     warnings: list[str] = field(default_factory=list)
+
+    def copy(self) -> Outcome:
+        """The same with arrays of its own."""
+        values: Iterable[Any] = vars(self).values()
+        return Outcome(*(v.copy() if isinstance(v, np.ndarray) else v for v in values))
 
 
 class Settling:

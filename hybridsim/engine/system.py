@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -156,27 +157,32 @@ class System:
         self.quantities: tuple[str, ...] = data["quantities"]
         self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
         self.monitor_names = tuple(m.name for m in model.monitors)
-        self._values = model.parameter_values()
+        self.values = model.parameter_values()
         self._base = np.zeros(self.layout.size)
-        self._base[: self.layout.parameters] = list(self._values.values())
+        self._base[: self.layout.parameters] = list(self.values.values())
         self._base[self.layout.pin_at] = 1.0
         self.rates = self._plain("rates", self._base, data["rates"])
-        self.signals = tuple(Signal(i, self._values) for i in model.inputs)
+        self.signals = tuple(Signal(i, self.values) for i in model.inputs)
         self.owner = np.zeros(self.guard_count, dtype=np.int64)  # component of each guard
         for c, automaton in enumerate(self.automata):
             for numbers in automaton.guards:
                 self.owner[list(numbers)] = c
+        self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
+        self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
-        self._registers = _Registers(data["tape"], self.layout)
-        self._lean: dict[bytes, LeanTape] = {}
+        self._registers: _Registers = self.code.shared(
+            "registers", lambda: _Registers(data["tape"], self.layout)
+        )
+        self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
+        self._component_numbers = np.arange(len(self.automata))
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
 
     @property
     def has_corners(self) -> bool:
         """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
-        return has_corners(self.code.data["tape"])
+        return bool(self.code.shared("corners", lambda: has_corners(self.code.data["tape"])))
 
-    @property
+    @cached_property
     def is_linear(self) -> bool:
         """Whether the flow of every mode is linear in the states."""
         return all(all(modes) for modes in self.linear.values())
@@ -185,8 +191,18 @@ class System:
 
     def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
         """Initial states, in order."""
-        values = self.model.start_values() | dict(overrides)
+        values = self._start | dict(overrides)
         return np.array([float(values[n]) for n in self.names])
+
+    @cached_property
+    def _start(self) -> dict[str, float]:
+        return self.model.start_values()
+
+    @cached_property
+    def discrete_start(self) -> np.ndarray:
+        """Initial discrete states, in order."""
+        values = self.model.discrete_values()
+        return np.array([values[d.name] for d in self.model.discrete], dtype=float)
 
     def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
         """The run-time vector p of a segment whose local time starts at `origin`."""
@@ -287,10 +303,16 @@ class System:
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
         """Active guard numbers (components, widest), -1 where a mode has fewer."""
-        table = np.full((len(self.automata), max(self._widest, 1)), -1, dtype=np.int64)
-        for c, (automaton, mode) in enumerate(zip(self.automata, z, strict=True)):
-            numbers = automaton.guards[mode]
-            table[c, : len(numbers)] = numbers
+        return self._guard_table[self._component_numbers, z]
+
+    @cached_property
+    def _guard_table(self) -> np.ndarray:
+        """Guard numbers (components, modes, widest) of every mode."""
+        most = max((len(a.modes) for a in self.automata), default=0)
+        table = np.full((len(self.automata), most, max(self._widest, 1)), -1, dtype=np.int64)
+        for c, automaton in enumerate(self.automata):
+            for m, numbers in enumerate(automaton.guards):
+                table[c, m, : len(numbers)] = numbers
         return table
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:

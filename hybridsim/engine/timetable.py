@@ -32,7 +32,7 @@ class Timetable:
     def __init__(self, system: System, end: Instant) -> None:
         self._end = end
         self._settled: Instant | None = None  # the last appointment that was kept, or the start of the run
-        values = system.model.parameter_values()
+        values = system.values
         self._signals = system.signals
         self._schedules = []
         for schedule in system.model.schedules:

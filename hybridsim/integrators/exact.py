@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.exact_leaper import ExactLeaper, compile_exact_leaps
+from hybridsim.engine.exact_leaper import ExactLeaper
+from hybridsim.engine.leaper import compile_leaps
 from hybridsim.engine.linear_segment import LinearSegment
 from hybridsim.engine.linear_tables import refuse_nonlinear
 from hybridsim.engine.stepping import Flow, Step, Stepper, Tolerances, Watch
@@ -63,11 +64,11 @@ class Exact(Integrator):
     def prepare(self, system: System) -> None:
         """The compiled mode loop; a model that is not piecewise linear is refused here."""
         refuse_nonlinear(system)
-        compile_exact_leaps(system)
+        compile_leaps(system, ExactLeaper)
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> ExactLeaper:
         """The compiled mode loop."""
-        return ExactLeaper(system, longest)
+        return ExactLeaper(system, tolerances, longest)
 
     def start(
         self,

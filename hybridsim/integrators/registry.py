@@ -15,6 +15,7 @@ from hybridsim.integrators.options import fits, in_words
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
+    "tsit5:Tsit5",
     "exact:Exact",
     "taylor:Taylor",
     "scipy_solvers:ScipyDOP853",
@@ -66,6 +67,7 @@ def integrator_class(name: str) -> type[Integrator]:
     return found[name]
 
 
+@cache
 def option_names(cls: type[Any]) -> tuple[str, ...]:
     """The options of an integrator: the fields of its dataclass."""
     return tuple(f.name for f in fields(cls))

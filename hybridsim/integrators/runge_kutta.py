@@ -1,89 +1,26 @@
-"""Embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
+"""Explicit embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
 from hybridsim.engine.hermite import hermite
-from hybridsim.engine.jit import call, kernel
-from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
+from hybridsim.engine.leaper import compile_leaps
+from hybridsim.engine.rk_leaper import RungeKuttaLeaper
+from hybridsim.engine.rk_step import SMALLEST, Tableau, attempt, next_length
+from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Pieces
+from hybridsim.integrators.base import Integrator
 
-# Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
-_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 10.0
+__all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
+
 _MOST_PARTS = 64  # of a step that is repeated up to an event
-_SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
-
-
-@dataclass(frozen=True)
-class Tableau:
-    """An explicit method with s stages: nodes c (s,), a (s, s) strictly lower triangular, weights b (s,).
-
-    e (s,) is b minus the weights of the embedded method; the error estimate of a step then falls like
-    h**error_order. e_low, where given, is a second estimate of lower order that keeps the first one honest, as in
-    DOP853: the error used is e**2/sqrt(e**2 + 0.01 e_low**2).
-    """
-
-    c: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-    e: np.ndarray
-    order: int
-    error_order: int
-    e_low: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-
-@kernel
-def _try(
-    flow: Any,
-    tableau: Any,
-    s: float,
-    h: float,
-    x: Any,
-    dx: Any,
-    p: Any,
-    z: Any,
-    tolerances: Any,
-    k: Any,
-    out: Any,
-) -> float:
-    """One step of length h from (s, x) with slope dx there; its end in `out`, its error in units of the tolerance.
-
-    tableau: c, a, b, e, e_low. tolerances: rtol, atol.
-    """
-    c, a, b, e, e_low = tableau
-    rtol, atol = tolerances
-    stages, n = c.shape[0], x.shape[0]
-    k[0] = dx
-    for i in range(1, stages):
-        for m in range(n):
-            total = 0.0
-            for j in range(i):
-                total += a[i, j] * k[j, m]
-            out[m] = x[m] + h * total
-        call(flow, s + c[i] * h, out, p, z, k[i])
-    square, square_low = 0.0, 0.0
-    for m in range(n):
-        total, error, error_low = 0.0, 0.0, 0.0
-        for j in range(stages):
-            total += b[j] * k[j, m]
-            error += e[j] * k[j, m]
-            if e_low.shape[0] > 0:
-                error_low += e_low[j] * k[j, m]
-        out[m] = x[m] + h * total
-        scale = atol[m] + rtol * max(abs(x[m]), abs(out[m]))
-        if scale > 0.0:
-            square += (error / scale) ** 2
-            square_low += (error_low / scale) ** 2
-    if square == 0.0 or n == 0:
-        return 0.0
-    weighted = square + 0.01 * square_low
-    return abs(h) * square / math.sqrt(weighted * n) if weighted > 0.0 else math.nan
 
 
 class RungeKuttaStepper:
@@ -103,9 +40,9 @@ class RungeKuttaStepper:
         first_step: float | None,
     ) -> None:
         self.tableau, self.flow, self.bound, self.tolerances = tableau, flow, bound, tolerances
-        self._arrays = (tableau.c, tableau.a, tableau.b, tableau.e, tableau.e_low)
         self._control = (tolerances.rtol, tolerances.atol)
         self._address = flow.system.address("flow")
+        self._memory = np.zeros(3)  # of the step control
         self._slopes = np.empty((len(tableau.c), flow.n))
         self.s, self.x, self.dx = 0.0, x0, self._rhs(0.0, x0)
         if not np.isfinite(self.dx).all():
@@ -119,18 +56,17 @@ class RungeKuttaStepper:
         direction = math.copysign(1.0, self.bound)
         while True:
             h = min(self.h, self.tolerances.max_step)
-            last = h >= abs(self.bound - self.s)
+            # what would be left is too short for a step of its own
+            last = h >= abs(self.bound - self.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - self.s) if last else h
-            if not h >= _SMALLEST * math.ulp(self.s):
+            if not h >= SMALLEST * math.ulp(self.s):
                 raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
             x, error = self._attempt(self.s, self.x, self.dx, direction * h)
             if error <= 1.0:
                 break
             self.flow.counters.rejected += 1
-            factor = _SAFETY * error ** (-1.0 / self.tableau.error_order) if math.isfinite(error) else _SHRINK
-            self.h = h * max(_SHRINK, min(factor, 1.0))
-        factor = _GROW if error == 0.0 else _SAFETY * error ** (-1.0 / self.tableau.error_order)
-        self.h = h * min(_GROW, max(factor, _SHRINK))
+            self.h = next_length(h, error, self.tableau.error_order, self._memory)
+        self.h = next_length(h, error, self.tableau.error_order, self._memory)
         s0, x0, left = self.s, self.x, self.left
         self.s, self.x = self.bound if last else s0 + direction * h, x
         self.dx, self.left = self._rhs(self.s, x), self._series(self.s, x)
@@ -169,8 +105,8 @@ class RungeKuttaStepper:
     def _attempt(self, s: float, x: np.ndarray, dx: np.ndarray, h: float) -> tuple[np.ndarray, float]:
         flow, out = self.flow, np.empty(self.flow.n)
         flow.counters.rhs_evaluations += len(self.tableau.c) - 1
-        error = _try(
-            self._address, self._arrays, s, h, x, dx, flow.p, flow.z, self._control, self._slopes, out
+        error = attempt(
+            self._address, self.tableau.arrays, s, h, x, dx, flow.p, flow.z, self._control, self._slopes, out
         )
         return out, error
 
@@ -200,3 +136,41 @@ class RungeKuttaStepper:
         # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
         smallest = 1e-9 * abs(self.bound)
         return max(min(100.0 * h0, h1, abs(self.bound)), smallest) if math.isfinite(h1) else smallest
+
+
+@dataclass(frozen=True)
+class RungeKuttaIntegrator(Integrator):
+    """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
+
+    Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
+    corners inside a mode do, since it looks at guards through their series.
+    """
+
+    tableau: ClassVar[Tableau]
+    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    leaps: ClassVar[bool] = True
+
+    @classmethod
+    def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
+        return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        if not system.has_corners:
+            compile_leaps(system, self._leaper)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
+        """The compiled mode loop; None for a model with corners."""
+        return None if system.has_corners else self._leaper(system, tolerances, longest)
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return RungeKuttaStepper(self.tableau, flow, x0, s_bound, tolerances, first_step)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.leaper import Leaper, compile_leaps
+from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
@@ -114,11 +114,11 @@ class Taylor(Integrator):
 
     def prepare(self, system: System) -> None:
         """The compiled mode loop."""
-        compile_leaps(system)
+        compile_leaps(system, TaylorLeaper)
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaper:
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLeaper:
         """The compiled mode loop."""
-        return Leaper(system, tolerances, longest)
+        return TaylorLeaper(system, tolerances, longest)
 
     def start(
         self,

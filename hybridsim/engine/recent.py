@@ -1,0 +1,36 @@
+"""The systems of the models that were run last: a model that is run again and again is validated and bound once."""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.system import System
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+_MOST = 16  # kept with their models; a loop over a few models finds them all
+
+_kept: dict[int, System] = {}
+_lock = Lock()
+
+
+def system_of(model: Model) -> System:
+    """The system of a valid model, the same for the same object: models are frozen and systems keep nothing of a run.
+
+    Errors
+    ------
+    ModelError with all faults of the model.
+    """
+    system = _kept.get(
+        id(model)
+    )  # a system holds its model, so nothing else has that number while it is kept
+    if system is not None:
+        return system
+    system = System(model.validate())
+    with _lock:
+        while len(_kept) >= _MOST:
+            del _kept[next(iter(_kept))]
+        _kept[id(model)] = system
+    return system

@@ -1,0 +1,389 @@
+"""The compiled mode loop of explicit Runge-Kutta methods: steps from event to event, no Python between.
+
+As in `hybridsim.engine.leap`, segments are committed one by one up to the target, or up to the first that holds
+something which is not ordinary. The dense output of a step is the two-point Hermite polynomial on the Taylor
+coefficients of the flow at its ends; a step in which a guard leaves is repeated up to the event.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.dense_guards import first_guard
+from hybridsim.engine.first_exit import FOUND, OPEN
+from hybridsim.engine.hermite import fit_in_time
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, load, set_origin
+from hybridsim.engine.ordinary_event import Before, find_modes, guard_series, put
+from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
+from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
+from hybridsim.engine.taylor import advance, expand
+
+LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
+_NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
+_CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
+_HALF = 0.5
+_ROUNDING = 16.0 * UNIT
+_PASSES = 3  # of the tolerance at a step's end, which the first step's length is made for
+
+
+@kernel
+def first_length(leading: Any, x: Any, tolerances: Any, states: Any, V: Any, longest: float) -> float:
+    """The length at which the error estimate of a step from the origin of the series V meets the tolerance.
+
+    leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then q and
+    one such coefficient of the low estimate, q = 0 where there is none; see `leading_terms`.
+    """
+    q, c, c_next, q_low, c_low = leading
+    rtol, atol = tolerances
+    n, h = x.shape[0], 0.0
+    for turn in range(_PASSES):
+        size, size_next, size_low = 0.0, 0.0, 0.0
+        for i in range(n):
+            r = states[i]
+            end = V[r, q]
+            for k in range(q - 1, -1, -1):
+                end = end * h + V[r, k]
+            scale = atol[i] + rtol * (max(abs(x[i]), abs(end)) if turn > 0 else abs(x[i]))
+            if scale > 0.0:
+                size += (c * V[r, q] / scale) ** 2
+                size_next += (c_next * V[r, q + 1] / scale) ** 2
+                size_low += (c_low * V[r, q_low] / scale) ** 2
+        if not size + size_next + size_low < math.inf:
+            return math.nan
+        size, size_next, size_low = math.sqrt(size / n), math.sqrt(size_next / n), math.sqrt(size_low / n)
+        h = longest
+        if size > 0.0:
+            h = min(h, size ** (-1.0 / q))
+        if size_next > 0.0:
+            h = min(h, size_next ** (-1.0 / (q + 1)))
+        if q_low > 0 and size_low > 0.0 and size > 0.0:
+            h = max(h, (size * size / (0.1 * size_low)) ** (-1.0 / (2 * q - q_low)))
+    return min(SAFETY * h, longest)
+
+
+@kernel
+def coefficients_of(states: Any, V: Any, out: Any) -> bool:
+    """Coefficients of the states (n, K) out of their registers; whether all are numbers."""
+    total = 0.0
+    for i in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            out[i, k] = V[states[i], k]
+            total += abs(out[i, k])
+    return total < math.inf
+
+
+@kernel
+def series_of(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: Any, out: Any) -> bool:
+    """Coefficients of the states (n, K) along the flow from (s, x), and in W of all registers; whether all are finite.
+
+    rows: all of the mode's; guard_rows: those of them that the guards need.
+    """
+    _, states, derivatives = places
+    last = out.shape[1] - 1
+    expand(rows, places, last - 1, s, x, W)
+    for i in range(out.shape[0]):
+        W[states[i], last] = W[derivatives[i], last - 1] / last
+    advance(guard_rows, W, last)
+    return coefficients_of(states, W, out)
+
+
+@kernel
+def stays_positive(left: Any, right: Any, d: float, weights: Any) -> bool:
+    """Whether a polynomial of degree 2 K - 1 is certainly positive from 0 to d: its Bernstein coefficients are.
+
+    left, right (K,): its Taylor coefficients at both ends. weights (K, K): from these to the K Bernstein coefficients
+    next to an end.
+    """
+    size, power = 0.0, 1.0
+    for k in range(left.shape[0]):
+        size += (abs(left[k]) + abs(right[k])) * power
+        power *= d
+    error = _ROUNDING * size
+    for j in range(left.shape[0]):
+        low, high, power = 0.0, 0.0, 1.0
+        for k in range(j + 1):
+            low += weights[j, k] * left[k] * power
+            high += weights[j, k] * right[k] * (power if k % 2 == 0 else -power)
+            power *= d
+        if not (low > error and high > error):
+            return False
+    return True
+
+
+@kernel
+def all_stay_positive(
+    watched: Any, numbers: Any, sides: Any, orders: Any, left: Any, W: Any, d: float, weights: Any
+) -> bool:
+    """Whether linear guards are certainly positive along a step; `left` their series at its start, W at its end."""
+    terms = weights.shape[0]
+    for i in range(watched.shape[0]):
+        if sides[numbers[i]] <= 0 or orders[numbers[i]] > 0:
+            return False
+        if not stays_positive(left[i], W[watched[i], :terms], d, weights):
+            return False
+    return True
+
+
+@kernel
+def land(
+    functions: Any,
+    tableau: Any,
+    tolerances: Any,
+    rows: Any,
+    guard_rows: Any,
+    places: Any,
+    register: int,
+    s: float,
+    d: float,
+    h: float,
+    y: Any,
+    p: Any,
+    z: Any,
+    is_holding: bool,
+    room: Any,
+    right: Any,
+) -> tuple[int, float]:
+    """Repeat the step of length h up to where a function (a register of the tape) is zero, at d by the dense output.
+
+    The end in room.y1, the series of the states there in `right`, of all registers in room.W. Newton's method corrects
+    the time until it is good to rounding; a correction within reach of the series at the end needs no new step.
+    """
+    W, y1, last = room.W, room.y1, right.shape[1] - 1
+    low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
+    error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
+    room.counts[0] += 1
+    for _ in range(_CORRECTIONS):
+        if not error <= 1.0:
+            return REJECTED, d
+        if is_holding:
+            call(functions.project, s + d, y1, p, z, room.slopes)
+            y1[:] = room.slopes
+        if not series_of(rows, guard_rows, places, s + d, y1, W, right):
+            return LOST, d
+        value, slope = W[register, 0], W[register, 1]
+        move = -value / slope if slope != 0.0 else math.nan
+        if not abs(move) < math.inf:
+            return LOST, d
+        if abs(move) <= 2.0 * 2.0**-52 * (s + d):
+            return LANDED, d
+        moved = min(max(d + move, low), high)
+        if moved == d or not moved > 0.0:
+            return UNSURE, d
+        move, d = moved - d, moved
+        is_near = True
+        for i in range(y.shape[0]):
+            is_near = is_near and abs(right[i, last] * move**last) <= UNIT * room.scale[i]
+        if is_near:
+            for i in range(y.shape[0]):
+                y1[i] = right[i, last]
+                for k in range(last - 1, -1, -1):
+                    y1[i] = y1[i] * move + right[i, k]
+        else:
+            error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
+            room.counts[0] += 1
+    return UNSURE, d
+
+
+@kernel
+def is_zero(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    k: int,
+    fired: int,
+    s: float,
+    y: Any,
+    x_error: Any,
+    p: Any,
+    z: Any,
+    room: Any,
+    work: Any,
+) -> bool:
+    """Whether a guard is zero within twice the rounding of the state and that of the instant."""
+    s_error = 8.0 * 2.0**-52 * s
+    state_errors(functions, automata, s, s_error, y, room.scale, x_error, p, z, room.slopes, room.y_error)
+    for i in range(y.shape[0]):
+        room.y_error[i] *= 2.0
+    event = Before(s, s_error, y, room.y_error, p, z)
+    guard_series(tapes, inputs, lin, k, event, y, room.y_error, work)
+    return abs(work.values[fired, 0]) <= work.bounds[fired, 0]
+
+
+@kernel
+def rk_leap(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    parts: Any,
+    inputs: Any,
+    lin: Any,
+    places: Any,
+    method: Any,
+    control: Any,
+    target: Any,
+    clock: Any,
+    state: Any,
+    work: Any,
+    room: Any,
+    record: Any,
+) -> tuple[int, int, int]:
+    """Go from event to event; returns why it ended and how many steps and segments were committed.
+
+    parts: `Parts` of the tapes. method: tableau, leading terms of its estimates, error order, matrices of the Hermite
+    polynomial. control: rtol, atol, order of the guards' series, max_step, longest segment, and in an array the length
+    of the first step of all (0: to be found), which is used up. The others are as for `leap`.
+    """
+    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    tableau, leading, error_order, hermite = method
+    rtol, atol, order, max_step, longest, first = control
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    sides, orders, floors = state.sides, state.orders, state.floors
+    V, W, left, right, y, y1, scale, slopes = (
+        room.V, room.W, room.left, room.right, room.y, room.y1, room.scale, room.slopes
+    )  # fmt: skip
+    side_now, order_now, floor_now = room.sides, room.orders, room.floors
+    steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
+    modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
+    time, states = inputs.time[0], inputs.states
+    n, terms, tolerances = x.shape[0], left.shape[1], (rtol, atol)
+    n_steps, n_segments = 0, 0
+    pace = room.pace
+    pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
+    while True:
+        k, first_step = find_modes(tapes.modes, z), n_steps
+        bound = (target[0] - clock[0]) + (target[1] - clock[1])
+        if not bound > 0.0:
+            return AT_TARGET, n_steps, n_segments
+        if k < 0:
+            return STOPPED, n_steps, n_segments
+        if n_segments >= segments.shape[0]:
+            return FULL, n_steps, n_segments
+        set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
+        rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+        guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
+        is_linear = parts.is_linear[k]
+        guard_order = 2 * terms + 1 if is_linear else order
+        flow_places = (time, states, tapes.derivatives[k])
+        load(inputs, tapes, k, p, V)
+        load(inputs, tapes, k, p, W)
+        numbers = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
+        watched = room.watched[: numbers.shape[0]]
+        for i in range(watched.shape[0]):
+            watched[i] = tapes.guards[k, numbers[i]]
+        put(sides, side_now)
+        put(orders, order_now)
+        put(floors, floor_now)
+        s, fired, is_holding, is_sure = 0.0, -1, holding(automata, z), True
+        value, slope = 0.0, 0.0
+        forget(room.memory)
+        put(x, y)
+        for i in range(n):
+            scale[i] = abs(x[i])
+        expand(rows, flow_places, leading[0] + 1, 0.0, y, W)
+        h = first_length(leading, y, tolerances, states, W, min(bound, max_step))
+        if first[0] > 0.0:
+            h, first[0] = first[0], 0.0
+        if not (coefficients_of(states, W, left) and h > 0.0):
+            return STOPPED, n_steps, n_segments
+        for i in range(watched.shape[0]):
+            for j in range(terms):
+                room.guards_left[i, j] = W[watched[i], j]
+        while fired < 0 and s < bound:
+            if n_steps >= steps.shape[0]:
+                return FULL, first_step, n_segments
+            is_last = (
+                h >= bound - s - SMALLEST * 2.0**-52 * bound
+            )  # what would be left is too short for a step
+            d = bound - s if is_last else h
+            if s > longest or not d > SMALLEST * 2.0**-52 * s:
+                return STOPPED, first_step, n_segments
+            for i in range(n):
+                room.dx[i] = left[i, 1]
+            error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
+            room.counts[0] += 1
+            h = min(next_length(d, error, error_order, room.memory), max_step)
+            if not (error <= 1.0 and series_of(rows, guard_rows, flow_places, s + d, y1, W, right)):
+                room.counts[1] += 1
+                h = min(h, _HALF * d) if error <= 1.0 else h
+                continue
+            if not (
+                is_linear
+                and all_stay_positive(
+                    watched, numbers, side_now, order_now, room.guards_left, W, d, hermite[2]
+                )
+            ):
+                if not fit_in_time(left, right, d, hermite[0], hermite[1], room.lack, room.polynomial):
+                    return STOPPED, first_step, n_segments
+                outcome, g, at = first_guard(
+                    tapes, k, guard_rows, inputs, is_linear, guard_order, rtol, s, d, room.polynomial, watched, atol,
+                    side_now, order_now, floor_now, V, W, y1, room.a, room.b, room.stack,
+                )  # fmt: skip
+                if outcome == OPEN:
+                    return STOPPED, first_step, n_segments
+                if outcome == FOUND:
+                    code, at = land(
+                        functions, tableau, tolerances, rows, guard_rows, flow_places, tapes.guards[k, g], s, at, d, y,
+                        p, z, is_holding, room, right,
+                    )  # fmt: skip
+                    if code == LOST:
+                        return STOPPED, first_step, n_segments
+                    if code == REJECTED:
+                        room.counts[1] += 1
+                        h = _HALF * at
+                        if s == 0.0:
+                            put(sides, side_now)
+                            put(orders, order_now)
+                            put(floors, floor_now)
+                        continue
+                    value, slope = W[tapes.guards[k, g], 0], W[tapes.guards[k, g], 1]
+                    d, is_last, fired, is_sure = at, False, g, code == LANDED
+            steps[n_steps, 0], steps[n_steps, 1] = s, d
+            for i in range(n):
+                for j in range(terms):
+                    series[n_steps, i, j], series[n_steps, i, terms + j] = left[i, j], right[i, j]
+                    left[i, j] = right[i, j]
+                y[i] = y1[i]
+                scale[i] = max(scale[i], abs(y1[i]))
+            for i in range(watched.shape[0]):
+                for j in range(terms):
+                    room.guards_left[i, j] = W[watched[i], j]
+            n_steps += 1
+            s = bound if is_last else s + d
+        if is_holding:
+            call(functions.project, s, y, p, z, y1)
+            put(y1, y)
+        segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
+        fires[n_segments] = fired
+        put(z, modes[n_segments])
+        put(p, vectors[n_segments])
+        put(y, jumps[n_segments, 0])
+        put(y, jumps[n_segments, 1])
+        if fired < 0:
+            put(y, x)
+            for i in range(n):
+                x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
+            clock[0], clock[1] = target[0], target[1]
+            return AT_TARGET, n_steps, n_segments + 1
+        if is_crowded(s, clock, pace):
+            return STOPPED, first_step, n_segments
+        if not is_sure and not is_zero(
+            functions, automata, tapes, inputs, lin, k, fired, s, y, x_error, p, z, room, work
+        ):
+            return STOPPED, first_step, n_segments
+        s_error = 2.0 * 2.0**-52 * s
+        if slope != 0.0 and abs(value / slope) < math.inf:
+            s_error = max(s_error, abs(value / slope))
+        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, room.y_error)
+        event = Before(s, s_error, y, room.y_error, p, z)
+        if not settle_and_move_on(
+            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,
+            (y1, slopes, room.z_after, room.p_after),
+        ):  # fmt: skip
+            return STOPPED, first_step, n_segments
+        put(y1, jumps[n_segments, 1])
+        n_segments += 1

@@ -1,0 +1,133 @@
+"""Leaps of a Runge-Kutta method: its compiled mode loop as the general one sees it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.guard_parts import GuardParts
+from hybridsim.engine.hermite import bernstein_weights, fit_all, right_system, shift_matrix
+from hybridsim.engine.leaper import NOT_LINEAR, Leaper
+from hybridsim.engine.packs import packed
+from hybridsim.engine.rk_leap import rk_leap
+from hybridsim.engine.rk_step import Tableau
+from hybridsim.engine.series import series_order
+from hybridsim.engine.series_block import SeriesBlock
+from hybridsim.engine.stepping import Counters, Tolerances
+from hybridsim.engine.system import System
+
+TERMS = 4  # coefficients of the flow at each end of a step: the dense output has degree 7
+
+
+class Room(NamedTuple):
+    """Scratch arrays of the kernel: series of all registers, of a guard, of the states at both ends, vectors."""
+
+    V: np.ndarray
+    W: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    stack: np.ndarray
+    stages: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    polynomial: np.ndarray
+    guards_left: np.ndarray
+    lack: np.ndarray
+    y: np.ndarray
+    y1: np.ndarray
+    y_error: np.ndarray
+    scale: np.ndarray
+    slopes: np.ndarray
+    dx: np.ndarray
+    z_after: np.ndarray
+    p_after: np.ndarray
+    watched: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    floors: np.ndarray
+    pace: np.ndarray
+    memory: np.ndarray
+    counts: np.ndarray
+
+
+class HermiteBlock(SeriesBlock):
+    """Segments whose steps have the flow's series at both ends: series (steps, n, 2 K), left and then right."""
+
+    @cached_property
+    def polynomials(self) -> np.ndarray:
+        """The two-point Hermite polynomials, made when they are asked for."""
+        out = np.empty_like(self.series)
+        fit_all(self.steps, self.series, shift_matrix(TERMS), right_system(TERMS), out)
+        return out
+
+
+class RungeKuttaLeaper(Leaper):
+    """Leaps of an explicit Runge-Kutta method."""
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float, tableau: Tableau) -> None:
+        rtol = tolerances.rtol
+        self.tableau, leading = tableau, tableau.leading_terms
+        order = max(series_order(rtol), 2 * TERMS + 1)
+        self.columns_of_room = max(order, leading[0] + 1) + 1
+        super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.columns_of_room}")
+        self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
+        matrices = (shift_matrix(TERMS), right_system(TERMS), bernstein_weights(TERMS))
+        self.method = (tableau.arrays, leading, tableau.error_order, matrices)
+        first = np.array([tolerances.first_step or 0.0])
+        self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest, first)
+
+    def _room(self) -> Room:
+        system, n, columns = self.system, self.system.n, self.columns_of_room
+        guards, registers = system.guard_count, system.registers.count
+        room: Room = packed(
+            Room(
+                V=np.zeros((registers, columns)),
+                W=np.zeros((registers, columns)),
+                a=np.empty(columns),
+                b=np.empty(columns),
+                stack=np.empty((64, columns)),
+                stages=np.empty((len(self.tableau.c), n)),
+                left=np.empty((n, TERMS)),
+                right=np.empty((n, TERMS)),
+                polynomial=np.empty((n, 2 * TERMS)),
+                guards_left=np.empty((guards, TERMS)),
+                lack=np.empty(TERMS),
+                **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes", "dx")},
+                z_after=np.empty(len(system.automata), dtype=np.int64),
+                p_after=np.empty(system.layout.size),
+                **{name: np.empty(guards, dtype=np.int64) for name in ("watched", "sides", "orders")},
+                floors=np.empty(guards),
+                pace=np.empty(3),
+                memory=np.empty(3),
+                counts=np.zeros(2, dtype=np.int64),
+            )
+        )
+        return room
+
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: Any,
+        work: Any,
+        room: Any,
+        rows: Any,
+    ) -> tuple[int, int, int]:
+        room.counts[:] = 0
+        code, steps, count = rk_leap(
+            self.functions, self.automata, self.shelf.tapes, self.parts.of(self.shelf.tapes), self.inputs,
+            NOT_LINEAR, self.places, self.method, self.control, to, clock, state, work, room, rows,
+        )  # fmt: skip
+        return code, steps, count
+
+    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+        tries, rejected = room.counts.tolist()
+        counters.rejected += rejected
+        counters.rhs_evaluations += (
+            tries * (len(self.tableau.c) - 1) + steps
+        )  # the slope comes with the series
+
+    def _block(self, *arrays: np.ndarray) -> HermiteBlock:
+        return HermiteBlock(self.system, *arrays)

@@ -1,0 +1,115 @@
+"""Where a compiled loop ends a segment: what is known of the state there, the event settled, the next origin."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.ordinary_event import SETTLED, put, settle_ordinary
+from hybridsim.engine.timepair import two_sum
+
+_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
+_ULPS = 64.0  # events closer than this are for the general way to tell apart
+
+
+class State(NamedTuple):
+    """What holds at the start of a segment: x, x_error (n,), z (C,), p, and sides, orders, floors (G,) of guards."""
+
+    x: np.ndarray
+    x_error: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    floors: np.ndarray
+
+
+@kernel
+def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
+    """Whether events follow each other so closely, or ever faster, that it is not for a compiled loop to go on.
+
+    gap: since the last event. pace (3,): the gap before, its ratio to the one before that, how often it was steady.
+    """
+    ratio = gap / pace[0]
+    steady = ratio < _SHRINKING and abs(ratio - pace[1]) <= _STEADY * ratio
+    pace[0], pace[1], pace[2] = gap, ratio, pace[2] + 1.0 if steady else 0.0
+    return pace[2] > 2.0 or gap <= _ULPS * 2.0**-52 * abs(clock[0])
+
+
+@kernel
+def state_errors(
+    functions: Any,
+    automata: Any,
+    s: float,
+    s_error: float,
+    y: Any,
+    scale: Any,
+    x_error: Any,
+    p: Any,
+    z: Any,
+    slopes: Any,
+    out: Any,
+) -> None:
+    """Bounds of the states at an event: rounding on the segment (of sizes `scale`), what was left, the instant's."""
+    call(functions.flow, s, y, p, z, slopes)
+    for i in range(y.shape[0]):
+        out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
+    for c in range(z.shape[0]):
+        if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
+            out[automata.pin[c]] = UNIT * abs(y[automata.pin[c]])
+
+
+@kernel
+def settle_and_move_on(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    discrete: Any,
+    at: Any,
+    fired: int,
+    clock: Any,
+    state: Any,
+    work: Any,
+    room: Any,
+) -> bool:
+    """Settle an ordinary event and make what follows it the start of the next segment; False leaves all as it was.
+
+    lin: tables of linear modes, empty for others. discrete: how many discrete states there are and where in p. at:
+    `Before`. state: `State`, moved on with the clock. room: (n,), (n,), like z, like p.
+    """
+    sides, orders, floors = state.sides, state.orders, state.floors
+    x_after, x_error_after, z_after, p_after = room
+    outcome, _ = settle_ordinary(
+        functions,
+        automata,
+        tapes,
+        inputs,
+        lin,
+        at,
+        fired,
+        discrete[0],
+        discrete[1],
+        x_after,
+        x_error_after,
+        z_after,
+        p_after,
+        work,
+    )
+    if outcome != SETTLED:
+        return False
+    s = at.s
+    put(x_after, state.x)
+    put(x_error_after, state.x_error)
+    put(z_after, state.z)
+    put(p_after, state.p)
+    for g in range(sides.shape[0]):
+        sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
+        floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
+    high, low = two_sum(clock[0], s)
+    clock[0], clock[1] = two_sum(high, low + clock[1])
+    return True

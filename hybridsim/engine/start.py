@@ -1,0 +1,25 @@
+"""How a run starts: the modes and states that hold just after its first instant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.system import System
+from hybridsim.engine.trajectory import Task
+
+_MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
+
+
+def settled_start(system: System, task: Task, p: np.ndarray, due: tuple[int, ...]) -> Outcome:
+    """What holds just after t0, the schedules due then applied; p is the run-time vector at t0."""
+    key = (task.t0, task.forward, task.x0.tobytes(), task.z0.tobytes(), task.discrete.tobytes())
+    known = system.starts.get(key)
+    if known is None:
+        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
+        resets = [("schedule", k) for k in due]
+        known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
+        if len(system.starts) >= _MOST:
+            system.starts.clear()
+        system.starts[key] = known
+    return known.copy()
