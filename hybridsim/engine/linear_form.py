@@ -246,5 +246,5 @@ def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
         elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == VALUE:
             terms += [(source, weight * w) for source, w in atoms.known[key[0][0]].terms]
         else:
-            raise NotLinear("a sine or exponential of more than linear time")
+            raise NotLinear("a sine or an exponential of what is not linear in time alone")
     return Atom(kind, rate, offset, tuple(sorted(terms)))

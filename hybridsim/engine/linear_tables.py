@@ -137,8 +137,8 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray) -> Linea
             J = len(flow.values)
             gamma = row @ flow.full_basis
             _modal_terms(gamma, flow, terms[k, g, :J])
-            sizes[k, g, :J], rests[k, g, :J] = np.abs(gamma), _first_left_out(gamma, flow)
-            seen = np.abs(gamma) > 0.0
+            sizes[k, g, :J], rests[k, g, :J] = _bounds(gamma, flow)
+            seen = rests[k, g, :J] > 0.0
             fastest, growth = max(flow.speeds[seen], default=0.0), max(flow.growth[seen], default=0.0)
             if fastest > 0.0:
                 farthest[k, g] = _FARTHEST / fastest
@@ -183,16 +183,20 @@ def _modal_terms(gamma: np.ndarray, flow: Modal, terms: np.ndarray) -> None:
         gamma = gamma @ B / (m + 1)
 
 
-def _first_left_out(gamma: np.ndarray, flow: Modal) -> np.ndarray:
-    """Factors of |c| in a bound of the coefficient TERMS of Re(gamma c): |gamma| |B**TERMS|/TERMS! of each block."""
-    factors, first = np.empty(len(gamma)), 0
+def _bounds(gamma: np.ndarray, flow: Modal) -> tuple[np.ndarray, np.ndarray]:
+    """Factors of |c| in bounds of Re(gamma c) and of its coefficient TERMS: |gamma| and |gamma| |B**TERMS|/TERMS!.
+
+    Block by block: what a guard does not see now it may see later, of another coordinate of the block.
+    """
+    sizes, rests, first = np.empty(len(gamma)), np.empty(len(gamma)), 0
     while first < len(gamma):
         here = slice(first, int(flow.ends[first]))
         block = np.diag(flow.values[here]) + flow.upper[here, here]
+        sizes[here] = np.linalg.norm(gamma[here])
         power = np.linalg.norm(np.linalg.matrix_power(block, TERMS), 2)
-        factors[here] = np.linalg.norm(gamma[here]) * power / math.factorial(TERMS)
+        rests[here] = sizes[here] * power / math.factorial(TERMS)
         first = here.stop
-    return factors
+    return sizes, rests
 
 
 def _atom_arrays(atoms: Atoms, monomials: list[Monomial]) -> dict[str, np.ndarray]:
@@ -233,17 +237,17 @@ def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> LinearTables:
 def refuse_nonlinear(system: System) -> None:
     """Refuse a model of which some mode is not linear; other combinations of modes are met when they are entered."""
     p = system.vector(Instant(0.0), np.zeros(system.layout.discrete))
-    count = len(system.automata)
+    vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
     for c, automaton in enumerate(system.automata):
-        for m in range(len(automaton.modes)):
-            z = np.zeros(count, dtype=np.int64)
+        for m, mode in enumerate(automaton.modes):
+            z = vectors[f"in {automaton.name}.{mode} "] = vectors[""].copy()
             z[c] = m
-            try:
-                LinearMode(system, Atoms(), z, p)
-            except NotLinear as reason:
-                mode = f"{automaton.name}.{automaton.modes[m]}"
-                raise UsageError(
-                    f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
-                    f"and in {mode} {reason}",
-                    remedy="choose taylor or dop853",
-                ) from None
+    for place, z in reversed(vectors.items()):
+        try:
+            LinearMode(system, Atoms(), z, p)
+        except NotLinear as reason:
+            raise UsageError(
+                f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
+                f"and {place}{reason}",
+                remedy="choose taylor or dop853",
+            ) from None

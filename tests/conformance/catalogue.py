@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from conformance import oscillators
@@ -512,15 +513,28 @@ def left_once(solution: Any) -> list[str]:
     return wrong + ([] if crossed in ([], [1.0]) else [f"the monitor fired at {crossed}"])
 
 
-SCENES: tuple[Scene, ...] = (
-    *oscillators.scenes(),
-    *contacts(),
-    *ball(),
-    *corridor(),
-    *modes(),
-    *smooth(),
-    *monitored(),
-    *scheduled(),
-    *backward(),
-    *coincidences(),
+# Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
+NONLINEAR = {
+    "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
+}  # fmt: skip
+
+
+def _with_linearity(scene: Scene) -> Scene:
+    return replace(scene, needs=scene.needs | {"nonlinear"}) if scene.file in NONLINEAR else scene
+
+
+SCENES: tuple[Scene, ...] = tuple(
+    _with_linearity(scene)
+    for scene in (
+        *oscillators.scenes(),
+        *contacts(),
+        *ball(),
+        *corridor(),
+        *modes(),
+        *smooth(),
+        *monitored(),
+        *scheduled(),
+        *backward(),
+        *coincidences(),
+    )
 )

@@ -10,6 +10,7 @@ from typing import Any
 VOCABULARY = (
     "contacts",
     "transitions",
+    "nonlinear",
     "monitors",
     "scheduled",
     "multiple-roots",

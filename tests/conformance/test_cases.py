@@ -14,7 +14,7 @@ from hybridsim.errors import HybridsimError
 
 INTEGRATORS = [one.name for one in hs.list_integrators()]
 # What a model visibly needs: a run is refused for it. The others show only in how a run goes.
-REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corners"}
+REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corners", "nonlinear"}
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
