@@ -16,6 +16,7 @@ ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
     "tsit5:Tsit5",
+    "rodas5p:Rodas5P",
     "taylor:Taylor",
     "scipy_solvers:ScipyDOP853",
     "scipy_solvers:ScipyRK45",
