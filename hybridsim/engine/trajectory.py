@@ -47,7 +47,7 @@ class Trajectory:
 
     def close(self, keep: Keep) -> None:
         """Let go of everything that is not to be kept, to the exact time."""
-        if not self.segments:
+        if keep == ALL or not self.segments:
             return
         last = self.segments[-1]
         end, forward = last.end, last.s[-1] >= last.s[0]
