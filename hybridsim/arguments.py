@@ -12,6 +12,7 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model, load
 
 if TYPE_CHECKING:
+    from hybridsim.engine.keep import Keep
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
 
@@ -196,12 +197,48 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
     return z
 
 
-def time_grid(t_eval: Sequence[float] | None, span: tuple[float, float]) -> np.ndarray | None:
-    """Times within the span."""
+def kept(save: Any, system: System) -> Keep:
+    """What is to be kept of a run: a word, or a length of time before its end."""
+    from hybridsim.engine.keep import ALL, EVENTS, NOTHING, Keep
+
+    words = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
+    if isinstance(save, str) and save in words:
+        return words[save]
+    if isinstance(save, str) and save == "last-period":
+        from hybridsim.engine.period import system_period
+
+        length = system_period(system)
+        if length is None:
+            raise UsageError(
+                f"save is 'last-period', and the forcing of model {system.model.name} has no period",
+                remedy="give a length of time instead, save=1.5 keeps the last 1.5 units of t",
+            )
+        return Keep(length, length)
+    remedy = "give 'all', 'events', 'last-period', 'nothing', or a length of time"
+    length = number(save, "save", remedy)
+    if not length > 0.0:
+        raise UsageError(f"save is {save!r}", remedy=remedy)
+    return Keep(length, length)
+
+
+def time_grid(
+    t_eval: Sequence[float] | None, span: tuple[float, float], keep: Keep, save: Any
+) -> np.ndarray | None:
+    """Times within what is kept of the span."""
     if t_eval is None:
         return None
+    if keep.segments is None:
+        raise UsageError(
+            f"t_eval is given, and save={save!r} keeps no states between the ends",
+            remedy="leave t_eval out, or save='all'",
+        )
     grid = numbers(t_eval, "t_eval", "give times from t0 to t1")
     low, high = min(span), max(span)
     if not np.isfinite(grid).all() or (len(grid) and (grid.min() < low or grid.max() > high)):
         raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
+    if (np.abs(span[1] - grid) > keep.segments).any():
+        raise UsageError(
+            f"t_eval begins before the last {keep.segments:.9g} of the run, which is what save={save!r} keeps",
+            remedy="give later times, or save='all'",
+        )
     return grid

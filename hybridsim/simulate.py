@@ -33,6 +33,7 @@ def simulate(
     max_step: float = math.inf,
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
+    save: str | float = "all",
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Solution:
@@ -52,6 +53,9 @@ def simulate(
     max_step, first_step : bounds of the step, in the unit of t.
     t_eval : times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
         changes the run.
+    save : what is kept of the run, which it never changes. "all"; "events": no states between them; "last-period": the
+        last period of the forcing, states and events; a number: the last so much time, in the unit of t; "nothing":
+        the state at the end, status and cost. With the last three a run of any length takes the same memory.
     progress : called with the finished fraction of the span, from time to time.
     options : options of the integrator.
 
@@ -97,6 +101,7 @@ def simulate(
         arguments.callback(progress),
         compile_time,
         t_eval,
+        save,
         rtol,
         atol,
         max_step,
@@ -114,6 +119,7 @@ def _run(
     progress: Callable[[float], None] | None,
     compile_time: float,
     t_eval: Sequence[float] | None,
+    save: str | float,
     rtol: float | None,
     atol: Any,
     max_step: float,
@@ -133,13 +139,15 @@ def _run(
         None if first_step is None else arguments.step_bound(first_step, "first_step"),
     )
     discrete = system.discrete_start
-    task = Task(span[0], span[1], start, z0, tolerances, discrete)
-    grid = arguments.time_grid(t_eval, span)
+    keep = arguments.kept(save, system)
+    grid = arguments.time_grid(t_eval, span, keep, save)
+    task = Task(span[0], span[1], start, z0, tolerances, discrete, keep)
     refuse_driving(system, span[0], start, discrete, z0)
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
-    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span)
+    trajectory.close(keep)
+    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span, save)
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

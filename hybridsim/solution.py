@@ -87,13 +87,14 @@ class Solution:
         compile_time: float,
         grid: np.ndarray | None,
         t_span: tuple[float, float],
+        save: str | float = "all",
     ) -> None:
         self.model = model
         self.integrator = integrator
         self._system = system
         self._trajectory = trajectory
         self._grid = grid
-        self._span = t_span
+        self._span, self._save = t_span, save
         self._cost = (wall_time, compile_time)
 
     # -- trajectory -----------------------------------------------------------------------------------------
@@ -133,8 +134,9 @@ class Solution:
 
     @property
     def t_start(self) -> float:
-        """First time of the run."""
-        return self._span[0]
+        """First time of the run, or of what was kept of it."""
+        whole = self._save in ("all", "events", "nothing") or not self._segments
+        return self._span[0] if whole else float(self._starts[0])
 
     @property
     def t_end(self) -> float:
@@ -216,7 +218,7 @@ class Solution:
         moved = total - high
         return total + (((high - (total - moved)) + (s - moved)) + low)
 
-    @property
+    @cached_property
     def _ends(self) -> np.ndarray:
         """Where each segment ends: to the last bit where the next begins."""
         return np.append(self._starts[1:], self.t_end) if self._segments else self._starts
@@ -227,18 +229,27 @@ class Solution:
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
         if not self._segments:
             raise UsageError(f"the run holds no trajectory ({self.status}: {self.message})")
+        if self._save in ("events", "nothing"):
+            raise UsageError(
+                f"the run was made with save={self._save!r}, which keeps no states between the ends",
+                remedy="run it with save='all', or with save='last-period' or a number for the end of it",
+            )
         low, high = sorted((self.t_start, self.t_end))
         if len(times) and not ((times >= low) & (times <= high)).all():
             bad = times[~((times >= low) & (times <= high))][0]
-            raise UsageError(f"t = {bad!r} is outside of the run, which goes from {low!r} to {high!r}")
+            whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
+            raise UsageError(f"t = {bad!r} is outside of {whole}, which goes from {low!r} to {high!r}")
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)
         index = np.searchsorted(sign * self._starts, sign * times, side="right" if later else "left") - 1
         index = np.maximum(index, 0)
         s = (times - self._origins[index, 0]) - self._origins[index, 1]
-        spans = self._spans[index]
-        return index, np.clip(s, spans.min(axis=1), spans.max(axis=1))
+        begins, ends = self._spans[index, 0], self._spans[index, 1]
+        s = np.clip(s, begins, ends) if sign > 0 else np.clip(s, ends, begins)
+        # a rounded time of an event means the event: its own state, on the side that is asked for
+        s = np.where(times == self._starts[index], begins, s)
+        return index, np.where(times == self._ends[index], ends, s)
 
     def _pieces(
         self, times: np.ndarray, side: str
@@ -254,10 +265,12 @@ class Solution:
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """All events in order of time: transitions, monitors, scheduled events, near-grazings."""
+        self._require_events()
         return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
+        self._require_events()
         blocks = self._trajectory.occurrences.blocks
         return np.concatenate(
             [np.empty(0), *(block.times[block.chosen(component, kind)] for block in blocks)]
@@ -266,6 +279,9 @@ class Solution:
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
         """For each component its modes in order, with the stretch of time of each."""
+        self._require_events()
+        if self._save == "events":
+            return self._modes_of_events()
         numbers, ends = self._segments.modes(), self._ends
         result = {}
         for c, automaton in enumerate(self._system.automata):
@@ -276,6 +292,25 @@ class Solution:
             stretches = zip(names, self._starts[first].tolist(), ends[last].tolist(), strict=True)
             result[automaton.name] = tuple(ModeInterval(*stretch) for stretch in stretches)
         return result
+
+    def _modes_of_events(self) -> dict[str, tuple[ModeInterval, ...]]:
+        result = {}
+        for automaton, last in zip(self._system.automata, self._segments.modes()[-1].tolist(), strict=True):
+            changes = [e for e in self.events if e.component == automaton.name and e.source != e.target]
+            times = [self.t_start, *(e.t for e in changes), self.t_end]
+            names = [*(e.source for e in changes), automaton.modes[last]]
+            stretches = zip(names, times[:-1], times[1:], strict=True)
+            result[automaton.name] = tuple(
+                ModeInterval(n, a, b) for n, a, b in stretches if a != b or b == times[-1]
+            )
+        return result
+
+    def _require_events(self) -> None:
+        if self._save == "nothing":
+            raise UsageError(
+                "the run was made with save='nothing', which keeps no events and no modes",
+                remedy="run it with save='events', or 'last-period'",
+            )
 
     # -- how it went ----------------------------------------------------------------------------------------
 
@@ -301,7 +336,11 @@ class Solution:
 
     @property
     def stats(self) -> dict[str, float]:
-        """Cost summed over all restarts: steps, rejected, evaluations, events, restarts, wall and compile seconds."""
+        """Cost summed over all restarts: steps, rejected, evaluations, events, restarts; seconds of wall, of compiling.
+
+        wall_time is all of the run; kernel_time what of it was spent in the compiled mode loop, for methods that have
+        one.
+        """
         counters = self._trajectory.counters
         return {**vars(counters), "wall_time": self._cost[0], "compile_time": self._cost[1]}
 
@@ -391,8 +430,9 @@ class Solution:
         return event_frame(self.events, self.names)
 
     def __repr__(self) -> str:
-        kinds = Counter(e.kind for e in self.events)
+        kinds = Counter(o.kind for o in self._trajectory.occurrences)
         counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) or "none"
+        counted = "not kept" if self._save == "nothing" else counted
         lines = [
             f"Solution of {self.model.name} by {self.integrator}: {self.status}",
             f"  {self.message}",
@@ -420,4 +460,6 @@ class Solution:
         }
         head |= {} if self.success else {"message": self.message}
         span = (self.t_start, self.t_end) if computed else None
-        return run_html(self.model, head, self.success, span, self.modes, self.events, self.warnings)
+        known = self._save != "nothing"
+        modes, events = (self.modes, self.events) if known else ({}, ())
+        return run_html(self.model, head, self.success, span, modes, events, self.warnings)

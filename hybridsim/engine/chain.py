@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.blocks import Block, SegmentList
 from hybridsim.engine.pieces import Segment
 from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
 
 Item = TypeVar("Item")
 
@@ -61,6 +62,13 @@ class Chain(Sequence[Item]):
         while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > self.window:
             del self.blocks[0]
 
+    def drop(self, count: int) -> None:
+        """Let go of the first items."""
+        while self.blocks and count >= len(self.blocks[0]):
+            count -= len(self.blocks.pop(0))
+        if count:
+            self.blocks[0] = self.blocks[0].since(count)
+
     def starts(self) -> np.ndarray:
         """Number of the first item of each block, and of all items."""
         return np.cumsum([0, *map(len, self.blocks)])
@@ -109,6 +117,24 @@ class SegmentChain(Chain[Segment]):
         """Modes (N, C)."""
         none = np.empty((0, self._shape[1]), dtype=np.int64)
         return np.concatenate([none, *(block.modes for block in self.blocks)])
+
+    def cut(self, instant: Instant) -> None:
+        """Let go of all that lies before an instant; the segment that holds it begins there from now on."""
+        origins, spans = self.origins(), self.spans()
+        moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
+        sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
+        first = max(int(np.searchsorted(sign * moved, 0.0, side="right")) - 1, 0)
+        held, s = self[first], instant.minus(Instant(*origins[first].tolist()))
+        if sign * s <= sign * held.s[0]:
+            self.drop(first)
+            return
+        x = self.states(np.array([first]), np.array([s]))
+        later = sign * held.s > sign * s
+        knots, states = np.append(s, held.s[later]), np.concatenate([x, held.x[later]])
+        self.drop(first + 1)
+        head = self._loose()
+        head.append(Segment(held.origin, held.z, held.p, knots, states, held.dense))
+        self.blocks.insert(0, head)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """States (k, n) in the segments of these numbers, at local times (k,)."""

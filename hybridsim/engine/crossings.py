@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -90,22 +90,23 @@ class Crossings(Sequence[Occurrence]):
 
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
-        events, components = self._places
-        e, c = int(events[i]), int(components[i])
-        automaton, fired = self._system.automata[c], int(self._fired[e])
-        source, target = int(self._before[e, c]), int(self._after[e, c])
-        guard = ""
-        if c == self._system.owner[fired]:
-            guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
-        return Occurrence(
-            Instant(*self._instants[e].tolist()),
-            "transition",
-            automaton.name,
-            guard,
-            automaton.modes[source],
-            automaton.modes[target],
-            -1,
-            self._states[e, 0],
-            self._states[e, 1],
+            return list(self._made(i))
+        k = range(len(self))[i]
+        return next(self._made(slice(k, k + 1)))
+
+    def __iter__(self) -> Iterator[Occurrence]:
+        return self._made(slice(None))
+
+    def _made(self, chosen: slice) -> Iterator[Occurrence]:
+        automata, owner = self._system.automata, self._system.owner.tolist()
+        e, c = (places[chosen] for places in self._places)
+        changes = zip(
+            self._fired[e].tolist(), self._before[e, c].tolist(), self._after[e, c].tolist(), strict=True
         )
+        rows = zip(c.tolist(), changes, self._instants[e].tolist(), self._states[e], strict=True)
+        for component, (fired, source, target), (high, low), (x_minus, x_plus) in rows:
+            automaton, guard = automata[component], ""
+            if component == owner[fired]:
+                guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
+            names = (automaton.name, guard, automaton.modes[source], automaton.modes[target])
+            yield Occurrence(Instant(high, low), "transition", *names, -1, x_minus, x_plus)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from time import perf_counter
+from typing import Any
+
 import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
@@ -57,13 +60,19 @@ class ExactLeaper:
             outcome.guard_floors.copy(),
         )
         tapes = self.shelf.tapes
-        tables = tables_of(self.system, tapes.modes, p)
-        work = work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1)
+        tables, spare = tables_of(self.system, tapes.modes, p)
+        try:
+            work, room = spare.pop()
+        except IndexError:
+            work, room = self._scratch(tables)
         rows = self._record(tables)
+        as_packed, record_packed, began = packed(state), packed(rows), perf_counter()
         code, count = exact_leap(
             self.functions, self.automata, tapes, self.system.registers.inputs, tables, self.places, self.longest,
-            to, clock, packed(state), work, packed(self._room(tables)), packed(rows),
+            to, clock, as_packed, work, room, record_packed,
         )  # fmt: skip
+        record.counters.kernel_time += perf_counter() - began
+        spare.append((work, room))
         instants = self._commit(tables, Record(*(r[:count] for r in rows)), state[2], clock, record)
         x, x_error, z, p, sides, orders, floors = state
         self.shelf.surround(z)
@@ -73,10 +82,10 @@ class ExactLeaper:
         end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
         return Landing(Instant(*clock.tolist()), after, end, instants)
 
-    def _room(self, tables: LinearTables) -> Room:
-        """Scratch arrays of the kernel."""
+    def _scratch(self, tables: LinearTables) -> tuple[Any, Any]:
+        """Room for events, and scratch arrays of the kernel."""
         n, widest = self.system.n, tables.values.shape[1]
-        return Room(
+        room = Room(
             c=np.zeros(widest, dtype=complex),
             v=np.zeros(widest, dtype=complex),
             terms=np.zeros((2, TERMS)),
@@ -85,6 +94,7 @@ class ExactLeaper:
             pace=np.empty(3),
             **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes")},
         )
+        return work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1), packed(room)
 
     def _record(self, tables: LinearTables) -> Record:
         """Fresh arrays for the kernel to write to; the trajectory keeps them."""

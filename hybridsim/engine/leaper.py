@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -152,8 +153,9 @@ class Leaper(ABC):
             work, room = work_space(self.system), self._room()
         instants = []
         while True:
-            rows = self._rows()
-            code, steps, count = self._go(to, clock, as_packed, work, room, packed(rows))
+            rows, began = packed(self._rows()), perf_counter()
+            code, steps, count = self._go(to, clock, as_packed, work, room, rows)
+            record.counters.kernel_time += perf_counter() - began
             self._count(record.counters, steps, room)
             is_full = code == FULL and (count > 0 or self.used != (0, 0))
             if count:

@@ -35,7 +35,7 @@ class LinearSegment:
 
     def __init__(self, system: System, x0: np.ndarray, p: np.ndarray, z: np.ndarray) -> None:
         self.n = system.n
-        self.tables = tables_of(system, z[None, :], p)
+        self.tables, _ = tables_of(system, z[None, :], p)
         monomials, atoms = len(self.tables.factor_start) - 1, len(self.tables.kinds)
         self.c = np.zeros(self.tables.values.shape[1], dtype=complex)
         _coordinates(self.tables, x0, p, np.zeros((2 * atoms, 2)), np.zeros((2, monomials)), self.c)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -223,20 +224,28 @@ def _stack(parts: list[np.ndarray], shape: tuple[int, ...], kind: Any) -> np.nda
     return out
 
 
-def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> LinearTables:
-    """Tables of these vectors of modes (K, components); made once for each set of parameter values."""
-    kept: dict[bytes, LinearTables] = system.code.shared("linear", dict)
+def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> tuple[LinearTables, deque[Any]]:
+    """Tables of these vectors of modes (K, components), and scratch arrays for them to be handed on.
+
+    Both are made once for each set of parameter values.
+    """
+    kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes()
-    if key not in kept:
+    found = kept.get(key)
+    if found is None:
         if len(kept) >= _KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = linear_tables(system, list(modes), p)
-    return kept[key]
+            kept.pop(next(iter(kept)), None)
+        found = kept[key] = (linear_tables(system, list(modes), p), deque())
+    return found
 
 
 def refuse_nonlinear(system: System) -> None:
     """Refuse a model of which some mode is not linear; other combinations of modes are met when they are entered."""
     p = system.vector(Instant(0.0), np.zeros(system.layout.discrete))
+    passed: set[bytes] = system.code.shared("known to be linear", set)
+    key = p[: system.layout.parameters].tobytes()
+    if key in passed:
+        return
     vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
     for c, automaton in enumerate(system.automata):
         for m, mode in enumerate(automaton.modes):
@@ -251,3 +260,5 @@ def refuse_nonlinear(system: System) -> None:
                 f"and {place}{reason}",
                 remedy="choose taylor or dop853",
             ) from None
+    if len(passed) < _KEPT:
+        passed.add(key)

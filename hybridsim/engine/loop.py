@@ -33,7 +33,7 @@ class ModeLoop:
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
-        self.record = Trajectory(system)
+        self.record = Trajectory(system, task.keep)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.crossed_by_reset: dict[

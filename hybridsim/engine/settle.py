@@ -74,8 +74,8 @@ class Outcome:
 
     def copy(self) -> Outcome:
         """The same with arrays of its own."""
-        values: Iterable[Any] = vars(self).values()
-        return Outcome(*(v.copy() if isinstance(v, np.ndarray) else v for v in values))
+        values: list[Any] = [v.copy() if isinstance(v, np.ndarray) else v for v in vars(self).values()]
+        return Outcome(*values)
 
 
 class Settling:

@@ -33,6 +33,7 @@ class Counters:
     guard_evaluations: int = 0
     events: int = 0
     restarts: int = 0
+    kernel_time: float = 0.0  # seconds in the compiled mode loop
 
 
 @dataclass(frozen=True)

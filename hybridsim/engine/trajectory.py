@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from hybridsim.engine.blocks import OccurrenceList
 from hybridsim.engine.chain import Chain, SegmentChain
+from hybridsim.engine.keep import ALL, Keep
 from hybridsim.engine.pieces import Occurrence, Pieces, Segment, end_point
 from hybridsim.engine.stepping import Counters
 from hybridsim.engine.system import System
@@ -21,12 +24,14 @@ class Trajectory:
     """The record of a run.
 
     segments and occurrences are sequences of `Segment` and `Occurrence`: append objects to them, or add the blocks
-    (`hybridsim.engine.blocks`) that a compiled loop leaves behind.
+    (`hybridsim.engine.blocks`) that a compiled loop leaves behind. What is older than is to be kept is let go on the
+    way, so that a run of any length takes no more memory than what it keeps.
     """
 
-    def __init__(self, system: System) -> None:
-        self.segments = SegmentChain(system)
-        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList)
+    def __init__(self, system: System, keep: Keep = ALL) -> None:
+        # the last segment is needed in any case: it says where a run ends
+        self.segments = SegmentChain(system, 0.0 if keep.segments is None else keep.segments)
+        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events)
         self.counters = Counters()
         self.status, self.message = "finished", ""
         self.warnings: dict[str, int] = {}  # message -> how often
@@ -40,14 +45,39 @@ class Trajectory:
                 return
         self.segments.append(end_point(instant, z.copy(), p, x))
 
+    def close(self, keep: Keep) -> None:
+        """Let go of everything that is not to be kept, to the exact time."""
+        if keep == ALL or not self.segments:
+            return
+        last = self.segments[-1]
+        end, forward = last.end, last.s[-1] >= last.s[0]
+        if keep.segments is None:
+            self.segments.blocks = []
+            self.segments.append(end_point(end, last.z, last.p, last.x[-1]))
+        elif keep.segments < math.inf:
+            self.segments.cut(_before(end, keep.segments, forward))
+        if keep.events is None:
+            self.occurrences.blocks = []
+        elif keep.events < math.inf:
+            start = _before(end, keep.events, forward)
+            sign = 1.0 if forward else -1.0
+            self.occurrences.drop(
+                bisect_left(self.occurrences, 0.0, key=lambda o: sign * o.instant.minus(start))
+            )
+
     def warn(self, message: str) -> None:
         """Count a warning; each message is kept once."""
         self.warnings[message] = self.warnings.get(message, 0) + 1
 
 
+def _before(end: Instant, length: float, forward: bool) -> Instant:
+    """So long before the end, at a double."""
+    return Instant(float(end.plus(-length if forward else length)))
+
+
 @dataclass(frozen=True)
 class Task:
-    """What to run: from t0 to t1 out of x0 and z0, how accurately, with the method's own options."""
+    """What to run: from t0 to t1 out of x0 and z0, how accurately, and what to keep of it."""
 
     t0: float
     t1: float
@@ -55,6 +85,7 @@ class Task:
     z0: np.ndarray
     tolerances: Any
     discrete: np.ndarray
+    keep: Keep = ALL
     options: dict[str, Any] = field(default_factory=dict)
 
     @property

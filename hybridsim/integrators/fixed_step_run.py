@@ -52,7 +52,7 @@ class FixedStepRun:
         self, system: System, task: Task, settings: FixedStep, progress: Callable[[float], None] | None
     ) -> None:
         self.system, self.task, self.settings, self.progress = system, task, settings, progress
-        self.record = Trajectory(system)
+        self.record = Trajectory(system, task.keep)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete

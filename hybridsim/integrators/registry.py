@@ -16,6 +16,7 @@ ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
     "dop853:Dop853",
     "tsit5:Tsit5",
+    "rodas5p:Rodas5P",
     "exact:Exact",
     "taylor:Taylor",
     "scipy_solvers:ScipyDOP853",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, parse, substitute
@@ -69,6 +70,17 @@ class Contact(Declared):
         ------
         ModelError for an argument that the law does not have, or one that is missing.
         """
+        varies = bool(self.normal.names - set(constants))
+        if varies not in self._expanded:
+            self._expanded[varies] = self._component(varies)
+        return self._expanded[varies]
+
+    @cached_property
+    def _expanded(self) -> dict[bool, Component]:
+        """What `component` has found: copies of a model with other values have the same contacts."""
+        return {}
+
+    def _component(self, varies: bool) -> Component:
         force = parse(self.name, self.place)
         backward = self._form("-v", v=self.velocity)
         forward_slip = self.slip_force(self.velocity)
@@ -76,7 +88,7 @@ class Contact(Declared):
         at_rest = self.slip_force(parse(0))
         limit = self.limit_force()
         loaded: tuple[Guard, ...] = ()
-        if self.normal.names - set(constants):
+        if varies:
             message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
             loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
         upper = self._form("limit - f", limit=limit, f=force)

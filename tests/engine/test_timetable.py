@@ -25,7 +25,8 @@ def timetable(
 ) -> Timetable:
     parameters = tuple(Parameter(n, v) for n, v in values.items())
     model = Model("m", states=(), schedules=schedules, parameters=parameters)
-    system = SimpleNamespace(model=model, signals=tuple(Signal(i, values) for i in inputs))
+    signals = tuple(Signal(i, values) for i in inputs)
+    system = SimpleNamespace(model=model, values=model.parameter_values(), signals=signals)
     return Timetable(system, end)
 
 

@@ -1,0 +1,143 @@
+"""Steps of one-step methods with an error estimate: their control, the first one, and steps repeated up to an event."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.rk_step import SMALLEST, next_length
+from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
+from hybridsim.engine.trajectory import Pieces
+
+_MOST_PARTS = 64  # of a step that is repeated up to an event
+
+
+class Point:
+    """A state on the way; what else is known there is worked out when it is first asked for."""
+
+    def __init__(self, flow: Flow, s: float, x: np.ndarray) -> None:
+        self.flow, self.s, self.x = flow, s, x
+
+    @cached_property
+    def dx(self) -> np.ndarray:
+        """The slope."""
+        self.flow.counters.rhs_evaluations += 1
+        return self.flow.rhs(self.s, self.x)
+
+    @cached_property
+    def series(self) -> np.ndarray:
+        """Taylor coefficients of the flow to third order (n, 4)."""
+        flow, zero = self.flow, np.zeros(self.flow.n)
+        return flow.system.series(self.s, self.x, flow.p, flow.z, zero, 0.0).states
+
+
+@dataclass(frozen=True)
+class Trial:
+    """The end of a trial step, its error in units of the tolerance, and what the method keeps for its dense output."""
+
+    x: np.ndarray
+    error: float
+    kept: Any = None
+
+
+class OneStepStepper(ABC):
+    """Steps a one-step method through one segment.
+
+    Parameters
+    ----------
+    order : of the method.
+    error_order : power of the step with which the estimated error of a step falls.
+    """
+
+    def __init__(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        order: int,
+        error_order: int,
+    ) -> None:
+        self.flow, self.bound, self.tolerances = flow, bound, tolerances
+        self.order, self.error_order = order, error_order
+        self.control = (tolerances.rtol, tolerances.atol)
+        self._memory = np.zeros(3)  # of the step control
+        self.here = self._point(0.0, x0)
+        if not np.isfinite(self.here.dx).all():
+            names = [n for n, d in zip(flow.system.names, self.here.dx, strict=True) if not np.isfinite(d)]
+            raise StepFailure(f"the derivative of {', '.join(names)} is not a finite number")
+        self.h = first_step or self._first_step()
+
+    def _point(self, s: float, x: np.ndarray) -> Point:
+        return Point(self.flow, s, x)
+
+    @abstractmethod
+    def _attempt(self, start: Point, h: float) -> Trial:
+        """One step of length h, negative where time runs backward."""
+
+    @abstractmethod
+    def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
+        """Dense output of an accepted step."""
+
+    def step(self) -> Step:
+        """The next accepted step."""
+        direction, start = math.copysign(1.0, self.bound), self.here
+        while True:
+            h = min(self.h, self.tolerances.max_step)
+            # what would be left is too short for a step of its own
+            last = h >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
+            h = abs(self.bound - start.s) if last else h
+            if not h >= SMALLEST * math.ulp(start.s):
+                raise StepFailure(f"the step fell to {h:.3g} at local time {start.s!r}")
+            trial = self._attempt(start, direction * h)
+            self.h = next_length(h, trial.error, self.error_order, self._memory)
+            if trial.error <= 1.0:
+                break
+            self.flow.counters.rejected += 1
+        self.here = self._point(self.bound if last else start.s + direction * h, trial.x)
+        return Step(start.s, self.here.s, start.x, trial.x, self._dense(start, self.here, trial))
+
+    def restep(self, step: Step, s: float) -> Step:
+        """The step up to s in one step of exactly that length; in equal parts where its error asks for them."""
+        count = 1
+        while True:
+            knots = np.linspace(step.s0, s, count + 1)
+            points, trials = [self._point(step.s0, step.x0)], []
+            for a, b in pairwise(knots.tolist()):
+                trials.append(self._attempt(points[-1], b - a))
+                points.append(self._point(b, trials[-1].x))
+            if count == _MOST_PARTS or all(trial.error <= 1.0 for trial in trials):
+                break
+            self.flow.counters.rejected += 1
+            count *= 2
+        parts = tuple(
+            self._dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
+        )
+        return Step(step.s0, s, step.x0, points[-1].x, parts[0] if count == 1 else Pieces(knots, parts))
+
+    def _first_step(self) -> float:
+        """Starting step of Hairer, Norsett and Wanner 1993, section II.4."""
+        x, dx = self.here.x, self.here.dx
+        scale = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
+        scale = np.where(scale > 0.0, scale, 1.0)
+
+        def size(x: np.ndarray) -> float:
+            return float(np.sqrt(np.mean((x / scale) ** 2)))
+
+        d0, d1 = size(x), size(dx)
+        h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+        h0 = min(h0, abs(self.bound))
+        direction = math.copysign(1.0, self.bound)
+        ahead = Point(self.flow, direction * h0, x + direction * h0 * dx).dx
+        steepest = max(d1, size(ahead - dx) / h0)
+        h1 = (0.01 / steepest) ** (1.0 / self.order) if steepest > 1e-15 else max(1e-6, 1e-3 * h0)
+        # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
+        smallest = 1e-9 * abs(self.bound)
+        return max(min(100.0 * h0, h1, abs(self.bound)), smallest) if math.isfinite(h1) else smallest

@@ -1,0 +1,132 @@
+"""A model that is run again is not bound again, and no run sees anything of another."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import weakref
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine.recent import system_of
+
+SPAN = (0, 0.06)
+METHODS = ["taylor", "dop853", "scipy-rk45", "rk4-dichotomy"]
+
+
+def content(sol: hs.Solution) -> list[object]:
+    """Everything that a run found, to the last bit."""
+    events = [(e.t, e.guard, e.source, e.target, *e.x_minus, *e.x_plus) for e in sol.events]
+    return [sol.status, sol.t.tolist(), sol.y.tolist(), events, sol.modes]
+
+
+@pytest.fixture
+def model() -> hs.Model:
+    """Fresh, so that no other test has run it."""
+    return hs.load("dfcs")
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_the_second_run_is_the_first(model: hs.Model, integrator: str) -> None:
+    runs = [hs.simulate(model, SPAN, integrator=integrator) for _ in range(3)]
+    fresh = hs.simulate(hs.load("dfcs"), SPAN, integrator=integrator)
+    assert all(content(run) == content(fresh) for run in runs)
+    assert system_of(model) is system_of(model)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_what_is_done_to_a_result_stays_there(model: hs.Model, integrator: str) -> None:
+    """Arrays that a run gave away are written over; the next run does not notice."""
+    wanted = content(hs.simulate(model, SPAN, integrator=integrator))
+    spoilt = hs.simulate(model, SPAN, integrator=integrator)
+    for event in spoilt.events:
+        event.x_minus[:] = event.x_plus[:] = np.nan
+    spoilt.y[:] = np.nan
+    spoilt.t[:] = np.nan
+    assert content(hs.simulate(model, SPAN, integrator=integrator)) == wanted
+
+
+def test_other_starts_are_other_runs(model: hs.Model) -> None:
+    """x0, t0, discrete states and parameters in turn: each as if it were alone."""
+    options = [
+        {},
+        {"x0": {"v": 0.1}},
+        {"x0": {"v": -0.1}},
+        {"params": {"F0": 25.0}},
+        {"params": {"F0": 25.0}, "x0": {"v": 0.1}},
+        {"z0": {"f": "slip+"}, "x0": {"v": 0.2}},
+    ]
+    alone = [content(hs.simulate(hs.load("dfcs"), SPAN, **o)) for o in options]
+    assert len({repr(c) for c in alone}) == 6
+    for _ in range(2):
+        assert [content(hs.simulate(model, SPAN, **o)) for o in options] == alone
+    later = (0.01, 0.06)
+    assert content(hs.simulate(model, later)) == content(hs.simulate(hs.load("dfcs"), later))
+
+
+def test_discrete_states_of_the_start_are_told_apart() -> None:
+    gate = hs.Component(
+        "gate", [hs.Mode("shut", guards=[hs.Guard("g", "n - x", then="open")]), hs.Mode("open")], "shut"
+    )
+    model = hs.Model("gated", [hs.State("x", 0, "1")], discrete=[hs.Discrete("n", 0.5)], components=[gate])
+    for _ in range(2):
+        for n in (0.5, 0.25, 0.75):
+            sol = hs.simulate(model, (0, 1), x0={"n": n}, integrator="taylor")
+            assert [e.t for e in sol.events] == pytest.approx([n], rel=1e-12)
+
+
+def test_a_faulty_model_is_refused_every_time() -> None:
+    broken = hs.Model("broken", states=[hs.State("x", 0, "y")])
+    pushing = hs.Model(
+        "pushing",
+        states=[hs.State("x", 0, "v"), hs.State("v", 1, "f")],
+        contacts=[hs.Contact("f", velocity="v", normal="1", law="coulomb", arguments={"mu": 0.5})],
+    )
+    for _ in range(3):
+        with pytest.raises(hs.ModelError, match="y"):
+            hs.simulate(broken, (0, 1))
+        with pytest.raises(hs.ModelError, match="acts along"):
+            hs.simulate(pushing, (0, 1))
+
+
+def test_models_do_not_pile_up(model: hs.Model) -> None:
+    """A sweep over parameters leaves a bounded number of models behind."""
+    copies = [model.with_(F0=20.0 + k) for k in range(60)]
+    for copy in copies:
+        hs.simulate(copy, (0, 0.001), integrator="taylor")
+    left = [weakref.ref(copy) for copy in copies]
+    del copies, copy
+    gc.collect()
+    # the last sixteen, and one more that the tables of their common structure were made for
+    assert sum(ref() is not None for ref in left) <= 17
+
+
+def test_runs_side_by_side_in_threads(model: hs.Model) -> None:
+    """Scratch arrays are handed on from run to run, never shared by two at once."""
+    starts = [{"v": 0.01 * k} for k in range(8)]
+    wanted = [content(hs.simulate(model, SPAN, x0=s, integrator="taylor")) for s in starts]
+    found: list[list[object]] = [[] for _ in starts]
+
+    def work(k: int) -> None:
+        for _ in range(10):
+            found[k] = content(hs.simulate(model, SPAN, x0=starts[k], integrator="taylor"))
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == wanted
+
+
+def test_a_run_inside_the_progress_of_another(model: hs.Model) -> None:
+    wanted = content(hs.simulate(model, SPAN, integrator="taylor"))
+    inner: list[list[object]] = []
+
+    def progress(_: float) -> None:
+        inner.append(content(hs.simulate(model, SPAN, integrator="taylor")))
+
+    assert content(hs.simulate(model, SPAN, integrator="taylor", progress=progress)) == wanted
+    assert inner and all(found == wanted for found in inner)

@@ -1,0 +1,182 @@
+"""What `save` keeps of a run: never other numbers than the whole run has, and never more than was asked for."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim import UsageError
+
+DFCS = hs.load("dfcs")
+PERIOD = 2 * math.pi / DFCS.parameter_values()["omega"]
+SPAN = (0, 5.3 * PERIOD)
+METHODS = ["taylor", "dop853", "scipy-rk45", "cvode-adams", "rk4-dichotomy", "rk4-sign"]
+
+
+def rows(events: tuple[hs.Event, ...]) -> list[tuple]:
+    return [(e.t, e.kind, e.component, e.guard, e.source, e.target, *e.x_minus, *e.x_plus) for e in events]
+
+
+@pytest.fixture(scope="module", params=METHODS)
+def whole(request: pytest.FixtureRequest) -> hs.Solution:
+    return hs.simulate(DFCS, SPAN, integrator=request.param)
+
+
+def again(whole: hs.Solution, **options) -> hs.Solution:
+    return hs.simulate(DFCS, SPAN, integrator=whole.integrator, **options)
+
+
+def test_events_alone(whole: hs.Solution) -> None:
+    """All events and modes, the state at the end, no states between."""
+    sol = again(whole, save="events")
+    assert rows(sol.events) == rows(whole.events)
+    assert sol.modes == whole.modes
+    assert (sol.t_start, sol.t_end) == SPAN
+    assert sol.t.tolist() == [whole.t_end]
+    assert (sol.y[:, 0] == whole.y[:, -1]).all()
+    with pytest.raises(UsageError, match="save='events'"):
+        sol(sol.t_end)
+    with pytest.raises(UsageError, match="save='events'"):
+        sol.output("f", 0.01)
+
+
+@pytest.mark.parametrize("save", ["last-period", 0.7 * PERIOD])
+def test_the_last_stretch(whole: hs.Solution, save: str | float) -> None:
+    """It begins at its exact time, inside a step, and holds what the whole run holds there."""
+    sol = again(whole, save=save)
+    length = PERIOD if save == "last-period" else save
+    assert sol.t_start == sol.t[0] == pytest.approx(SPAN[1] - length, rel=1e-15)
+    assert sol.t_end == sol.t[-1] == SPAN[1]
+    assert rows(sol.events) == [row for row in rows(whole.events) if row[0] >= sol.t_start]
+    assert 0 < len(sol.events) < len(whole.events)
+    grid = np.linspace(sol.t_start, sol.t_end, 301)
+    assert (sol(grid) == whole(grid)).all()
+    assert (sol.t[1:] == whole.t[-len(sol.t) + 1 :]).all()
+    assert (sol.y[:, 1:] == whole.y[:, -len(sol.t) + 1 :]).all()
+    assert (sol.output("f", grid) == whole.output("f", grid)).all()
+    for name, intervals in sol.modes.items():
+        assert intervals[0].t0 == sol.t_start
+        assert [i.mode for i in intervals] == [i.mode for i in whole.modes[name][-len(intervals) :]]
+    with pytest.raises(UsageError, match="outside of what save="):
+        sol(0.5 * sol.t_start)
+
+
+def test_nothing_but_the_end(whole: hs.Solution) -> None:
+    sol = again(whole, save="nothing")
+    assert sol.t.tolist() == [whole.t_end]
+    assert (sol.y[:, 0] == whole.y[:, -1]).all()
+    counts = ("steps", "rejected", "rhs_evaluations", "guard_evaluations", "events", "restarts")
+    assert [sol.stats[name] for name in counts] == [whole.stats[name] for name in counts]
+    assert (sol.status, sol.message) == (whole.status, whole.message)
+    for ask in (lambda: sol.events, lambda: sol.modes, lambda: sol.event_times("f"), lambda: sol(0.0)):
+        with pytest.raises(UsageError, match="save='nothing'"):
+            ask()
+    assert "not kept" in repr(sol)
+    assert "finished" in sol._repr_html_()
+
+
+def test_a_stretch_longer_than_the_run_is_the_run(whole: hs.Solution) -> None:
+    sol = again(whole, save=10 * SPAN[1])
+    assert (sol.t == whole.t).all() and (sol.y == whole.y).all()
+    assert rows(sol.events) == rows(whole.events)
+
+
+def test_a_grid_in_the_last_stretch() -> None:
+    grid = np.linspace(4.5 * PERIOD, SPAN[1], 11)
+    sol = hs.simulate(DFCS, SPAN, save="last-period", t_eval=grid)
+    assert sol.t.tolist() == grid.tolist()
+    assert (sol.y == hs.simulate(DFCS, SPAN, t_eval=grid).y).all()
+
+
+def test_backward_in_time_the_last_stretch_is_the_earliest() -> None:
+    model = hs.Model("turn", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x")])
+    whole, sol = (hs.simulate(model, (10, 0), rtol=1e-10, save=save) for save in ("all", 2.0))
+    assert (sol.t_start, sol.t_end) == (2.0, 0.0)
+    grid = np.linspace(2, 0, 41)
+    assert (sol(grid) == whole(grid)).all()
+    assert sol(grid)[0] == pytest.approx(np.cos(grid - 10), abs=1e-8)
+
+
+def test_a_run_that_stops_early_keeps_the_last_stretch_before() -> None:
+    ball = hs.load("bouncing-ball")
+    end = hs.Monitor("slow", "w - 0.5", direction="down", action="terminate")
+    model = hs.Model(
+        "ended", ball.states, parameters=ball.parameters, components=ball.components, monitors=[end]
+    )
+    whole, sol = (hs.simulate(model, (0, 3), save=save) for save in ("all", 0.2))
+    assert sol.status == whole.status == "terminated"
+    assert sol.t_end == whole.t_end < 3
+    assert sol.t_start == pytest.approx(whole.t_end - 0.2, rel=1e-14)
+    assert sol.events[-1].component == "slow"
+
+
+def test_modes_out_of_events_with_transitions_at_both_ends() -> None:
+    """A schedule changes a mode at t0, and another at the very end."""
+    ticks = [hs.Schedule("tick", start=0, period=1, reset={"n": "n + 1"})]
+    gate = hs.Component(
+        "gate",
+        modes=[
+            hs.Mode("shut", guards=[hs.Guard("g", "0.5 - n", then="open")]),
+            hs.Mode("open", guards=[hs.Guard("g", "2.5 - n", then="done")]),
+            hs.Mode("done"),
+        ],
+        initial="shut",
+    )
+    model = hs.Model(
+        "gated",
+        states=[hs.State("x", 0, "1")],
+        discrete=[hs.Discrete("n", 0)],
+        components=[gate],
+        schedules=ticks,
+    )
+    whole, sol = (hs.simulate(model, (0, 2), save=save) for save in ("all", "events"))
+    assert sol.modes == whole.modes
+    assert [i.mode for i in sol.modes["gate"]] == ["open", "done"]
+
+
+@pytest.mark.parametrize(
+    ("save", "said"),
+    [
+        ("some", "save is 'some'"),
+        (-1.0, "save is -1.0"),
+        (0, "save is 0"),
+        (math.nan, "save is nan"),
+        (None, "save is None"),
+        (True, "save is True"),
+    ],
+)
+def test_what_save_cannot_be(save: object, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        hs.simulate(DFCS, (0, 0.01), save=save)
+
+
+def test_what_does_not_go_together() -> None:
+    with pytest.raises(UsageError, match="no period"):
+        hs.simulate("bouncing-ball", (0, 1), save="last-period")
+    with pytest.raises(UsageError, match="t_eval is given"):
+        hs.simulate(DFCS, (0, 0.01), save="events", t_eval=[0.0])
+    with pytest.raises(UsageError, match="t_eval begins before"):
+        hs.simulate(DFCS, (0, 1), save=0.5, t_eval=[0.1, 0.9])
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "rk4-dichotomy"])
+@pytest.mark.parametrize("save", ["last-period", "nothing"])
+def test_memory_does_not_grow_with_the_run(integrator: str, save: str) -> None:
+    """Eight times as many periods take as much memory, where the whole run would take eight times as much."""
+    periods = {"taylor": 600, "dop853": 600, "rk4-dichotomy": 25}[integrator]
+
+    def peak(count: int, keep: str) -> int:
+        tracemalloc.start()
+        sol = hs.simulate(DFCS, (0, count * PERIOD), integrator=integrator, save=keep)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert sol.success and sol.stats["events"] >= 3 * count
+        return found
+
+    peak(periods, save)  # what the first run of all leaves in caches
+    assert peak(8 * periods, save) < 1.5 * peak(periods, save)
+    assert peak(8 * periods, "all") > 2 * peak(8 * periods, save)
