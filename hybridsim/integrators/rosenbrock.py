@@ -54,10 +54,11 @@ class RosenbrockStepper(OneStepStepper):
         self.tableau, system, n = tableau, flow.system, flow.n
         self._address = system.address("flow")
         lean = system.lean_tape(flow.z)
-        constants, values, parameters, sources, _, time, states = system.registers.inputs
-        self._rows, self._places = lean.rows, (time, states, lean.derivatives)
+        inputs = system.registers.inputs
+        self._rows, self._places = lean.rows, (int(inputs.time[0]), inputs.states, lean.derivatives)
         self._V = np.zeros((system.registers.count, 2))
-        self._V[constants, 0], self._V[parameters, 0] = values[:, 0], flow.p[sources]
+        self._V[inputs.constants, 0] = inputs.values[:, 0]
+        self._V[inputs.parameters, 0] = flow.p[inputs.sources]
         advance(lean.constant_rows, self._V, 0)
         self._room = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)

@@ -237,7 +237,9 @@ def test_stick_with_v_zeroed_is_exact_over_a_thousand_periods(name: str, release
 
 def test_stick_on_a_belt_is_the_speed_of_the_belt() -> None:
     """Bit for bit, at every stick of the limit cycle."""
-    for integrator in EXACT:
+    for integrator in (
+        one.name for one in hs.list_integrators() if not {"exact-stick", "nonlinear"} & set(one.lacks)
+    ):
         sol = hs.simulate("belt", (0.0, 60.0), integrator=integrator, rtol=1e-7)
         speed = sol.model.parameter_values()["v_belt"]
         sticks = [m for m in sol.modes["f"] if m.mode == "stick"]

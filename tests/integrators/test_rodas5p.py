@@ -101,14 +101,22 @@ def test_the_linearisation_is_exact() -> None:
     p = system.vector(Instant(1.25), np.zeros(0))
     t = 1.25 + s
     lean = system.lean_tape(z)
-    constants, values, parameters, sources, _, time, registers = system.registers.inputs
+    inputs = system.registers.inputs
     V = np.zeros((system.registers.count, 2))
-    V[constants, 0], V[parameters, 0] = values[:, 0], p[sources]
+    V[inputs.constants, 0], V[inputs.parameters, 0] = inputs.values[:, 0], p[inputs.sources]
     from hybridsim.engine.taylor import advance
 
     advance(lean.constant_rows, V, 0)
     jacobian, rate = np.empty((3, 3)), np.empty(3)
-    linearise(lean.rows, (time, registers, lean.derivatives), s, np.array([x, v, w]), V, jacobian, rate)
+    linearise(
+        lean.rows,
+        (int(inputs.time[0]), inputs.states, lean.derivatives),
+        s,
+        np.array([x, v, w]),
+        V,
+        jacobian,
+        rate,
+    )
     bell = 1 / math.cosh(w * x) ** 2 / (1 + v * v)
     expected = [
         [0, 1, 0],
