@@ -106,12 +106,12 @@ def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
 
 
 def integrator_name(integrator: Any) -> str:
-    """The name of an integrator, "auto" resolved."""
+    """The name of an integrator, or "auto"."""
     if not isinstance(integrator, str):
         raise UsageError(
             f"integrator is {integrator!r}", remedy="give a name; hs.list_integrators() has them all"
         )
-    return "dop853" if integrator == "auto" else integrator
+    return integrator
 
 
 def refuse_unused(method: Integrator, **given: Any) -> None:

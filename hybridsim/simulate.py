@@ -46,7 +46,9 @@ def simulate(
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.
     z0 : initial modes by component; where a surface decides, the engine finds the mode from x0.
-    integrator : a name from `list_integrators`; "auto" takes the default work-horse, ``dop853``.
+    integrator : a name from `list_integrators`; "auto" takes ``exact`` where all modes are linear in the
+        states, ``rodas5p`` where they are stiff at the start, else ``taylor`` below rtol = 1e-10 and ``dop853``;
+        ``sol.message`` says which and why.
     rtol, atol : error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its default
         is rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1. An integrator with a
         fixed step refuses both.
@@ -79,15 +81,21 @@ def simulate(
     span = arguments.time_span(t_span)
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.recent import system_of
+    from hybridsim.integrators.automatic import choose
     from hybridsim.integrators.registry import make_integrator
 
     announce_compilation()
-    method = make_integrator(arguments.integrator_name(integrator), options)
-    arguments.refuse_unused(method, rtol=rtol, atol=atol)
+    name = arguments.integrator_name(integrator)
     began = time.perf_counter()
-    system = system_of(model)
-    for name in system.hot_functions():
-        system.address(name)
+    system, reason = system_of(model), ""
+    modes = arguments.initial_modes(system, z0)
+    if name == "auto":
+        start, relative = system.start_state(x0_states), arguments.relative_tolerance(rtol)
+        name, reason = choose(system, start, modes, span, relative)
+    method = make_integrator(name, options)
+    arguments.refuse_unused(method, rtol=rtol, atol=atol)
+    for function in system.hot_functions():
+        system.address(function)
     method.prepare(system)
     compile_time = time.perf_counter() - began
     _refuse_lacking(method, model, system, span)
@@ -97,7 +105,8 @@ def simulate(
         method,
         span,
         x0_states,
-        arguments.initial_modes(system, z0),
+        modes,
+        reason,
         arguments.callback(progress),
         compile_time,
         t_eval,
@@ -116,6 +125,7 @@ def _run(
     span: tuple[float, float],
     x0: Mapping[str, float],
     z0: np.ndarray,
+    reason: str,
     progress: Callable[[float], None] | None,
     compile_time: float,
     t_eval: Sequence[float] | None,
@@ -147,7 +157,7 @@ def _run(
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
     trajectory.close(keep)
-    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span, save)
+    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span, save, reason)
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

@@ -88,6 +88,7 @@ class Solution:
         grid: np.ndarray | None,
         t_span: tuple[float, float],
         save: str | float = "all",
+        reason: str = "",
     ) -> None:
         self.model = model
         self.integrator = integrator
@@ -96,6 +97,7 @@ class Solution:
         self._grid = grid
         self._span, self._save = t_span, save
         self._cost = (wall_time, compile_time)
+        self._reason = reason  # why "auto" took this integrator
 
     # -- trajectory -----------------------------------------------------------------------------------------
 
@@ -327,7 +329,8 @@ class Solution:
     @property
     def message(self) -> str:
         """One sentence about how the run ended."""
-        return self._trajectory.message or f"reached t = {self.t_end!r} with {self.integrator}"
+        why = f", chosen because {self._reason}" if self._reason else ""
+        return self._trajectory.message or f"reached t = {self.t_end!r} with {self.integrator}{why}"
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.engine.stepping import StepFailure
 from hybridsim.engine.tape import (
     ABS,
     ADD,
@@ -43,7 +44,7 @@ _SINGLE = (NEG, ABS, SIGN, NOT, EXP, SQRT, SINCOS, SINHCOSH, TANGENT)
 _HIGHEST = 8  # degree of a monomial; beyond it the closure under derivatives would be large
 
 
-class NotLinear(Exception):
+class NotLinear(StepFailure):
     """A rate or a guard that is no linear form; the message says which kind of operation is in the way."""
 
 

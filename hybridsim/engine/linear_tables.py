@@ -239,13 +239,22 @@ def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> tuple[LinearT
     return found
 
 
-def refuse_nonlinear(system: System) -> None:
-    """Refuse a model of which some mode is not linear; other combinations of modes are met when they are entered."""
+def what_is_not_linear(system: System) -> str | None:
+    """What keeps a model from being linear in each of its modes, in words; None where nothing does.
+
+    Each mode of each component is looked at; other combinations of modes are when they are entered.
+    """
+    known: dict[bytes, str | None] = system.code.shared("what is not linear", dict)
     p = system.vector(Instant(0.0), np.zeros(system.layout.discrete))
-    passed: set[bytes] = system.code.shared("known to be linear", set)
     key = p[: system.layout.parameters].tobytes()
-    if key in passed:
-        return
+    if key not in known:
+        if len(known) >= _KEPT:
+            known.clear()
+        known[key] = _first_reason(system, p)
+    return known[key]
+
+
+def _first_reason(system: System, p: np.ndarray) -> str | None:
     vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
     for c, automaton in enumerate(system.automata):
         for m, mode in enumerate(automaton.modes):
@@ -255,10 +264,16 @@ def refuse_nonlinear(system: System) -> None:
         try:
             LinearMode(system, Atoms(), z, p)
         except NotLinear as reason:
-            raise UsageError(
-                f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
-                f"and {place}{reason}",
-                remedy="choose taylor or dop853",
-            ) from None
-    if len(passed) < _KEPT:
-        passed.add(key)
+            return f"{place}{reason}"
+    return None
+
+
+def refuse_nonlinear(system: System) -> None:
+    """Refuse a model of which some mode is not linear."""
+    reason = what_is_not_linear(system)
+    if reason is not None:
+        raise UsageError(
+            f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
+            f"and {reason}",
+            remedy="choose taylor or dop853",
+        )

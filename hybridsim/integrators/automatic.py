@@ -1,0 +1,61 @@
+"""Which integrator "auto" takes, and why."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.linear_tables import what_is_not_linear
+from hybridsim.engine.rosenbrock_step import linearise
+from hybridsim.engine.system import System
+from hybridsim.engine.taylor import advance
+from hybridsim.engine.timepair import Instant
+
+_SMALL = 24  # states and guards up to which tables of closed forms are small
+_TIGHT = 1e-10  # rtol below which series of high order cost least
+_STABLE = 3.0  # |h lambda| at which explicit methods of high order are about to lose stability
+_MANY = 1e6  # steps held down by stability alone: a minute where a stiff method takes less than a second
+
+
+class Choice(NamedTuple):
+    """An integrator by name, and the reason in words."""
+
+    name: str
+    reason: str
+
+
+def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
+    """The closed form where it applies; a stiff method where stability would rule an explicit one; else one of these.
+
+    Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian.
+    """
+    if system.n + system.guard_count <= _SMALL and what_is_not_linear(system) is None:
+        return Choice("exact", "its modes are linear in the states")
+    steps = abs(span[1] - span[0]) * _fastest_decay(system, x0, np.maximum(z0, 0), span[0]) / _STABLE
+    if steps > _MANY:
+        return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
+    if system.has_corners:
+        return Choice("dop853", "its modes are not stiff at the start, and have corners")
+    if rtol < _TIGHT:
+        return Choice("taylor", "its modes are smooth and the tolerance is tight")
+    return Choice("dop853", "its modes are smooth and not stiff at the start")
+
+
+def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> float:
+    """The largest rate -Re(lambda) at which anything decays at the start."""
+    n = system.n
+    if not n:
+        return 0.0
+    inputs, lean = system.registers.inputs, system.lean_tape(z)
+    p = system.vector(Instant(t0), system.discrete_start)
+    V = np.zeros((system.registers.count, 2))
+    V[inputs.constants, 0] = inputs.values[:, 0]
+    V[inputs.parameters, 0] = p[inputs.sources]
+    advance(lean.constant_rows, V, 0)
+    jacobian, rate = np.empty((n, n)), np.empty(n)
+    places = (int(inputs.time[0]), inputs.states, lean.derivatives)
+    linearise(lean.rows, places, 0.0, x, V, jacobian, rate)
+    if not np.isfinite(jacobian).all():
+        return 0.0
+    return max(0.0, float(-np.linalg.eigvals(jacobian).real.min()))
