@@ -22,6 +22,7 @@ import hybridsim as hs
 from conformance import judge
 from conformance.catalogue import SCENES
 from conformance.scene import Scene
+from hybridsim.engine.recent import system_of
 from hybridsim.errors import HybridsimError
 
 # Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
@@ -161,7 +162,7 @@ def outcome(name: str, scene: Scene, **options: Any) -> Outcome:
 @cache
 def _compile(name: str) -> None:
     """Have an integrator compiled: that may take as long as a machine needs, and must not be interrupted."""
-    hs.simulate("free-decay", (0.0, 1e-3), integrator=name)
+    integrator(name)().prepare(system_of(hs.load("free-decay")))
 
 
 @contextmanager
