@@ -30,6 +30,7 @@ class ExactLeaper:
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
+        self.horizon = 0.0  # the farthest that a segment might have gone so far
         self.shelf, self.automata, self.functions = (
             shelf_of(system),
             automata_of(system),
@@ -60,7 +61,8 @@ class ExactLeaper:
             outcome.guard_floors.copy(),
         )
         tapes = self.shelf.tapes
-        tables, spare = tables_of(self.system, tapes.modes, p)
+        self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
+        tables, spare = tables_of(self.system, tapes.modes, p, self.horizon)
         try:
             work, room = spare.pop()
         except IndexError:

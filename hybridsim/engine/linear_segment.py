@@ -31,11 +31,11 @@ def _states(lin: Any, c: Any, s: Any, v: Any, out: Any) -> None:
 
 
 class LinearSegment:
-    """States x(s) of a segment that begins with x0 at local time 0."""
+    """States x(s) of a segment that begins with x0 at local time 0 and ends at `bound` at the latest."""
 
-    def __init__(self, system: System, x0: np.ndarray, p: np.ndarray, z: np.ndarray) -> None:
+    def __init__(self, system: System, x0: np.ndarray, p: np.ndarray, z: np.ndarray, bound: float) -> None:
         self.n = system.n
-        self.tables, _ = tables_of(system, z[None, :], p)
+        self.tables, _ = tables_of(system, z[None, :], p, abs(bound))
         monomials, atoms = len(self.tables.factor_start) - 1, len(self.tables.kinds)
         self.c = np.zeros(self.tables.values.shape[1], dtype=complex)
         _coordinates(self.tables, x0, p, np.zeros((2 * atoms, 2)), np.zeros((2, monomials)), self.c)

@@ -104,8 +104,8 @@ def no_tables() -> LinearTables:
     return tables
 
 
-def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray) -> LinearTables:
-    """Tables of the vectors of modes met so far, at the parameters in p."""
+def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon: float) -> LinearTables:
+    """Tables of the vectors of modes met so far, at the parameters in p, for segments of about that length."""
     atoms = Atoms()
     modes = [LinearMode(system, atoms, z, p) for z in met]
     monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
@@ -122,7 +122,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray) -> Linea
             for key, weight in form.items():
                 A[i, place[key]] = weight
         matrices.append(A)
-    flows = [modal(A) for A in matrices]
+    flows = [modal(A, horizon) for A in matrices]
     widest = max((len(f.values) for f in flows), default=0)
     count, guards = len(met), system.guard_count
     series, roundings = (np.zeros((count, guards, size, ORDER + 1)) for _ in range(2))
@@ -224,18 +224,22 @@ def _stack(parts: list[np.ndarray], shape: tuple[int, ...], kind: Any) -> np.nda
     return out
 
 
-def tables_of(system: System, modes: np.ndarray, p: np.ndarray) -> tuple[LinearTables, deque[Any]]:
+def tables_of(
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float
+) -> tuple[LinearTables, deque[Any]]:
     """Tables of these vectors of modes (K, components), and scratch arrays for them to be handed on.
 
-    Both are made once for each set of parameter values.
+    Both are made once for each set of parameter values and each order of magnitude of the horizon: how long a segment
+    may be at most.
     """
+    horizon = 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
     kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
-    key = p[: system.layout.parameters].tobytes() + modes.tobytes()
+    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
     found = kept.get(key)
     if found is None:
         if len(kept) >= _KEPT:
             kept.pop(next(iter(kept)), None)
-        found = kept[key] = (linear_tables(system, list(modes), p), deque())
+        found = kept[key] = (linear_tables(system, list(modes), p, horizon), deque())
     return found
 
 

@@ -21,7 +21,7 @@ class ExactStepper:
     """Cuts the closed form of one segment into steps over which a guard is easily followed."""
 
     def __init__(self, flow: Flow, x0: np.ndarray, bound: float, max_step: float) -> None:
-        self.segment = LinearSegment(flow.system, x0, flow.p, flow.z)
+        self.segment = LinearSegment(flow.system, x0, flow.p, flow.z, bound)
         self.s, self.x, self.bound, self.max_step = 0.0, x0, bound, max_step
 
     def step(self) -> Step:
