@@ -54,7 +54,7 @@ class ModeLoop:
     def _leaper(self) -> Leaps | None:
         """The compiled loop, where method and model allow it."""
         model = self.system.model
-        if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors:
+        if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors or model.inputs:
             return None
         return self.method.leaper(self.system, self.task.tolerances, self.renewal)
 

@@ -14,7 +14,7 @@ from hybridsim.engine.linear_segment import LinearSegment
 from hybridsim.engine.linear_tables import refuse_nonlinear
 from hybridsim.engine.stepping import Flow, Step, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.base import NEEDS_TAPE, Integrator
 
 
 class ExactStepper:
@@ -57,7 +57,10 @@ class Exact(Integrator):
     order: ClassVar[str] = "exact"
     reference: ClassVar[str] = "Moler and Van Loan 2003, doi:10.1137/S00361445024180 (methods 14 to 18)"
     when: ClassVar[str] = "piecewise linear models: fastest and most accurate"
-    lacks: ClassVar[dict[str, str]] = {"nonlinear": "a closed form takes modes that are linear in the states"}
+    lacks: ClassVar[dict[str, str]] = {
+        "nonlinear": "a closed form takes modes that are linear in the states",
+        "functions": NEEDS_TAPE,
+    }
     dense_is_accurate: ClassVar[bool] = True
     leaps: ClassVar[bool] = True
 
@@ -66,9 +69,9 @@ class Exact(Integrator):
         refuse_nonlinear(system)
         compile_leaps(system, ExactLeaper)
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> ExactLeaper:
-        """The compiled mode loop."""
-        return ExactLeaper(system, tolerances, longest)
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> ExactLeaper | None:
+        """The compiled mode loop, which knows no steps: where these are bounded there is none."""
+        return ExactLeaper(system, tolerances, longest) if math.isinf(tolerances.max_step) else None
 
     def start(
         self,

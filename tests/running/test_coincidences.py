@@ -8,7 +8,7 @@ import pytest
 import hybridsim as hs
 from hybridsim import ModelError
 
-LOCATING = ("dop853", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf")
+LOCATING = ("dop853", "exact", "taylor", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf")
 
 
 def model(text: str) -> hs.Model:

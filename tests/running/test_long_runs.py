@@ -43,7 +43,7 @@ def orbit():
     return state
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "scipy-dop853", "cvode-adams"])
+@pytest.mark.parametrize("integrator", ["dop853", "exact", "scipy-dop853", "cvode-adams"])
 def test_an_orbit_of_slip_and_slip(orbit, integrator: str) -> None:
     omega = NO_STOP.parameter_values()["omega"]
     period = 2 * math.pi / omega

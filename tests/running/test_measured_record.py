@@ -76,7 +76,7 @@ def test_the_spectrum_has_the_ground_and_no_drift(script: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-@pytest.mark.parametrize("integrator", ["dop853", "scipy-dop853", "cvode-adams"])
+@pytest.mark.parametrize("integrator", ["dop853", "exact", "taylor", "scipy-dop853", "cvode-adams"])
 def test_every_knot_is_a_boundary(integrator: str, interpolation: str) -> None:
     """Stepped to, not over: each knot stands twice in the times, to the last bit."""
     end = 2.5  # six events

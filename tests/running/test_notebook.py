@@ -92,7 +92,7 @@ def test_the_events_are_listed(rubbing: hs.Solution) -> None:
 
 def test_how_it_went(rubbing: hs.Solution) -> None:
     page = Page(rubbing._repr_html_())
-    for word in ("✔", "finished", rubbing.model.title, "dop853", f"{rubbing.stats['steps']} steps"):
+    for word in ("✔", "finished", rubbing.model.title, "by exact", f"{rubbing.stats['steps']} steps"):
         assert word in page.text()
     failed = hs.simulate(hs.Model("broken", states=(hs.State("x", 1, "x**2"),)), (0, 2))
     page = Page(failed._repr_html_())

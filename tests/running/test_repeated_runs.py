@@ -13,7 +13,7 @@ import hybridsim as hs
 from hybridsim.engine.recent import system_of
 
 SPAN = (0, 0.06)
-METHODS = ["taylor", "dop853", "scipy-rk45", "rk4-dichotomy"]
+METHODS = ["exact", "taylor", "dop853", "scipy-rk45", "rk4-dichotomy"]
 
 
 def content(sol: hs.Solution) -> list[object]:

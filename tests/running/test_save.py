@@ -14,7 +14,7 @@ from hybridsim import UsageError
 DFCS = hs.load("dfcs")
 PERIOD = 2 * math.pi / DFCS.parameter_values()["omega"]
 SPAN = (0, 5.3 * PERIOD)
-METHODS = ["taylor", "dop853", "scipy-rk45", "cvode-adams", "rk4-dichotomy", "rk4-sign"]
+METHODS = ["exact", "taylor", "dop853", "scipy-rk45", "cvode-adams", "rk4-dichotomy", "rk4-sign"]
 
 
 def rows(events: tuple[hs.Event, ...]) -> list[tuple]:
