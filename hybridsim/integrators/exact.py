@@ -10,32 +10,13 @@ import numpy as np
 
 from hybridsim.engine.exact_leaper import ExactLeaper
 from hybridsim.engine.leaper import compile_leaps
-from hybridsim.engine.linear_segment import LinearSegment
 from hybridsim.engine.linear_tables import refuse_nonlinear
-from hybridsim.engine.stepping import Flow, Step, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
+from hybridsim.integrators.taylor import TaylorStepper
 
-
-class ExactStepper:
-    """Cuts the closed form of one segment into steps over which a guard is easily followed."""
-
-    def __init__(self, flow: Flow, x0: np.ndarray, bound: float, max_step: float) -> None:
-        self.segment = LinearSegment(flow.system, x0, flow.p, flow.z, bound)
-        self.s, self.x, self.bound, self.max_step = 0.0, x0, bound, max_step
-
-    def step(self) -> Step:
-        """As far as the fastest part that is still alive allows."""
-        left = abs(self.bound - self.s)
-        h = min(self.segment.reach(self.s), self.max_step)
-        s0, x0 = self.s, self.x
-        self.s = self.bound if h >= left else s0 + math.copysign(h, self.bound)
-        self.x = self.segment(np.array([self.s]))[0]
-        return Step(s0, self.s, x0, self.x, self.segment)
-
-    def restep(self, step: Step, s: float) -> Step:
-        """Not needed: the closed form is exact everywhere."""
-        raise NotImplementedError("the dense output of a closed form is the closed form")
+_TIGHTEST = 1e-14  # what a series in doubles is asked for
 
 
 @dataclass(frozen=True)
@@ -47,7 +28,8 @@ class Exact(Integrator):
     not is refused with what is in the way. B is block diagonal (see `hybridsim.engine.modal`), so that defective,
     oscillatory and stiff modes are taken alike. Each guard is followed by lower bounds made of its Taylor polynomial
     and the largest remainder, so that no zero is jumped over, and its zeros are good to rounding. There is no step and
-    no truncation: rtol and atol do not enter.
+    no truncation: rtol and atol do not enter. A segment that holds something unusual (a monitor, an input, a question
+    of rounding, time running backward) is taken by its Taylor series to rounding, which converges everywhere.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """
@@ -82,5 +64,6 @@ class Exact(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
-        return ExactStepper(flow, x0, s_bound, tolerances.max_step)
+        """Begin a smooth segment that holds something unusual."""
+        tight = Tolerances(_TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
+        return TaylorStepper(flow, x0, s_bound, tight, first_step)
