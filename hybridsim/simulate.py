@@ -15,6 +15,7 @@ from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
+    from hybridsim.engine.python_code import PythonCode
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
     from hybridsim.solution import Solution
@@ -80,6 +81,7 @@ def simulate(
     x0_states, model = arguments.start_values(model, x0)
     span = arguments.time_span(t_span)
     from hybridsim.engine.jit import announce_compilation
+    from hybridsim.engine.python_code import PythonCode
     from hybridsim.engine.recent import system_of
     from hybridsim.integrators.automatic import choose
     from hybridsim.integrators.registry import make_integrator
@@ -94,6 +96,8 @@ def simulate(
         name, reason = choose(system, start, modes, span, relative)
     method = make_integrator(name, options)
     arguments.refuse_unused(method, rtol=rtol, atol=atol)
+    if isinstance(system.code, PythonCode):
+        _check_functions(method, system, system.code, system.start_state(x0_states), span[0])
     for function in system.hot_functions():
         system.address(function)
     method.prepare(system)
@@ -136,6 +140,7 @@ def _run(
     first_step: float | None,
 ) -> Solution:
     from hybridsim.engine.driving import refuse_driving
+    from hybridsim.engine.python_code import PythonCode
     from hybridsim.engine.stepping import Tolerances
     from hybridsim.engine.trajectory import Task
     from hybridsim.solution import Solution
@@ -156,8 +161,22 @@ def _run(
     began = time.perf_counter()
     trajectory = method.run(system, task, progress)
     wall_time = time.perf_counter() - began
+    if isinstance(system.code, PythonCode):
+        system.code.report(trajectory)
     trajectory.close(keep)
     return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span, save, reason)
+
+
+def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
+    """Refuse what cannot run a model of Python functions, and functions that return something else than they should."""
+    from hybridsim.engine.timepair import Instant
+
+    reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or choose dop853"
+    if code.refused and not method.name.startswith("scipy-"):
+        reason, remedy = code.refused_in_words, "choose scipy-dop853, which calls them from Python"
+    if reason:
+        raise UsageError(f"{method.name} cannot run {system.model.name}: {reason}", remedy=remedy)
+    code.check(x0, system.vector(Instant(t0), system.discrete_start))
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

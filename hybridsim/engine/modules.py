@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.engine.cache import model_folder
 
 if TYPE_CHECKING:
+    from hybridsim.engine.python_code import PythonCode
     from hybridsim.model.model import Model
 
 
@@ -57,14 +58,30 @@ class Compiled:
 
 
 _loaded: dict[str, Compiled] = {}
+_MOST = 16  # models of Python functions that are kept; their functions cannot be found again on disk
+_of_functions: dict[tuple[Any, ...], PythonCode] = {}
 
 
-def compiled(model: Model) -> Compiled:
+def compiled(model: Model) -> Compiled | PythonCode:
     """The compiled form of a model, from memory, from disk, or lowered now."""
+    if model.flow is not None:
+        return _code_of_functions(model)
     name = _name(model)
     if name not in _loaded:
         _loaded[name] = _load(model, name)
     return _loaded[name]
+
+
+def _code_of_functions(model: Model) -> PythonCode:
+    from hybridsim.engine.python_code import PythonCode
+
+    # copies with other values have the same functions
+    key = (model.structure(), model.flow, model.components, model.monitors, model.schedules, model.outputs)
+    if key not in _of_functions:
+        while len(_of_functions) >= _MOST:
+            del _of_functions[next(iter(_of_functions))]
+        _of_functions[key] = PythonCode(model)
+    return _of_functions[key]
 
 
 def is_cached(model: Model) -> bool:

@@ -19,6 +19,7 @@ from hybridsim.engine.decide import (
     judge,
     side_after,
 )
+from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.system import Series, System
 
@@ -189,7 +190,7 @@ class Settling:
             if g >= 0 and self.fired[g]
         ]
 
-    def _series(self, z: np.ndarray, x: np.ndarray) -> Series:
+    def _series(self, z: np.ndarray, x: np.ndarray) -> Series | DifferenceSeries:
         at = self.at
         return self.system.series(at.s, x, at.p, z, at.x_error, at.s_error)
 

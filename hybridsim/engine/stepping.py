@@ -110,7 +110,9 @@ class Flow:
         return out
 
     def jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """d(dx/dt)/dx, (n, n), as it is differentiated from the declaration."""
+        """d(dx/dt)/dx, (n, n), as it is differentiated from the declaration; of Python functions by differences."""
+        if not self.system.has_tape:
+            return self.system.jacobian(float(s), np.ascontiguousarray(x, dtype=float), self.p, self.z)
         tangent, columns, both = (
             self.system.address("tangent"),
             np.empty((self.n, self.n)),

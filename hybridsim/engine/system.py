@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
@@ -170,9 +171,11 @@ class System:
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
-        self._registers: _Registers = self.code.shared(
-            "registers", lambda: _Registers(data["tape"], self.layout)
-        )
+        self.has_tape: bool = data["tape"] is not None  # it is made from expressions
+        if self.has_tape:
+            self._registers: _Registers = self.code.shared(
+                "registers", lambda: _Registers(data["tape"], self.layout)
+            )
         self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
         self._component_numbers = np.arange(len(self.automata))
         self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
@@ -180,7 +183,8 @@ class System:
     @property
     def has_corners(self) -> bool:
         """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
-        return bool(self.code.shared("corners", lambda: has_corners(self.code.data["tape"])))
+        tape = self.code.data["tape"]
+        return self.has_tape and bool(self.code.shared("corners", lambda: has_corners(tape)))
 
     @cached_property
     def is_linear(self) -> bool:
@@ -344,11 +348,40 @@ class System:
 
     def series(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
-    ) -> Series:
+    ) -> Series | DifferenceSeries:
         """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
+        if not self.has_tape:
+            return self._differences(s, x, p, z, x_error, s_error)
         tape, count = self.lean_tape(z), self._registers.count
         V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
         run_series(
             tape.constant_rows, tape.rows, self._registers.inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
         )  # fmt: skip
         return Series(V, E, tape)
+
+    def _differences(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
+    ) -> DifferenceSeries:
+        """The same where functions are known by their values alone."""
+        guards = self.guard_count
+        shape = (guards + len(self.monitor_names), ORDER + 1)
+        C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)
+        p = self._probing(p)
+        run_differences(
+            self.address("flow"), self.address("watched"), s, float(p[self.layout.origin_at]) + s, s_error,
+            np.ascontiguousarray(x, dtype=float), x_error, p, z, C, G, E,
+        )  # fmt: skip
+        return DifferenceSeries(C, G[:guards], E[:guards], G[guards:], E[guards:])
+
+    def jacobian(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """d(dx/dt)/dx (n, n) by differences: for functions that are known by their values alone."""
+        out = np.empty((self.n, self.n))
+        t = float(p[self.layout.origin_at]) + s
+        run_jacobian(self.address("flow"), s, t, x, self._probing(p), z, out)
+        return out
+
+    def _probing(self, p: np.ndarray) -> np.ndarray:
+        """p for differences, which go far from the run: what Python functions raise there is not noted."""
+        p = p.copy()
+        p[self.layout.pin_at] = 0.0
+        return p

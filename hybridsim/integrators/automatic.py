@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.linear_tables import what_is_not_linear
+from hybridsim.engine.python_code import PythonCode
 from hybridsim.engine.rosenbrock_step import linearise
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import advance
@@ -26,13 +27,15 @@ class Choice(NamedTuple):
 
 
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
-    """The closed form where it applies; a stiff method where stability would rule an explicit one; else one of these.
+    """The closed form where it applies; a stiff method where stability would rule; else an explicit one.
 
     Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian.
     """
+    if not system.has_tape:
+        return _for_functions(system, x0, z0, span)
     if system.n + system.guard_count <= _SMALL and what_is_not_linear(system) is None:
         return Choice("exact", "its modes are linear in the states")
-    steps = abs(span[1] - span[0]) * _fastest_decay(system, x0, np.maximum(z0, 0), span[0]) / _STABLE
+    steps = _steps_for_stability(system, x0, z0, span)
     if steps > _MANY:
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
@@ -42,13 +45,37 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     return Choice("dop853", "its modes are smooth and not stiff at the start")
 
 
+def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
+    """For rates that are a Python function: there is no tape for closed forms and series."""
+    steps = _steps_for_stability(system, x0, z0, span)
+    stiff = f"stability would hold an explicit method to {steps:.0e} steps" if steps > _MANY else ""
+    if isinstance(system.code, PythonCode) and system.code.refused:
+        return Choice(
+            "scipy-radau" if stiff else "scipy-dop853", stiff or "numba cannot compile its functions"
+        )
+    return Choice("cvode-bdf" if stiff else "dop853", stiff or "its rates are a Python function")
+
+
+def _steps_for_stability(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> float:
+    """Steps to which stability alone would hold an explicit method."""
+    return abs(span[1] - span[0]) * _fastest_decay(system, x0, np.maximum(z0, 0), span[0]) / _STABLE
+
+
 def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> float:
     """The largest rate -Re(lambda) at which anything decays at the start."""
     n = system.n
     if not n:
         return 0.0
-    inputs, lean = system.registers.inputs, system.lean_tape(z)
     p = system.vector(Instant(t0), system.discrete_start)
+    jacobian = _jacobian(system, x, p, z) if system.has_tape else system.jacobian(0.0, x, p, z)
+    if not np.isfinite(jacobian).all():
+        return 0.0
+    return max(0.0, float(-np.linalg.eigvals(jacobian).real.min()))
+
+
+def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """d(dx/dt)/dx from the tape."""
+    n, inputs, lean = system.n, system.registers.inputs, system.lean_tape(z)
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0] = inputs.values[:, 0]
     V[inputs.parameters, 0] = p[inputs.sources]
@@ -56,6 +83,4 @@ def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> f
     jacobian, rate = np.empty((n, n)), np.empty(n)
     places = (int(inputs.time[0]), inputs.states, lean.derivatives)
     linearise(lean.rows, places, 0.0, x, V, jacobian, rate)
-    if not np.isfinite(jacobian).all():
-        return 0.0
-    return max(0.0, float(-np.linalg.eigvals(jacobian).real.min()))
+    return jacobian

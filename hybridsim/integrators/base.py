@@ -14,6 +14,7 @@ from hybridsim.engine.stepping import Flow, Leaps, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 
+NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
 CAPABILITIES = {
     "contacts": "components with a surface: contacts, relays",
     "transitions": "general automata: modes, choices, resets",
@@ -24,6 +25,7 @@ CAPABILITIES = {
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
     "corners": "corners and jumps (abs, min, max, sign, a condition) inside a mode",
+    "functions": "models whose rates are a Python function",
     "stiff": "rates that differ by many decades",
     "nonlinear": "flows and guards that are not linear in the states",
     "adaptive": "the error follows rtol and atol",

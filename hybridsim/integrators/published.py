@@ -21,6 +21,7 @@ _FIXED = {
     "multiple-roots": "only the signs at the ends of a step are compared",
     "stiff": "explicit, with a fixed step",
     "backward": "the zone rule of the force has no past",
+    "functions": "it is a method for contacts, which are declared by expressions",
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.engine.rosenbrock_step import RosenbrockTableau
 from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.base import NEEDS_TAPE, Integrator
 from hybridsim.integrators.rodas5p_coefficients import GAMMA, NODES, STAGES, A, C, D, H, M
 from hybridsim.integrators.rosenbrock import RosenbrockStepper
 
@@ -36,6 +36,7 @@ class Rodas5P(Integrator):
     order: ClassVar[str] = "5(4)"
     reference: ClassVar[str] = "Steinebach 2023, doi:10.1007/s10543-023-00967-x"
     when: ClassVar[str] = "stiff modes, and many events among them"
+    lacks: ClassVar[dict[str, str]] = {"functions": NEEDS_TAPE}
 
     def start(
         self,

@@ -74,7 +74,7 @@ class RungeKuttaIntegrator(Integrator):
     """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
 
     Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
-    corners inside a mode do, since it looks at guards through their series.
+    corners inside a mode and Python functions do, since it looks at guards through their series.
     """
 
     tableau: ClassVar[Tableau]
@@ -87,12 +87,13 @@ class RungeKuttaIntegrator(Integrator):
 
     def prepare(self, system: System) -> None:
         """The compiled mode loop."""
-        if not system.has_corners:
+        if system.has_tape and not system.has_corners:
             compile_leaps(system, self._leaper)
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
-        """The compiled mode loop; None for a model with corners."""
-        return None if system.has_corners else self._leaper(system, tolerances, longest)
+        """The compiled mode loop; None for a model with corners, or one of Python functions."""
+        leaps = system.has_tape and not system.has_corners
+        return self._leaper(system, tolerances, longest) if leaps else None
 
     def start(
         self,

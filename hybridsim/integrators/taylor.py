@@ -13,7 +13,7 @@ from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.base import NEEDS_TAPE, Integrator
 
 _SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
 _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
@@ -108,6 +108,7 @@ class Taylor(Integrator):
     lacks: ClassVar[dict[str, str]] = {
         "stiff": "explicit: its step is bound by the fastest rate",
         "corners": "a series follows one side of an abs, min, max, sign or condition past its corner",
+        "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True
     leaps: ClassVar[bool] = True

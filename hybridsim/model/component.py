@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from hybridsim.expr import Expression
 from hybridsim.model.declared import Declared, as_tuple
@@ -20,8 +21,8 @@ class Choice(Declared):
 
     def __post_init__(self) -> None:
         self._texts("to")
-        self._expressions("when")
-        self._maps("reset")
+        self._expressions("when", functions=True)
+        self._maps("reset", functions=True)
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Guard(Declared):
 
     def __post_init__(self) -> None:
         self._texts("name", "fatal")
-        self._expressions("expr")
+        self._expressions("expr", functions=True)
         choices = tuple(
             Choice(choice, place=self.place) if isinstance(choice, str) else choice
             for choice in as_tuple(self.then)
@@ -56,17 +57,22 @@ class Guard(Declared):
 
 @dataclass(frozen=True)
 class Mode(Declared):
-    """A flow and its domain: ``der`` replaces rates of states, ``set`` gives the component's variables."""
+    """A flow and its domain: ``der`` replaces rates of states, ``set`` gives the component's variables.
+
+    ``flow`` replaces all rates in a model whose rates are a Python function (see `Model`).
+    """
 
     name: str
     guards: tuple[Guard, ...] = ()
     der: Mapping[str, Expression] = field(default_factory=FrozenMap)
     set: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    flow: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         self._texts("name")
         self._parts("guards", Guard)
         self._maps("der", "set")
+        self._functions("flow")
 
 
 @dataclass(frozen=True)

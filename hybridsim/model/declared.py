@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass, field
 from typing import Any
 
 from hybridsim.errors import ModelError, Place, UsageError
-from hybridsim.expr import parse
+from hybridsim.expr import Expression, of_function, parse
 from hybridsim.model.frozen_map import FrozenMap
 
 
@@ -28,23 +28,38 @@ class Declared:
             if not (isinstance(value, str) or (value is None and self._has_default(name))):
                 raise self._fault(f"{name} is {value!r}", "give a text")
 
-    def _expressions(self, *fields: str) -> None:
-        """Parse what was given as text or number; None stays None where it is the default."""
+    def _expressions(self, *fields: str, functions: bool = False) -> None:
+        """Parse what was given as text or number; None stays None where it is the default.
+
+        functions: whether a Python function may stand there as well.
+        """
         for name in fields:
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, parse(value, self.place))
+                object.__setattr__(self, name, self._parsed(value, functions))
             elif not self._has_default(name):
                 raise self._fault(f"{name} is None", "give a number or an expression")
 
-    def _maps(self, *fields: str) -> None:
-        """Freeze mappings of expressions; a value of None stays None."""
+    def _parsed(self, value: Any, functions: bool) -> Expression:
+        if functions and callable(value):
+            return of_function(value, self.place)
+        return parse(value, self.place)
+
+    def _maps(self, *fields: str, functions: bool = False) -> None:
+        """Freeze mappings of expressions (or, if so, Python functions); a value of None stays None."""
         for name in fields:
             items = getattr(self, name)
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
                 raise self._fault(f"{name} is {items!r}", "give a mapping from names to expressions")
-            parsed = {key: None if text is None else parse(text, self.place) for key, text in items.items()}
+            parsed = {key: None if v is None else self._parsed(v, functions) for key, v in items.items()}
             object.__setattr__(self, name, FrozenMap(parsed))
+
+    def _functions(self, *fields: str) -> None:
+        """See to it that functions are callable; None stays None."""
+        for name in fields:
+            value = getattr(self, name)
+            if not (value is None or callable(value)):
+                raise self._fault(f"{name} is {value!r}", "give a Python function of (t, x, p)")
 
     def _parts(self, field: str, kind: type[Declared]) -> None:
         """Make a tuple of parts of one kind; a single one becomes a tuple of one."""

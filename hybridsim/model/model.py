@@ -45,6 +45,10 @@ class Model(Declared):
     outputs : `Output` objects, or a dict of name to expression.
     definitions : named intermediate expressions, a dict or pairs; they may use one another and what
         components set.
+    flow : a Python function (t, x, p) -> the n rates (a tuple or an array), instead of rates by expressions. p has the
+        parameters as ``p.g`` and ``p[0]``. The states are then a dict of name to start value, or have der 0;
+        ``flow`` of a `Mode` replaces it there; guards, monitors, outputs, conditions and resets are functions
+        (t, x, p) -> a number, or a constant. Contacts, inputs, definitions and discrete states need expressions.
     title, source, description, look : what it is, where it comes from, more, and what to look at.
     duration : how long a run shows what there is to see, in the unit of t: an expression of parameters, the default of
         ``hybridsim run`` and of comparisons. None leaves it to them.
@@ -55,6 +59,9 @@ class Model(Declared):
     >>> free = Model("free", states=[State("x", 1, der="v"), State("v", 0, der="-k*x")], parameters={"k": 4})
     >>> free.with_(k=9).parameter_values()
     {'k': 9.0}
+    >>> fall = Model("fall", states={"h": 1, "w": 0}, parameters={"g": 9.81}, flow=lambda t, x, p: (x[1], -p.g))
+    >>> fall.validate() is fall
+    True
     """
 
     name: str
@@ -74,8 +81,11 @@ class Model(Declared):
     look: str = ""
     duration: Expression | None = None
     path: str | None = None
+    flow: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
+        self._functions("flow")
+        self._named("states", self._state)
         self._named("parameters", Parameter)
         self._named("discrete", Discrete)
         self._named("outputs", Output)
@@ -90,6 +100,14 @@ class Model(Declared):
             remedy = "give a mapping from names to expressions, or pairs of the two"
             raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
+
+    def _state(self, name: str, start: Any) -> State:
+        if self.flow is None:
+            remedy = (
+                "give hs.State(name, start, der) objects, or the rates of all as a function flow(t, x, p)"
+            )
+            raise self._fault(f"states gives {name} no rate", remedy)
+        return State(name, start, parse(0))
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
         given = getattr(self, field)
@@ -226,9 +244,19 @@ class Model(Declared):
         return self
 
     def to_toml(self) -> str:
-        """The model as a TOML text that stands on its own: laws and tables are written into it."""
+        """The model as a TOML text that stands on its own: laws and tables are written into it.
+
+        Errors
+        ------
+        UsageError for a model of Python functions: a text cannot hold them.
+        """
         from hybridsim.model.toml_write import write_model
 
+        if self.flow is not None:
+            raise UsageError(
+                f"model {self.name} is made of Python functions, which cannot be written to TOML",
+                remedy="write its rates, guards and resets as expressions, or keep it as a Python file",
+            )
         return write_model(self)
 
     @classmethod
@@ -246,7 +274,8 @@ def _content(model: Model) -> tuple[object, ...]:
         model.states, model.parameters, model.discrete, model.components, model.contacts, model.inputs,
         model.monitors, model.schedules, model.outputs, model.definitions,
     )  # fmt: skip
-    return (model.name, *parts, model.title, model.source, model.description, model.look, model.duration)
+    words = (model.title, model.source, model.description, model.look, model.duration)
+    return (model.name, *parts, *words, model.flow)
 
 
 def _known(changes: Mapping[str, Any], names: Iterable[str], kind: str, model: str) -> None:

@@ -31,5 +31,5 @@ class Monitor(Declared):
 
     def __post_init__(self) -> None:
         self._texts("name", "direction", "action")
-        self._expressions("expr")
-        self._maps("reset")
+        self._expressions("expr", functions=True)
+        self._maps("reset", functions=True)

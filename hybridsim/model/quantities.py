@@ -32,7 +32,8 @@ class State(Declared):
     Parameters
     ----------
     start : initial value, an expression of parameters.
-    der : its rate over everything the model names; a mode may override it in its own ``der``.
+    der : its rate over everything the model names; a mode may override it in its own ``der``. 0 where the model's
+        rates are a Python function.
     unit : for people; never computed with.
     nominal : typical size in that unit, from which the absolute tolerance follows; None takes it from the
         run.
@@ -80,5 +81,5 @@ class Output(Declared):
 
     def __post_init__(self) -> None:
         self._texts("name")
-        self._expressions("expr")
+        self._expressions("expr", functions=True)
         self._maps("modes")

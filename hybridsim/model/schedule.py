@@ -39,4 +39,4 @@ class Schedule(Declared):
         if self.start is None and self.period is not None:
             object.__setattr__(self, "start", parse(0))
         self._expressions("start", "period")
-        self._maps("reset")
+        self._maps("reset", functions=True)

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import ExpressionError, ModelError, Place, nearest
-from hybridsim.expr import Expression, require_names
+from hybridsim.expr import Expression, FunctionExpression, require_names
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.component import Component
 from hybridsim.model.declared import Declared
@@ -84,6 +84,8 @@ class Scope:
                 remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
                 raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
             require_names(expr, allowed)
+            if isinstance(expr, FunctionExpression):
+                return  # what it gives is seen when it is called
             if boolean and not expr.is_boolean:
                 raise expr.error(f"'{expr.text}' is a number", remedy="a condition is needed, e.g. 'x > 0'.")
             if expr.is_boolean and not boolean:

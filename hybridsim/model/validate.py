@@ -8,6 +8,7 @@ from hybridsim.errors import ModelError
 from hybridsim.model.check_automata import check_automata
 from hybridsim.model.check_contacts import check_contacts
 from hybridsim.model.check_expressions import check_expressions
+from hybridsim.model.check_functions import check_functions
 from hybridsim.model.check_names import check_names
 from hybridsim.model.check_signals import check_signals
 from hybridsim.model.check_values import check_values
@@ -28,6 +29,7 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_automata(scope)
     check_contacts(scope)
     check_signals(scope)
+    check_functions(scope)
     check_expressions(scope)
     if not scope.errors:
         check_values(scope)
