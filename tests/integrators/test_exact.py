@@ -1,0 +1,132 @@
+"""Closed forms of linear modes: runs against closed forms and multiple precision, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from reference.arithmetic import multiprecision
+from reference.dfcs_closed_form import Oscillator
+
+import hybridsim as hs
+
+
+def oscillator(rate: str, guard: str = "", **parts: object) -> hs.Model:
+    """v' = rate, with a guard of a first mode."""
+    first = hs.Mode("a", guards=[hs.Guard("g", guard, "b")] if guard else [])
+    return hs.Model(
+        "m",
+        states=[hs.State("x", 1, "v"), hs.State("v", 0, rate)],
+        parameters={"k": 4},
+        components=[hs.Component("c", modes=[first, hs.Mode("b")], initial="a")],
+        **parts,
+    )
+
+
+@pytest.mark.parametrize(("F0", "ratio"), [(30.0, 0.6), (22.0, 0.64)])
+def test_a_hundred_periods_of_dry_friction_to_rounding(F0: float, ratio: float) -> None:
+    """Event times and states against the closed form in 30 digits."""
+    model = hs.load("dfcs").with_(F0=F0, omega=ratio * math.sqrt(1e5 / 0.2))
+    omega = model.parameter_values()["omega"]
+    period = 2 * math.pi / omega
+    exact = Oscillator(0.2, 5.65, 1e5, 20, 20, F0, omega, numbers=multiprecision(30)).run(0, 100 * period, 0)
+    solution = hs.simulate(model, (0, 100 * period), integrator="exact")
+    modes = {"stick": 0, "slip+": 1, "slip-": -1}
+    assert [modes[event.target] for event in solution.events] == [change.mode for change in exact.changes]
+    amplitude = float(exact.amplitude(99 * period, 100 * period))
+    for event, change in zip(solution.events, exact.changes, strict=True):
+        assert abs(event.t - change.t) <= 1e-13 * period
+        assert abs(event.x_plus[0] - change.x) <= 1e-12 * amplitude
+    for t in np.linspace(99 * period, 100 * period, 41):
+        x, v, _ = exact.state(mpmath.mpf(float(t)))
+        assert np.abs(solution(t) - [float(x), float(v)]).max(initial=0.0) <= 1e-12 * amplitude * omega
+        assert abs(solution(t)[0] - float(x)) <= 1e-12 * amplitude
+
+
+@pytest.mark.parametrize(
+    ("rate", "reason"),
+    [
+        ("-x*v", "a product of states"),
+        ("-x*t", "a product of a state and what changes in time"),
+        ("-x*sin(t)", "a product of a state and what changes in time"),
+        ("-x/(1 + t)", "a quotient by what moves"),
+        ("-sqrt(x)", "a root of what moves"),
+        ("-sin(x)", "a sine or an exponential of what is not linear in time alone"),
+        ("sin(t**2) - x", "a sine or an exponential of what is not linear in time alone"),
+        ("-tanh(v)", "a tangent of what moves"),
+        ("sinh(x)", "a hyperbolic function of what moves"),
+        ("-abs(x)", "a corner, a jump or another function of what moves"),
+        ("-x if x > 0 else -v", "a corner, a jump or another function of what moves"),
+        ("t**9 - x", "a product of more than 8 functions of time"),
+    ],
+)
+def test_what_is_not_linear_is_refused_with_the_reason(rate: str, reason: str) -> None:
+    with pytest.raises(hs.UsageError, match=f"the rate of v has {reason}"):
+        hs.simulate(oscillator(rate), (0, 1), integrator="exact")
+
+
+@pytest.mark.parametrize("guard", ["x*v + 1", "x + t*x", "sin(x) + 0.5", "abs(x) - 0.1"])
+def test_a_guard_that_is_not_linear_is_refused_by_name(guard: str) -> None:
+    with pytest.raises(hs.UsageError, match="guard g of c in mode a has"):
+        hs.simulate(oscillator("-x", guard), (0, 1), integrator="exact")
+
+
+def test_a_close_pair_is_found_and_its_second_zero_is_where_it_belongs() -> None:
+    """g = cos(t) + 1 - depth is zero at pi -+ acos(1 - depth); the pair is one mode apart."""
+    up = hs.Mode("up", guards=[hs.Guard("g", "c + 1 - depth", "down")])
+    down = hs.Mode("down", guards=[hs.Guard("g", "depth - c - 1", "up")])
+    model = hs.Model(
+        "dip",
+        states=[hs.State("c", 1, "-s"), hs.State("s", 0, "c")],
+        parameters={"depth": 1e-2},
+        components=[hs.Component("m", modes=[up, down], initial="up")],
+    )
+    for depth in (1e-2, 1e-5, 1e-8, 1e-11, 1e-13):
+        solution = hs.simulate(model.with_(depth=depth), (0, 5), integrator="exact")
+        with mpmath.workdps(30):
+            apart = float(mpmath.acos(1 - mpmath.mpf(depth)))
+        # beyond the slope, the rounding of 1 - depth moves the zeros as well
+        close = 4e-15 / apart + 2e-15
+        assert [event.t for event in solution.events if event.kind == "transition"] == pytest.approx(
+            [math.pi - apart, math.pi + apart], abs=close
+        ), depth
+
+
+def test_a_discrete_state_that_enters_linearly_is_right_after_a_reset() -> None:
+    """x'' = q - x: each reset of q starts a cosine about the new q."""
+    model = oscillator(
+        "q - x",
+        discrete=[hs.Discrete("q", 1)],
+        schedules=[hs.Schedule("s", times=[1.0], reset={"q": "x + 2"})],
+    )
+    solution = hs.simulate(model, (0, 2.5), integrator="exact")
+    assert solution(0.7) == pytest.approx([1.0, 0.0], abs=1e-15)
+    assert solution(2.5) == pytest.approx([3 - 2 * math.cos(1.5), 2 * math.sin(1.5)], rel=1e-14)
+
+
+def test_backward_undoes_forward() -> None:
+    model = oscillator("-k*x + t**2*exp(-t)*sin(2*t)")
+    forward = hs.simulate(model, (0, 3), integrator="exact")
+    back = hs.simulate(model.with_start(x=forward.y[0, -1], v=forward.y[1, -1]), (3, 0), integrator="exact")
+    assert back(0.0) == pytest.approx([1.0, 0.0], abs=1e-13)
+    assert back(1.5) == pytest.approx(forward(1.5), abs=1e-13)
+
+
+def test_impacts_that_accumulate_are_said_to() -> None:
+    """The ball's flights are 2 e**k sqrt(2 h/g); their sum is finite."""
+    floor = hs.Guard("floor", "h", [hs.Choice("flight", reset={"h": "0", "w": "-0.5*w"})])
+    model = hs.Model(
+        "ball",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-9.81")],
+        components=[hs.Component("b", modes=[hs.Mode("flight", guards=[floor])])],
+    )
+    solution = hs.simulate(model, (0, 5), integrator="exact")
+    assert solution.status == "accumulation"
+    fall, expected = math.sqrt(2 / 9.81), []
+    t = fall
+    for k in range(12):
+        expected.append(t)
+        t += 2 * fall * 0.5 ** (k + 1)
+    assert [event.t for event in solution.events[:12]] == pytest.approx(expected, rel=1e-14)
