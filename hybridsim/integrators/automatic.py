@@ -27,13 +27,15 @@ class Choice(NamedTuple):
 
 
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
-    """The closed form where it applies; a stiff method where stability would rule; else an explicit one.
+    """The closed form where it goes from event to event, a stiff method where stability would rule, an explicit one.
 
     Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian.
     """
     if not system.has_tape:
         return _for_functions(system, x0, z0, span)
-    if system.n + system.guard_count <= _SMALL and what_is_not_linear(system) is None:
+    model = system.model
+    is_small = system.n + system.guard_count <= _SMALL and not (model.monitors or model.inputs)
+    if is_small and span[1] >= span[0] and what_is_not_linear(system) is None:
         return Choice("exact", "its modes are linear in the states")
     steps = _steps_for_stability(system, x0, z0, span)
     if steps > _MANY:

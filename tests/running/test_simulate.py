@@ -19,7 +19,9 @@ def decay(**more: object) -> hs.Model:
     return hs.Model("decay", states=(State("x", 1, "-x"),), **more)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "exact", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf"])
+@pytest.mark.parametrize(
+    "integrator", ["dop853", "exact", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf"]
+)
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
 def test_the_error_follows_the_tolerance(integrator: str, rtol: float) -> None:
     sol = hs.simulate(decay(), (0, 3), integrator=integrator, rtol=rtol)
@@ -110,7 +112,9 @@ def test_what_does_not_fit_is_refused_by_name(arguments: dict[str, object], word
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "exact", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf"])
+@pytest.mark.parametrize(
+    "integrator", ["dop853", "exact", "scipy-dop853", "scipy-rk45", "cvode-adams", "cvode-bdf"]
+)
 def test_a_jump_of_the_load_frees_a_body_at_rest(integrator: str) -> None:
     """m = 1, limit 3; the load is 1 up to t = 1 and -5 after: v = -(5 - 3)(t - 1)."""
     load = hs.Input("F", "table", times=(0, 1, 1, 3), values=(1, 1, -5, -5))
