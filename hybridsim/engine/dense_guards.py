@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
@@ -10,6 +11,7 @@ from hybridsim.engine.leap import earliest_exit, holds
 from hybridsim.engine.taylor import advance, reach
 
 _SHORTER = 0.25
+_LONGER = 4.0
 _SHORTEST = 2.0**-40  # of a step: a stretch on which a guard's series says nothing
 
 
@@ -27,6 +29,19 @@ def shifted(coefficients: Any, q: float, states: Any, order: int, V: Any) -> Non
             for j in range(m - 1):
                 for k in range(m - 2, j - 1, -1):
                     V[r, k] += q * V[r, k + 1]
+
+
+@kernel
+def likely_reach(V: Any, watched: Any, order: int, rtol: float) -> float:
+    """A length beyond that over which the series of some functions hold, to look for that from."""
+    longest = math.inf
+    for j in range(watched.shape[0]):
+        r = watched[j]
+        for k in (0, 1):
+            if V[r, k] != 0.0 and V[r, order] != 0.0:
+                w = (rtol * abs(V[r, k] / V[r, order])) ** (1.0 / (order - k))
+                longest = min(longest, _LONGER * w)
+    return longest
 
 
 @kernel
@@ -70,7 +85,9 @@ def first_guard(
         for j in range(order + 1):
             advance(rows, V, j)
         left = d - q
-        w = left if is_linear else reach(V, none, watched, order, rtol, atol, left)
+        w = left
+        if not is_linear:
+            w = reach(V, none, watched, order, rtol, atol, min(left, likely_reach(V, watched, order, rtol)))
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(tapes, k, order, w, sides, orders, floors, V, a, b, stack)

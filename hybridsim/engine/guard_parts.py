@@ -15,11 +15,16 @@ _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVID
 
 
 class Parts(NamedTuple):
-    """Rows for the guards of each vector of modes, one slice each, and whether these are linear in states and time."""
+    """Rows for the guards of each vector of modes, one slice each, and whether these are linear in states and time.
+
+    The other rows are those that a step needs: of the flow, and of guards where they are linear.
+    """
 
     start: np.ndarray
     rows: np.ndarray
     is_linear: np.ndarray
+    step_start: np.ndarray
+    step_rows: np.ndarray
 
 
 class GuardParts:
@@ -36,15 +41,19 @@ class GuardParts:
 
 
 def _parts(tapes: Tapes) -> Parts:
-    start, rows, is_linear = [0], [np.zeros((0, 5), dtype=np.int64)], []
+    guards, steps, is_linear = [], [], []
     for k in range(len(tapes.modes)):
-        lean = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+        lean = [tuple(row) for row in tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]].tolist()]
         active = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
-        needed = needed_rows([tuple(row) for row in lean.tolist()], set(tapes.guards[k, active].tolist()))
-        rows.append(np.array(needed, dtype=np.int64).reshape(-1, 5))
-        start.append(start[-1] + len(needed))
-        is_linear.append(all(row[0] in _LINEAR for row in needed))
-    parts: Parts = packed(
-        Parts(np.array(start, dtype=np.int64), np.concatenate(rows), np.array(is_linear, dtype=np.bool_))
-    )
+        watched, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
+        guards.append(needed_rows(lean, watched))
+        is_linear.append(all(row[0] in _LINEAR for row in guards[-1]))
+        steps.append(needed_rows(lean, rates | watched if is_linear[-1] else rates))
+    parts: Parts = packed(Parts(*_flat(guards), np.array(is_linear, dtype=np.bool_), *_flat(steps)))
     return parts
+
+
+def _flat(lists: list[list[tuple[int, ...]]]) -> tuple[np.ndarray, np.ndarray]:
+    """Where each of several lists of rows begins, and all of them in a row."""
+    start = np.cumsum([0, *map(len, lists)]).astype(np.int64)
+    return start, np.array([row for rows in lists for row in rows], dtype=np.int64).reshape(-1, 5)

@@ -14,7 +14,7 @@ from hybridsim.engine.dense_guards import first_guard
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, load, set_origin
 from hybridsim.engine.ordinary_event import Before, find_modes, guard_series, put
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
@@ -64,7 +64,7 @@ def first_length(leading: Any, x: Any, tolerances: Any, states: Any, V: Any, lon
     return min(SAFETY * h, longest)
 
 
-@kernel
+@inlined
 def coefficients_of(states: Any, V: Any, out: Any) -> bool:
     """Coefficients of the states (n, K) out of their registers; whether all are numbers."""
     total = 0.0
@@ -76,21 +76,28 @@ def coefficients_of(states: Any, V: Any, out: Any) -> bool:
 
 
 @kernel
-def series_of(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: Any, out: Any) -> bool:
+def series_of(
+    rows: Any, guard_rows: Any, time: int, states: Any, derivatives: Any, s: float, x: Any, W: Any, out: Any
+) -> bool:
     """Coefficients of the states (n, K) along the flow from (s, x), and in W of all registers; whether all are finite.
 
-    rows: all of the mode's; guard_rows: those of them that the guards need.
+    rows: what the flow needs of the tape, and what else is wanted; guard_rows: those of them that guards need.
     """
-    _, states, derivatives = places
-    last = out.shape[1] - 1
-    expand(rows, places, last - 1, s, x, W)
-    for i in range(out.shape[0]):
-        W[states[i], last] = W[derivatives[i], last - 1] / last
+    n, last = out.shape
+    last -= 1
+    if time >= 0:
+        W[time, 0], W[time, 1] = s, 1.0
+    for i in range(n):
+        W[states[i], 0] = x[i]
+    for k in range(last):
+        advance(rows, W, k)
+        for i in range(n):
+            W[states[i], k + 1] = W[derivatives[i], k] / (k + 1)
     advance(guard_rows, W, last)
     return coefficients_of(states, W, out)
 
 
-@kernel
+@inlined
 def stays_positive(left: Any, right: Any, d: float, weights: Any) -> bool:
     """Whether a polynomial of degree 2 K - 1 is certainly positive from 0 to d: its Bernstein coefficients are.
 
@@ -161,7 +168,7 @@ def land(
         if is_holding:
             call(functions.project, s + d, y1, p, z, room.slopes)
             y1[:] = room.slopes
-        if not series_of(rows, guard_rows, places, s + d, y1, W, right):
+        if not series_of(rows, guard_rows, *places, s + d, y1, W, right):
             return LOST, d
         value, slope = W[register, 0], W[register, 1]
         move = -value / slope if slope != 0.0 else math.nan
@@ -266,9 +273,12 @@ def rk_leap(
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
         rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
         guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
+        step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
         is_linear = parts.is_linear[k]
+        step_guards = guard_rows if is_linear else guard_rows[:0]
         guard_order = 2 * terms + 1 if is_linear else order
-        flow_places = (time, states, tapes.derivatives[k])
+        derivatives = tapes.derivatives[k]
+        flow_places = (time, states, derivatives)
         load(inputs, tapes, k, p, V)
         load(inputs, tapes, k, p, W)
         numbers = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
@@ -284,7 +294,7 @@ def rk_leap(
         put(x, y)
         for i in range(n):
             scale[i] = abs(x[i])
-        expand(rows, flow_places, leading[0] + 1, 0.0, y, W)
+        expand(step_rows, flow_places, leading[0] + 1, 0.0, y, W)
         h = first_length(leading, y, tolerances, states, W, min(bound, max_step))
         if first[0] > 0.0:
             h, first[0] = first[0], 0.0
@@ -307,7 +317,10 @@ def rk_leap(
             error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
             room.counts[0] += 1
             h = min(next_length(d, error, error_order, room.memory), max_step)
-            if not (error <= 1.0 and series_of(rows, guard_rows, flow_places, s + d, y1, W, right)):
+            if not (
+                error <= 1.0
+                and series_of(step_rows, step_guards, time, states, derivatives, s + d, y1, W, right)
+            ):
                 room.counts[1] += 1
                 h = min(h, _HALF * d) if error <= 1.0 else h
                 continue
