@@ -20,6 +20,7 @@ _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the
 _DEFECT = (
     100.0  # of a step, in units of the tolerance: in the slope the last term of order p is p times as large
 )
+_WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of what there is leaves no rest behind
 _RETRIES = 30
 
 
@@ -43,7 +44,9 @@ class TaylorStepper:
         """The next step, as long as the series reaches."""
         direction = math.copysign(1.0, self.bound)
         left = abs(self.bound - self.s)
-        longest = min(left, self.tolerances.max_step, self.longest)
+        longest = min(left, self.tolerances.max_step)
+        if self.longest < _WORTH_ITS_OWN * longest:
+            longest = self.longest
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
