@@ -11,6 +11,7 @@ VOCABULARY = (
     "contacts",
     "transitions",
     "nonlinear",
+    "functions",
     "monitors",
     "scheduled",
     "multiple-roots",
