@@ -6,12 +6,15 @@ import math
 from typing import Any
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.hermite import fit_in_time
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.leap import earliest_exit, holds
 from hybridsim.engine.taylor import advance, reach
 
 _SHORTER = 0.25
 _LONGER = 4.0
+_ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to all that is summed for it
 _SHORTEST = 2.0**-40  # of a step: a stretch on which a guard's series says nothing
 
 
@@ -29,6 +32,76 @@ def shifted(coefficients: Any, q: float, states: Any, order: int, V: Any) -> Non
             for j in range(m - 1):
                 for k in range(m - 2, j - 1, -1):
                     V[r, k] += q * V[r, k + 1]
+
+
+@inlined
+def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
+    """Every guard is positive where the next step or stretch begins."""
+    for g in range(sides.shape[0]):
+        sides[g], orders[g], floors[g] = 1, 0, 0.0
+
+
+@kernel
+def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, weights: Any) -> bool:
+    """Whether a polynomial of degree 2 K - 1 is certainly positive on (0, d]: its Bernstein coefficients are.
+
+    left, right (K,): its Taylor coefficients at both ends, the first `order` of which are zero by decree on the left,
+    where it is known to the floor. weights (K, K): from these to the K Bernstein coefficients next to an end.
+    """
+    size, power = 0.0, 1.0
+    for k in range(left.shape[0]):
+        size += (abs(left[k]) + abs(right[k])) * power
+        power *= d
+    error = _ROUNDING * size + floor
+    for j in range(left.shape[0]):
+        low, high, power = 0.0, 0.0, 1.0
+        for k in range(j + 1):
+            if k >= order:
+                low += weights[j, k] * left[k] * power
+            high += weights[j, k] * right[k] * (power if k % 2 == 0 else -power)
+            power *= d
+        if not ((low > error or j < order) and high > error):
+            return False
+    return True
+
+
+@kernel
+def first_linear_guard(
+    tapes: Any, k: int, count: int, d: float, hermite: Any, room: Any
+) -> tuple[int, int, float]:
+    """As `first_guard` for guards that are linear in states and time: along a step they are polynomials themselves.
+
+    room: the numbers of the watched guards, `guards_left` and `guards_right` (G, K), their Taylor coefficients at the
+    ends of the step, and their sides, orders and floors.
+    """
+    left, right, numbers = room.guards_left, room.guards_right, room.numbers
+    sides, orders, floors = room.sides, room.orders, room.floors
+    is_positive = True
+    for i in range(count):
+        g = numbers[i]
+        is_positive = (
+            is_positive
+            and sides[g] > 0
+            and stays_positive(left[i], right[i], orders[g], floors[g], d, hermite.weights)
+        )
+    outcome, g, at = NEVER, -1, d
+    if not is_positive:
+        polynomials, watched, V = room.polynomials, room.watched, room.V
+        left, right = left[:count], right[:count]
+        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, polynomials[:count]):
+            return OPEN, -1, 0.0
+        degree = polynomials.shape[1] - 1
+        for i in range(count):
+            for j in range(degree + 1):
+                V[watched[i], j] = polynomials[i, j]
+            for j in range(degree + 1, degree + 3):  # nothing is left out: so much for the error of a series
+                V[watched[i], j] = 0.0
+        outcome, g, at = earliest_exit(
+            tapes, k, degree + 2, d, sides, orders, floors, V, room.a, room.b, room.stack
+        )
+    if outcome == NEVER:
+        begin_positive(sides, orders, floors)
+    return outcome, g, at
 
 
 @kernel
@@ -50,55 +123,47 @@ def first_guard(
     k: int,
     rows: Any,
     inputs: Any,
-    is_linear: bool,
     order: int,
     rtol: float,
     s: float,
     d: float,
-    polynomial: Any,
-    watched: Any,
     atol: Any,
-    sides: Any,
-    orders: Any,
-    floors: Any,
-    V: Any,
-    W: Any,
-    x: Any,
-    a: Any,
-    b: Any,
-    stack: Any,
+    watched: Any,
+    room: Any,
 ) -> tuple[int, int, float]:
     """The guard of mode row k that first goes negative on a step: (FOUND, guard, time from s), (NEVER, -1, d), OPEN.
 
-    polynomial (n, m): the states in powers of the time from s. rows: what the guards need of the tape, whose constants
-    are in V and W; is_linear: guards are linear in states and time, so that their series are exact. sides, orders,
-    floors: of the guards just after s, as in `earliest_exit`; moved on. The series of a guard serves as far as its last
-    terms stay below rtol of its largest and it meets the guard at its end; there the next stretch begins.
+    rows: what the guards need of the tape. room: `polynomial` (n, m), the states in powers of the time from s; V and W
+    with the constants of the tape in their registers; sides, orders, floors of the guards just after s, as in
+    `earliest_exit`, moved on. The series of a guard serves as far as its last terms stay below rtol of its largest and
+    it meets the guard at its end; there the next stretch begins.
     """
-    time, states = inputs.time[0], inputs.states
+    time, states, V, W = inputs.time[0], inputs.states, room.V, room.W
     none = states[:0]
     q = 0.0
     while q < d:
-        shifted(polynomial, q, states, order, V)
+        shifted(room.polynomial, q, states, order, V)
         if time >= 0:
             V[time, 0], V[time, 1] = s + q, 1.0
         for j in range(order + 1):
             advance(rows, V, j)
         left = d - q
-        w = left
-        if not is_linear:
-            w = reach(V, none, watched, order, rtol, atol, min(left, likely_reach(V, watched, order, rtol)))
+        w = reach(V, none, watched, order, rtol, atol, min(left, likely_reach(V, watched, order, rtol)))
         if not w > _SHORTEST * d:
             return OPEN, -1, q
-        outcome, g, at = earliest_exit(tapes, k, order, w, sides, orders, floors, V, a, b, stack)
+        outcome, g, at = earliest_exit(
+            tapes, k, order, w, room.sides, room.orders, room.floors, V, room.a, room.b, room.stack
+        )
         if outcome == OPEN:
             return OPEN, g, q + at
-        while not is_linear:
+        while True:
             for i in range(states.shape[0]):
                 W[states[i], 0] = V[states[i], order]
                 for j in range(order - 1, -1, -1):
                     W[states[i], 0] = W[states[i], 0] * at + V[states[i], j]
-            if holds(rows, (time, none, none), order, s + q, x, x, at, rtol, atol, watched, V, W):
+            if holds(
+                rows, (time, none, none), order, s + q, atol, atol, at, rtol, atol, watched, V, W
+            ):  # of states it is asked nothing
                 break
             at, outcome = _SHORTER * at, NEVER
             if not at > _SHORTEST * d:
@@ -106,5 +171,5 @@ def first_guard(
         if outcome == FOUND:
             return FOUND, g, q + at
         q = d if at >= left else q + at
-        sides[:], orders[:], floors[:] = 1, 0, 0.0
+        begin_positive(room.sides, room.orders, room.floors)
     return NEVER, -1, d

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import cache
 from math import comb
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,14 @@ def bernstein_weights(count: int) -> np.ndarray:
     """
     degree = 2 * count - 1
     return np.array([[comb(j, k) / comb(degree, k) for k in range(count)] for j in range(count)])
+
+
+class Hermite(NamedTuple):
+    """The matrices of one K: `shift_matrix`, `right_system`, `bernstein_weights`."""
+
+    shift: np.ndarray
+    inverse: np.ndarray
+    weights: np.ndarray
 
 
 @kernel

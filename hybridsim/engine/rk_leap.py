@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.dense_guards import first_guard
+from hybridsim.engine.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
@@ -25,7 +25,6 @@ LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
 _CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
 _HALF = 0.5
-_ROUNDING = 16.0 * UNIT
 _PASSES = 3  # of the tolerance at a step's end, which the first step's length is made for
 
 
@@ -98,39 +97,20 @@ def series_of(
 
 
 @inlined
-def stays_positive(left: Any, right: Any, d: float, weights: Any) -> bool:
-    """Whether a polynomial of degree 2 K - 1 is certainly positive from 0 to d: its Bernstein coefficients are.
-
-    left, right (K,): its Taylor coefficients at both ends. weights (K, K): from these to the K Bernstein coefficients
-    next to an end.
-    """
-    size, power = 0.0, 1.0
-    for k in range(left.shape[0]):
-        size += (abs(left[k]) + abs(right[k])) * power
-        power *= d
-    error = _ROUNDING * size
-    for j in range(left.shape[0]):
-        low, high, power = 0.0, 0.0, 1.0
-        for k in range(j + 1):
-            low += weights[j, k] * left[k] * power
-            high += weights[j, k] * right[k] * (power if k % 2 == 0 else -power)
-            power *= d
-        if not (low > error and high > error):
-            return False
-    return True
-
-
-@kernel
-def all_stay_positive(
-    watched: Any, numbers: Any, sides: Any, orders: Any, left: Any, W: Any, d: float, weights: Any
-) -> bool:
-    """Whether linear guards are certainly positive along a step; `left` their series at its start, W at its end."""
-    terms = weights.shape[0]
+def gather(watched: Any, W: Any, out: Any) -> None:
+    """Coefficients of the watched functions, a row each."""
     for i in range(watched.shape[0]):
-        if sides[numbers[i]] <= 0 or orders[numbers[i]] > 0:
-            return False
-        if not stays_positive(left[i], W[watched[i], :terms], d, weights):
-            return False
+        for j in range(out.shape[1]):
+            out[i, j] = W[watched[i], j]
+
+
+@inlined
+def is_still(stages: Any) -> bool:
+    """Whether nothing moves at any stage of a step."""
+    for i in range(stages.shape[0]):
+        for m in range(stages.shape[1]):
+            if stages[i, m] != 0.0:
+                return False
     return True
 
 
@@ -139,36 +119,44 @@ def land(
     functions: Any,
     tableau: Any,
     tolerances: Any,
-    rows: Any,
+    tapes: Any,
+    k: int,
     guard_rows: Any,
-    places: Any,
+    inputs: Any,
     register: int,
     s: float,
     d: float,
     h: float,
-    y: Any,
     p: Any,
     z: Any,
     is_holding: bool,
     room: Any,
-    right: Any,
 ) -> tuple[int, float]:
     """Repeat the step of length h up to where a function (a register of the tape) is zero, at d by the dense output.
 
-    The end in room.y1, the series of the states there in `right`, of all registers in room.W. Newton's method corrects
-    the time until it is good to rounding; a correction within reach of the series at the end needs no new step.
+    The step starts from room.y; its end is in room.y1, the series there in room.right, of all registers in room.W.
+    Newton's method corrects the time until it is good to rounding; a correction within reach of the series at the end
+    needs no new step.
     """
-    W, y1, last = room.W, room.y1, right.shape[1] - 1
+    W, right, y, y1, last = room.W, room.right, room.y, room.y1, room.right.shape[1] - 1
+    rows, time, states = (
+        tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]],
+        inputs.time[0],
+        inputs.states,
+    )
+    derivatives = tapes.derivatives[k]
     low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
-    error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
-    room.counts[0] += 1
+    error = 0.0
+    if not is_still(room.stages):
+        error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
+        room.counts[0] += 1
     for _ in range(_CORRECTIONS):
         if not error <= 1.0:
             return REJECTED, d
         if is_holding:
             call(functions.project, s + d, y1, p, z, room.slopes)
-            y1[:] = room.slopes
-        if not series_of(rows, guard_rows, *places, s + d, y1, W, right):
+            put(room.slopes, y1)
+        if not series_of(rows, guard_rows, time, states, derivatives, s + d, y1, W, right):
             return LOST, d
         value, slope = W[register, 0], W[register, 1]
         move = -value / slope if slope != 0.0 else math.nan
@@ -250,9 +238,8 @@ def rk_leap(
     rtol, atol, order, max_step, longest, first = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    V, W, left, right, y, y1, scale, slopes = (
-        room.V, room.W, room.left, room.right, room.y, room.y1, room.scale, room.slopes
-    )  # fmt: skip
+    W, left, right, y, y1 = room.W, room.left, room.right, room.y, room.y1
+    scale, slopes = room.scale, room.slopes
     side_now, order_now, floor_now = room.sides, room.orders, room.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
@@ -271,20 +258,18 @@ def rk_leap(
         if n_segments >= segments.shape[0]:
             return FULL, n_steps, n_segments
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
-        rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
         guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
         step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
         is_linear = parts.is_linear[k]
         step_guards = guard_rows if is_linear else guard_rows[:0]
-        guard_order = 2 * terms + 1 if is_linear else order
         derivatives = tapes.derivatives[k]
         flow_places = (time, states, derivatives)
-        load(inputs, tapes, k, p, V)
+        load(inputs, tapes, k, p, room.V)
         load(inputs, tapes, k, p, W)
-        numbers = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
-        watched = room.watched[: numbers.shape[0]]
+        watched = room.watched[: tapes.active_start[k + 1] - tapes.active_start[k]]
         for i in range(watched.shape[0]):
-            watched[i] = tapes.guards[k, numbers[i]]
+            room.numbers[i] = tapes.active[tapes.active_start[k] + i]
+            watched[i] = tapes.guards[k, room.numbers[i]]
         put(sides, side_now)
         put(orders, order_now)
         put(floors, floor_now)
@@ -300,15 +285,12 @@ def rk_leap(
             h, first[0] = first[0], 0.0
         if not (coefficients_of(states, W, left) and h > 0.0):
             return STOPPED, n_steps, n_segments
-        for i in range(watched.shape[0]):
-            for j in range(terms):
-                room.guards_left[i, j] = W[watched[i], j]
+        gather(watched, W, room.guards_left)
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
                 return FULL, first_step, n_segments
-            is_last = (
-                h >= bound - s - SMALLEST * 2.0**-52 * bound
-            )  # what would be left is too short for a step
+            # what would be left is too short for a step of its own
+            is_last = h >= bound - s - SMALLEST * 2.0**-52 * bound
             d = bound - s if is_last else h
             if s > longest or not d > SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments
@@ -324,37 +306,34 @@ def rk_leap(
                 room.counts[1] += 1
                 h = min(h, _HALF * d) if error <= 1.0 else h
                 continue
-            if not (
-                is_linear
-                and all_stay_positive(
-                    watched, numbers, side_now, order_now, room.guards_left, W, d, hermite[2]
-                )
-            ):
-                if not fit_in_time(left, right, d, hermite[0], hermite[1], room.lack, room.polynomial):
-                    return STOPPED, first_step, n_segments
+            if is_linear:
+                gather(watched, W, room.guards_right)
+                outcome, g, at = first_linear_guard(tapes, k, watched.shape[0], d, hermite, room)
+            elif fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, room.polynomial):
                 outcome, g, at = first_guard(
-                    tapes, k, guard_rows, inputs, is_linear, guard_order, rtol, s, d, room.polynomial, watched, atol,
-                    side_now, order_now, floor_now, V, W, y1, room.a, room.b, room.stack,
+                    tapes, k, guard_rows, inputs, order, rtol, s, d, atol, watched, room
+                )
+            else:
+                outcome, g, at = OPEN, -1, 0.0
+            if outcome == OPEN:
+                return STOPPED, first_step, n_segments
+            if outcome == FOUND:
+                code, at = land(
+                    functions, tableau, tolerances, tapes, k, guard_rows, inputs, tapes.guards[k, g], s, at, d, p, z,
+                    is_holding, room,
                 )  # fmt: skip
-                if outcome == OPEN:
+                if code == LOST:
                     return STOPPED, first_step, n_segments
-                if outcome == FOUND:
-                    code, at = land(
-                        functions, tableau, tolerances, rows, guard_rows, flow_places, tapes.guards[k, g], s, at, d, y,
-                        p, z, is_holding, room, right,
-                    )  # fmt: skip
-                    if code == LOST:
-                        return STOPPED, first_step, n_segments
-                    if code == REJECTED:
-                        room.counts[1] += 1
-                        h = _HALF * at
-                        if s == 0.0:
-                            put(sides, side_now)
-                            put(orders, order_now)
-                            put(floors, floor_now)
-                        continue
-                    value, slope = W[tapes.guards[k, g], 0], W[tapes.guards[k, g], 1]
-                    d, is_last, fired, is_sure = at, False, g, code == LANDED
+                if code == REJECTED:
+                    room.counts[1] += 1
+                    h = _HALF * at
+                    if s == 0.0:
+                        put(sides, side_now)
+                        put(orders, order_now)
+                        put(floors, floor_now)
+                    continue
+                value, slope = W[tapes.guards[k, g], 0], W[tapes.guards[k, g], 1]
+                d, is_last, fired, is_sure = at, False, g, code == LANDED
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             for i in range(n):
                 for j in range(terms):
@@ -362,9 +341,8 @@ def rk_leap(
                     left[i, j] = right[i, j]
                 y[i] = y1[i]
                 scale[i] = max(scale[i], abs(y1[i]))
-            for i in range(watched.shape[0]):
-                for j in range(terms):
-                    room.guards_left[i, j] = W[watched[i], j]
+            if is_linear:
+                gather(watched, W, room.guards_left)
             n_steps += 1
             s = bound if is_last else s + d
         if is_holding:

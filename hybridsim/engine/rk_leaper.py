@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.guard_parts import GuardParts
-from hybridsim.engine.hermite import bernstein_weights, fit_all, right_system, shift_matrix
+from hybridsim.engine.hermite import Hermite, bernstein_weights, fit_all, right_system, shift_matrix
 from hybridsim.engine.leaper import NOT_LINEAR, Leaper
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rk_leap import rk_leap
@@ -19,6 +19,9 @@ from hybridsim.engine.stepping import Counters, Tolerances
 from hybridsim.engine.system import System
 
 TERMS = 4  # coefficients of the flow at each end of a step: the dense output has degree 7
+
+
+_HERMITE = packed(Hermite(shift_matrix(TERMS), right_system(TERMS), bernstein_weights(TERMS)))
 
 
 class Room(NamedTuple):
@@ -33,7 +36,9 @@ class Room(NamedTuple):
     left: np.ndarray
     right: np.ndarray
     polynomial: np.ndarray
+    polynomials: np.ndarray
     guards_left: np.ndarray
+    guards_right: np.ndarray
     lack: np.ndarray
     y: np.ndarray
     y1: np.ndarray
@@ -44,6 +49,7 @@ class Room(NamedTuple):
     z_after: np.ndarray
     p_after: np.ndarray
     watched: np.ndarray
+    numbers: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
     floors: np.ndarray
@@ -73,8 +79,7 @@ class RungeKuttaLeaper(Leaper):
         self.columns_of_room = max(order, leading[0] + 1) + 1
         super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.columns_of_room}")
         self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
-        matrices = (shift_matrix(TERMS), right_system(TERMS), bernstein_weights(TERMS))
-        self.method = (tableau.arrays, leading, tableau.error_order, matrices)
+        self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
         first = np.array([tolerances.first_step or 0.0])
         self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest, first)
 
@@ -92,12 +97,17 @@ class RungeKuttaLeaper(Leaper):
                 left=np.empty((n, TERMS)),
                 right=np.empty((n, TERMS)),
                 polynomial=np.empty((n, 2 * TERMS)),
+                polynomials=np.empty((guards, 2 * TERMS)),
                 guards_left=np.empty((guards, TERMS)),
+                guards_right=np.empty((guards, TERMS)),
                 lack=np.empty(TERMS),
                 **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes", "dx")},
                 z_after=np.empty(len(system.automata), dtype=np.int64),
                 p_after=np.empty(system.layout.size),
-                **{name: np.empty(guards, dtype=np.int64) for name in ("watched", "sides", "orders")},
+                **{
+                    name: np.empty(guards, dtype=np.int64)
+                    for name in ("watched", "numbers", "sides", "orders")
+                },
                 floors=np.empty(guards),
                 pace=np.empty(3),
                 memory=np.empty(3),

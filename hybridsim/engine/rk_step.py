@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.packs import packed
 
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 _LEAST = 1e-2  # an error below this share of the tolerance says nothing of how errors grow
 _NOTHING = 1e-9  # a coefficient that order conditions make zero, but for rounding
 SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
+
+
+class Coefficients(NamedTuple):
+    """The arrays of a tableau: nodes, matrix, and in rows the weights, those of the error, those of the low error."""
+
+    c: np.ndarray
+    a: np.ndarray
+    weights: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -34,10 +44,11 @@ class Tableau:
     error_order: int
     e_low: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
+    @cached_property
+    def packed(self) -> Any:
         """What `attempt` takes."""
-        return self.c, self.a, self.b, self.e, self.e_low
+        rows = [self.b, self.e, self.e_low] if self.e_low.size else [self.b, self.e]
+        return packed(Coefficients(self.c, np.ascontiguousarray(self.a), np.array(rows)))
 
     @property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
@@ -78,12 +89,13 @@ def attempt(
 ) -> float:
     """One step of length h from (s, x) with slope dx there; its end in `out`, its error in units of the tolerance.
 
-    tableau: c, a, b, e, e_low. tolerances: rtol, atol.
+    tableau: `Coefficients`. tolerances: rtol, atol.
     """
-    c, a, b, e, e_low = tableau
+    c, a, weights = tableau.c, tableau.a, tableau.weights
     rtol, atol = tolerances
     stages, n = c.shape[0], x.shape[0]
-    k[0] = dx
+    for m in range(n):
+        k[0, m] = dx[m]
     for i in range(1, stages):
         for m in range(n):
             total = 0.0
@@ -95,10 +107,10 @@ def attempt(
     for m in range(n):
         total, error, error_low = 0.0, 0.0, 0.0
         for j in range(stages):
-            total += b[j] * k[j, m]
-            error += e[j] * k[j, m]
-            if e_low.shape[0] > 0:
-                error_low += e_low[j] * k[j, m]
+            total += weights[0, j] * k[j, m]
+            error += weights[1, j] * k[j, m]
+            if weights.shape[0] > 2:
+                error_low += weights[2, j] * k[j, m]
         out[m] = x[m] + h * total
         scale = atol[m] + rtol * max(abs(x[m]), abs(out[m]))
         if scale > 0.0:

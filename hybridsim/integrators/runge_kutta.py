@@ -45,7 +45,7 @@ class RungeKuttaStepper(OneStepStepper):
         flow.counters.rhs_evaluations += len(self.tableau.c) - 1
         error = attempt(
             self._address,
-            self.tableau.arrays,
+            self.tableau.packed,
             start.s,
             h,
             start.x,

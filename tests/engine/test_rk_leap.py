@@ -13,8 +13,9 @@ from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
 from hybridsim.engine import loop
+from hybridsim.engine.dense_guards import stays_positive
 from hybridsim.engine.hermite import bernstein_weights, fit_all, hermite, right_system, shift_matrix
-from hybridsim.engine.rk_leap import first_length, stays_positive
+from hybridsim.engine.rk_leap import first_length
 from hybridsim.engine.rk_step import forget, next_length
 from hybridsim.integrators.dop853 import Dop853
 from hybridsim.integrators.registry import integrator_class
@@ -48,14 +49,17 @@ def test_what_is_called_positive_is() -> None:
     draw = np.random.default_rng(3)
     seen = missed = 0
     for _ in range(2000):
-        a, d = draw.normal(size=8), draw.uniform(0.1, 2)
-        a[0] = draw.uniform(0, 30)
-        low = np.polynomial.polynomial.polyval(np.linspace(0, d, 401), a).min()
-        if stays_positive(*ends(a, d), d, WEIGHTS):
+        a, d, order = draw.normal(size=8), draw.uniform(0.1, 2), int(draw.integers(3))
+        a[:order], a[order] = 0.0, draw.uniform(0, 30)
+        inside = np.linspace(0, d, 401)[1:]
+        low = (np.polynomial.polynomial.polyval(inside, a) / inside**order).min()
+        left, right = ends(a, d)
+        left[:order] = 1e-17 * draw.normal(size=order)  # zero by decree, whatever rounding made of it
+        if stays_positive(left, right, order, 0.0, d, WEIGHTS):
             assert low > 0
             seen += 1
         else:
-            missed += low > 1
+            missed += low > 2
     assert seen > 5 * missed
 
 
