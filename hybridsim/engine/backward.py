@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridsim.engine.decide import LEAVES
-from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.outcome import Outcome, Situation
+from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 
 

@@ -14,9 +14,9 @@ from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.linear_tables import TERMS, LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
+from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
 from hybridsim.engine.segment_end import State
-from hybridsim.engine.settle import Outcome
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant

@@ -17,11 +17,11 @@ from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
+from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
 from hybridsim.engine.segment_end import State
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
-from hybridsim.engine.settle import Outcome
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Leaps, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant

@@ -11,9 +11,10 @@ from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
-from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.settle import Settling
 from hybridsim.engine.start import settled_start
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System

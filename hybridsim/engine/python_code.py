@@ -126,7 +126,7 @@ class PythonCode:
                 raise
             except (ArithmeticError, ValueError):
                 continue
-            except Exception as fault:
+            except Exception as fault:  # a user's code may raise anything; told with its place
                 name = function_name(function)
                 message = f"the function {name} raised {type(fault).__name__}: {fault} at t = {t!r}"
                 remedy = f"call {name}(t, x, p) with the initial values to see where"

@@ -86,7 +86,7 @@ class Compiler:
         self.room[0] = 0.0
         try:
             rates(function, self.parts.states, t, x, p) if is_flow else number(function, t, x, p)
-        except Exception as fault:
+        except Exception as fault:  # a user's code may raise anything; the run ends with what it said
             failures.note(function, t, fault, True)
 
     def _take(self, function: Any, is_flow: bool) -> str:
@@ -127,7 +127,7 @@ class Compiler:
             try:
                 named = parameters(*to_fixed_tuple(given, count))
                 _put(function(t, state.copy(), named), out, at, width)
-            except Exception:
+            except Exception:  # the only clause that numba compiles; what it was is found out by calling it again
                 raised = True
             if raised:
                 if p[origin + 1] > 0.0:  # on the run, not in differences far from it

@@ -51,6 +51,7 @@ def parts_of(model: Model) -> Parts:
     assert model.flow is not None
     names = [p.name for p in model.parameters]
     try:
+        # mypy wants the names of a namedtuple written out
         parameters = namedtuple("Parameters", names)  # type: ignore[misc]
     except ValueError as fault:
         message = f"model {model.name}: its functions cannot get the parameters as p.name: {fault}"
@@ -119,7 +120,7 @@ class Forms:
         t, state, named = self.arguments(s, x, p)
         try:
             out[: parts.states] = rates(function, parts.states, t, state, named).tolist()
-        except Exception as fault:
+        except Exception as fault:  # a user's code may raise anything; told where the step is judged
             self.failures.note(function, t, fault, bool(p[parts.origin_at + 1]))
             out[: parts.states] = [math.nan] * parts.states
             return 1
@@ -146,7 +147,7 @@ class Forms:
         t, state, named = self.arguments(s, x, p)
         try:
             return number(function, t, state, named)
-        except Exception as fault:
+        except Exception as fault:  # a user's code may raise anything; told where the step is judged
             self.failures.note(function, t, fault, bool(p[self.parts.origin_at + 1]))
             return math.nan
 

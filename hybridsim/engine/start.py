@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsim.engine.settle import Outcome, Settling, Situation
+from hybridsim.engine.outcome import Outcome, Situation
+from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task
 

@@ -12,7 +12,7 @@ from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.system import System
 
 if TYPE_CHECKING:
-    from hybridsim.engine.settle import Outcome
+    from hybridsim.engine.outcome import Outcome
     from hybridsim.engine.timepair import Instant
     from hybridsim.engine.trajectory import Trajectory
 

@@ -10,8 +10,9 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.fixed_dense import StepDense
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.outcome import Situation
 from hybridsim.engine.pieces import Occurrence, Segment
-from hybridsim.engine.settle import Settling, Situation
+from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable

@@ -1,0 +1,58 @@
+"""What goes into the decision of an event and what comes out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass
+class Situation:
+    """Where an event happens: the state before it, and how well its instant is known."""
+
+    s: float
+    x: np.ndarray
+    p: np.ndarray
+    z: np.ndarray
+    x_error: np.ndarray
+    s_error: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """One transition of one component."""
+
+    component: int
+    guard: str
+    source: int
+    target: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+
+@dataclass
+class Outcome:
+    """What holds just after an event, or why nothing does."""
+
+    x: np.ndarray
+    p: np.ndarray
+    z: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    monitor_sides: np.ndarray
+    monitor_orders: np.ndarray
+    x_error: np.ndarray  # how well the states are known: what locating the event left over
+    guard_floors: np.ndarray  # the same for the guards and monitors that start from zero
+    monitor_floors: np.ndarray
+    changes: list[Change] = field(default_factory=list)
+    continuous: bool = False  # the flow went on without a jump: the step size may be kept
+    status: str = ""
+    message: str = ""
+    warnings: list[str] = field(default_factory=list)
+
+    def copy(self) -> Outcome:
+        """The same with arrays of its own."""
+        values: list[Any] = [v.copy() if isinstance(v, np.ndarray) else v for v in vars(self).values()]
+        return Outcome(*values)
