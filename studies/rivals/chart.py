@@ -1,0 +1,171 @@
+"""Error against time, a small chart for each scene, every marker with its name beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+
+from hybridsim.plot import style
+from rivals.race import Line
+from rivals.scenes import Scene
+
+_LOOKS = {
+    "ours": (style.PALETTE[0], "o", "hybridsim"),
+    "rival": (style.PALETTE[1], "s", "other libraries"),
+    "published": (style.PALETTE[2], "^", "published RK4, and tanh"),
+    "limit": (style.INK, "D", "closed form by hand"),
+}
+_FLOOR = 1e-17
+# where a name may stand beside its marker, in points: (x, y, horizontal, vertical)
+_PLACES = [
+    (dx, dy, "left" if dx > 0 else "right" if dx < 0 else "center", "center")
+    for reach in (0, 1, 2, 3)
+    for dx, dy in (
+        (6, 0 + 9 * reach),
+        (-6, 0 + 9 * reach),
+        (6, -9 * reach),
+        (-6, -9 * reach),
+        (0, 9 + 9 * reach),
+        (0, -9 - 9 * reach),
+    )
+]
+
+
+def charts(
+    scenes: Mapping[str, Scene], found: Mapping[str, Sequence[Line]], folder: Path
+) -> tuple[Path, Path]:
+    """Events alone against the error of their times, and with the grid against that of the states."""
+    return (
+        _picture(
+            scenes,
+            found,
+            folder / "speed-events.png",
+            "time, events alone",
+            "error of event times / T",
+            lambda line: (line.events.middle, line.errors.times) if line.events else None,
+        ),
+        _picture(
+            scenes,
+            found,
+            folder / "speed-grid.png",
+            "time, with 2000 states",
+            "error of states / amplitude",
+            lambda line: (line.grid.middle, line.errors.states),
+        ),
+    )
+
+
+def _picture(
+    scenes: Mapping[str, Scene],
+    found: Mapping[str, Sequence[Line]],
+    path: Path,
+    across: str,
+    up: str,
+    point: Callable[[Line], tuple[float, float] | None],
+) -> Path:
+    rows = math.ceil(len(found) / 2)
+    figure = style.figure(11.5, 3.4 * rows + 0.5)
+    panels = figure.subplots(rows, 2, squeeze=False).ravel()
+    drawn: list[tuple[Any, list[tuple[float, float, str, str]]]] = []
+    for panel, (name, lines) in zip(panels, found.items()):
+        points = []
+        for line in lines:
+            place = point(line) if line.method.shown else None
+            if place is None or not math.isfinite(place[1]):
+                continue
+            x, y = place[0], max(place[1], _FLOOR)
+            colour, marker, _ = _LOOKS[line.method.family]
+            right = line.errors.right is not False
+            panel.plot(
+                x,
+                y,
+                marker,
+                color=colour,
+                markersize=5.5,
+                markerfacecolor=colour if right else "white",
+                zorder=3,
+            )
+            points.append((x, y, line.method.label, colour))
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.margins(x=0.16, y=0.12)
+        style.dress(panel)
+        panel.set_title(scenes[name].title, fontsize=10, loc="left")
+        panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.yaxis.set_major_locator(LogLocator(numticks=7))
+        panel.yaxis.set_minor_formatter(NullFormatter())
+        panel.set_xlabel(across, fontsize=9)
+        panel.set_ylabel(up, fontsize=9)
+        drawn.append((panel, points))
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    families = {line.method.family for lines in found.values() for line in lines if line.method.shown}
+    handles = [
+        Line2D([], [], color=colour, marker=marker, linewidth=0, label=label)
+        for family, (colour, marker, label) in _LOOKS.items()
+        if family in families
+    ]
+    hollow = Line2D(
+        [],
+        [],
+        color=style.INK,
+        marker="o",
+        markerfacecolor="white",
+        linewidth=0,
+        label="hollow: wrong sequence of events",
+    )
+    figure.legend(handles=[*handles, hollow], loc="outside upper left", ncols=5, frameon=False, fontsize=9)
+    FigureCanvasAgg(figure).draw()
+    for panel, points in drawn:
+        _name(panel, points)
+    return style.save(figure, path)
+
+
+def _name(panel: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
+    """Names beside their markers, where they cover neither a marker nor another name."""
+    renderer = panel.figure.canvas.get_renderer()
+    pixels = panel.figure.dpi / 72
+    taken = []
+    for x, y, _, _ in points:
+        at = panel.transData.transform((x, y))
+        taken.append((at[0] - 4 * pixels, at[1] - 4 * pixels, at[0] + 4 * pixels, at[1] + 4 * pixels))
+    frame = panel.get_window_extent(renderer)
+    for x, y, label, colour in sorted(points, key=lambda p: -p[1]):
+        best: Any = None
+        for dx, dy, ha, va in _PLACES:
+            text = panel.annotate(
+                label,
+                (x, y),
+                (dx, dy),
+                textcoords="offset points",
+                ha=ha,
+                va=va,
+                fontsize=8,
+                color=colour,
+            )
+            box = text.get_window_extent(renderer)
+            inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
+            free = all(box.x1 < b[0] or box.x0 > b[2] or box.y1 < b[1] or box.y0 > b[3] for b in taken)
+            if inside and free:
+                best = box
+                if abs(dy) > 12:
+                    panel.annotate(
+                        "",
+                        (x, y),
+                        (dx * 0.9, dy),
+                        textcoords="offset points",
+                        arrowprops={"arrowstyle": "-", "color": style.MARK, "linewidth": 0.7},
+                    )
+                break
+            text.remove()
+        if best is not None:
+            taken.append((best.x0, best.y0, best.x1, best.y1))
+        else:
+            panel.annotate(label, (x, y), (6, 0), textcoords="offset points", fontsize=8, color=colour)

@@ -1,0 +1,123 @@
+"""The page of the study: how it was measured, the ratios, a table for each scene."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from rivals.race import Line, Times
+from rivals.ratios import Found, ratios
+from rivals.scenes import Scene
+from rivals.truth import Errors, Truth
+
+_LIBRARIES = ("numpy", "numba", "scipy", "scikit-sundae", "heyoka", "jax", "diffrax", "casadi", "pathsim")
+
+
+def page(
+    scenes: Mapping[str, Scene], truths: Mapping[str, Truth], found: Found, lacking: Sequence[str], text: str
+) -> str:
+    """The whole page; `text` holds {machine}, {ratios}, {overhead} and {scenes}."""
+    tables = [_scene_table(scenes[name], truths[name], lines) for name, lines in found.items()]
+    missing = f" Not installed: {', '.join(lacking)}." if lacking else ""
+    return text.format(
+        machine=machine() + missing,
+        ratios=_ratios(found),
+        overhead=_overhead(found),
+        scenes="\n\n".join(tables),
+    )
+
+
+def machine() -> str:
+    """Processor, versions and date."""
+    versions = []
+    for library in _LIBRARIES:
+        try:
+            versions.append(f"{library} {version(library)}")
+        except PackageNotFoundError:
+            continue
+    today = datetime.date.today().isoformat()
+    return f"{_processor()}, Python {platform.python_version()}, {', '.join(versions)}; {today}."
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def seconds(value: float) -> str:
+    """A time for people."""
+    for size, unit in ((1.0, "s"), (1e-3, "ms")):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e6:.3g} us"
+
+
+def _cells(times: Times | None) -> str:
+    return f"{seconds(times.middle)} | {seconds(times.least)}" if times and times.calls else "- | -"
+
+
+def _events(errors: Errors) -> str:
+    if errors.right is None:
+        return "none to judge"
+    if errors.right:
+        return f"{errors.times:.0e}"
+    count = abs(errors.missing or 0)
+    return (
+        f"**{count} {'missing' if errors.missing and errors.missing > 0 else 'spurious'}**"
+        if count
+        else "**wrong**"
+    )
+
+
+def _scene_table(scene: Scene, exact: Truth, lines: Sequence[Line]) -> str:
+    rows = [
+        f"### {scene.title}",
+        "",
+        f"{len(exact.t)} events; held against: {exact.title}.",
+        "",
+        "| method | events: median | least | with grid: median | least | first call | states | event times / T |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for line in sorted(lines, key=lambda line: (line.events or line.grid).middle):
+        rows.append(
+            f"| {line.method.label} | {_cells(line.events)} | {_cells(line.grid)} | {seconds(line.grid.building)} "
+            f"| {line.errors.states:.0e} | {_events(line.errors)} |"
+        )
+    return "\n".join(rows)
+
+
+def _ratios(found: Found) -> str:
+    rows = ["| ratio | asked | scene | times | ratio | |", "| --- | --- | --- | --- | --- | --- |"]
+    for r in ratios(found):
+        times = f"{seconds(r.second)} / {seconds(r.first)}"
+        rows.append(f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.note} |")
+    return "\n".join(rows)
+
+
+def _overhead(found: Found) -> str:
+    rows = [
+        "| scene | integrator | in all | compiled loop | rest |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name, lines in found.items():
+        for line in lines:
+            times = line.events
+            if (
+                line.method.family != "ours"
+                or not line.method.shown
+                or times is None
+                or not any(times.inside)
+            ):
+                continue
+            k = min(range(len(times.clock)), key=times.clock.__getitem__)
+            total, inside = times.clock[k], times.inside[k]
+            cells = [name, line.method.label, seconds(total), seconds(inside), seconds(total - inside)]
+            rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)

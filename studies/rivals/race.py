@@ -1,0 +1,117 @@
+"""Times all methods of a scene in turns, after each has run once and has been held against the exact motion."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from statistics import median
+from typing import Any
+
+from rivals.method import Method, Runs
+from rivals.scenes import Scene
+from rivals.truth import Errors, Truth
+
+_TURN, _MOST_CALLS = 0.01, 10  # a short run has several calls in its turn: as many as fill this time
+_ENOUGH = 2.5  # seconds that a run has in all; slow ones have fewer turns
+_LEAST = 2  # turns that even the slowest has
+
+
+@dataclass
+class Times:
+    """Seconds that the first call took on the clock; seconds of processor time of the later ones, of the same on the
+    clock, and inside a compiled loop, where it is known."""
+
+    first: float = 0.0
+    calls: list[float] = field(default_factory=list)
+    clock: list[float] = field(default_factory=list)
+    inside: list[float] = field(default_factory=list)
+
+    @property
+    def middle(self) -> float:
+        """The median."""
+        return median(self.calls)
+
+    @property
+    def least(self) -> float:
+        """The fastest."""
+        return min(self.calls)
+
+    @property
+    def building(self) -> float:
+        """What the first call took beyond the others."""
+        return max(self.first - median(self.clock), 0.0)
+
+
+@dataclass
+class Line:
+    """A method on a scene: its times with events alone and with the grid, and its errors."""
+
+    method: Method
+    errors: Errors
+    events: Times | None
+    grid: Times
+
+
+def race(
+    scene: Scene, exact: Truth, methods: Iterable[Method], turns: int, say: Callable[[str], None]
+) -> list[Line]:
+    """The lines of a scene."""
+    lines: list[Line] = []
+    running: list[tuple[Times, Callable[[], Any], Runs]] = []
+    for method in methods:
+        began = time.perf_counter()
+        runs = method.start(scene)
+        if runs is None:
+            continue
+        outcome = runs.grid()
+        first = Times(time.perf_counter() - began)
+        errors = exact.errors(scene, runs.read(outcome), method.has_modes)
+        say(f"  {method.label}: first call {first.first:.3g} s, {described(errors)}")
+        events = Times() if runs.events is not None else None
+        lines.append(Line(method, errors, events, first))
+        if runs.events is not None and events is not None:
+            alone = exact.errors(scene, runs.read(runs.events()), method.has_modes)
+            # states are of the run with the grid, events of that without
+            if errors.right and not alone.right:
+                say(f"  {method.label}: with events alone {described(alone)}")
+            lines[-1].errors = replace(alone, states=errors.states)
+            running.append((events, runs.events, runs))
+        running.append((first, runs.grid, runs))
+    _turns(running, turns)
+    return lines
+
+
+def _turns(running: list[tuple[Times, Callable[[], Any], Runs]], turns: int) -> None:
+    gc.collect()
+    gc.freeze()
+    try:
+        for turn in range(turns):
+            for times, call, runs in running:
+                if turn >= _LEAST and sum(times.calls) > _ENOUGH:
+                    continue
+                gc.collect()
+                gc.disable()
+                for _ in range(_MOST_CALLS):
+                    clock, began = time.perf_counter(), time.process_time()
+                    outcome = call()
+                    times.calls.append(time.process_time() - began)
+                    times.clock.append(time.perf_counter() - clock)
+                    if runs.parts is not None:
+                        times.inside.append(runs.parts(outcome))
+                    if times.calls[-1] > _TURN / _MOST_CALLS and sum(times.calls[-_MOST_CALLS:]) > _TURN:
+                        break
+    finally:
+        gc.enable()
+        gc.unfreeze()
+
+
+def described(errors: Errors) -> str:
+    """Errors in words."""
+    if errors.right is None:
+        return f"states {errors.states:.1e}, no modes"
+    if not errors.right:
+        wrong = f"{errors.missing:+d} events missing" if errors.missing else "other modes"
+        return f"states {errors.states:.1e}, WRONG: {wrong}"
+    return f"states {errors.states:.1e}, times {errors.times:.1e} T"

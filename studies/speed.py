@@ -1,0 +1,67 @@
+"""How fast hybridsim is: its integrators, what else there is, and the closed form written by hand, side by side.
+
+    python studies/speed.py [--scenes P1,belt] [--methods exact,heyoka] [--turns 15] [--out DIR]
+
+One run, one process; calls of all methods of a scene take turns. All give the same: once the events and the states at
+them, once the states at 2000 times besides. Writes docs/studies/speed.md and its pictures (or DIR).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rivals.chart import charts
+from rivals.every import methods
+from rivals.page import page
+from rivals.race import race
+from rivals.scenes import NAMES, scene
+from rivals.truth import truth
+
+ROOT = Path(__file__).parents[1]
+
+
+def main() -> None:
+    """Run the study."""
+    options = _options()
+    every, lacking = methods()
+    if options.methods:
+        wanted = options.methods.split(",")
+        every = [method for method in every if any(method.name.startswith(name) for name in wanted)]
+    if lacking:
+        print("not installed, left out:", ", ".join(lacking))
+    began = time.perf_counter()
+    scenes, truths, found = {}, {}, {}
+    for name in options.scenes.split(","):
+        here = scene(name)
+        exact = truth(here, options.truth)
+        print(
+            f"{name}: {len(exact.t)} events, {exact.title} ({time.perf_counter() - began:.0f} s)", flush=True
+        )
+        lines = race(here, exact, every, options.turns, lambda text: print(text, flush=True))
+        scenes[name], truths[name], found[name] = here, exact, lines
+    text = (Path(__file__).parent / "rivals" / "page_text.md").read_text()
+    written = page(scenes, truths, found, lacking, text)
+    (options.out / "studies").mkdir(parents=True, exist_ok=True)
+    (options.out / "images").mkdir(exist_ok=True)
+    (options.out / "studies" / "speed.md").write_text(written)
+    charts(scenes, found, options.out / "images")
+    print(f"done in {time.perf_counter() - began:.0f} s")
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--scenes", default=",".join(NAMES), help="which scenes")
+    parser.add_argument("--methods", default="", help="which methods, by the beginning of their names")
+    parser.add_argument("--turns", type=int, default=15, help="turns of each method")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs", help="where studies/ and images/ are")
+    parser.add_argument("--truth", type=Path, default=None, help="folder where exact motions are kept")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
