@@ -47,4 +47,4 @@ def method(
 
         return Runs(events, on_grid, read, lambda outcome: outcome[0].stats["kernel_time"])
 
-    return Method(name, text, "rival" if "cvode" in integrator else "ours", start, shown=shown)
+    return Method(name, text, "ours", start, shown=shown)

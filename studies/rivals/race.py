@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
 from typing import Any
 
-from rivals.method import Method, Runs
+from rivals.method import Method
 from rivals.scenes import Scene
 from rivals.truth import Errors, Truth
 
 _TURN, _MOST_CALLS = 0.01, 10  # a short run has several calls in its turn: as many as fill this time
-_ENOUGH = 2.5  # seconds that a run has in all; slow ones have fewer turns
+_ENOUGH = 1.0  # seconds that a run has in all; slow ones have fewer turns
 _LEAST = 2  # turns that even the slowest has
 
 
@@ -44,6 +44,10 @@ class Times:
         return max(self.first - median(self.clock), 0.0)
 
 
+# Where its times go, the run, and what tells of its outcome the seconds in a compiled loop.
+Running = tuple[Times, Callable[[], Any], Callable[[Any], float] | None]
+
+
 @dataclass
 class Line:
     """A method on a scene: its times with events alone and with the grid, and its errors."""
@@ -59,7 +63,7 @@ def race(
 ) -> list[Line]:
     """The lines of a scene."""
     lines: list[Line] = []
-    running: list[tuple[Times, Callable[[], Any], Runs]] = []
+    running: list[Running] = []
     for method in methods:
         began = time.perf_counter()
         runs = method.start(scene)
@@ -77,18 +81,19 @@ def race(
             if errors.right and not alone.right:
                 say(f"  {method.label}: with events alone {described(alone)}")
             lines[-1].errors = replace(alone, states=errors.states)
-            running.append((events, runs.events, runs))
-        running.append((first, runs.grid, runs))
-    _turns(running, turns)
+            running.append((events, runs.events, runs.parts))
+        running.append((first, runs.grid, runs.parts))
+    take_turns(running, turns)
     return lines
 
 
-def _turns(running: list[tuple[Times, Callable[[], Any], Runs]], turns: int) -> None:
+def take_turns(running: Sequence[Running], turns: int) -> None:
+    """Call each run again and again, in turns over all of them."""
     gc.collect()
     gc.freeze()
     try:
         for turn in range(turns):
-            for times, call, runs in running:
+            for times, call, parts in running:
                 if turn >= _LEAST and sum(times.calls) > _ENOUGH:
                     continue
                 gc.collect()
@@ -98,8 +103,8 @@ def _turns(running: list[tuple[Times, Callable[[], Any], Runs]], turns: int) -> 
                     outcome = call()
                     times.calls.append(time.process_time() - began)
                     times.clock.append(time.perf_counter() - clock)
-                    if runs.parts is not None:
-                        times.inside.append(runs.parts(outcome))
+                    if parts is not None:
+                        times.inside.append(parts(outcome))
                     if times.calls[-1] > _TURN / _MOST_CALLS and sum(times.calls[-_MOST_CALLS:]) > _TURN:
                         break
     finally:

@@ -17,7 +17,7 @@ Piece = tuple[Callable[[float, Any], Any], list[Any], Callable[[int, float, Any]
 
 # A slip starts with v = v' = 0 on its own guard, and rounding may take it to the wrong side. So the guard is raised by
 # this much of a velocity's size. Without it P1 loses fourteen events.
-_OFFSET = 1e-13
+OFFSET = 1e-13
 
 
 def method(rtol: float, shown: bool = True) -> Method:
@@ -26,7 +26,7 @@ def method(rtol: float, shown: bool = True) -> Method:
     def start(scene: Scene) -> Runs:
         physics = scene.physics
         rubbing = isinstance(physics, Friction)
-        system = _Rubbing(physics, _OFFSET * scene.velocity) if rubbing else _Striking(physics)
+        system = Rubbing(physics, OFFSET * scene.velocity) if rubbing else Striking(physics)
         atol = [rtol * 1e-3 * (state.nominal or 1.0) for state in scene.model.states]
         grid = scene.grid
 
@@ -77,8 +77,8 @@ def _terminal(guard: Callable[[float, Any], float]) -> Any:
     return guard
 
 
-class _Rubbing:
-    """Modes are tuples of signs, 0 for stick."""
+class Rubbing:
+    """Masses that rub, mode by mode: tuples of signs, 0 for stick."""
 
     def __init__(self, physics: Friction, raised: float) -> None:
         self.raised = raised
@@ -163,8 +163,8 @@ def _several(physics: Friction, push: Any, slip: Any, mode: tuple[int, ...]) -> 
     return flow
 
 
-class _Striking:
-    """One mode."""
+class Striking:
+    """The mass that strikes a wall, in its one mode."""
 
     def __init__(self, physics: Any) -> None:
         self.physics = physics
