@@ -13,58 +13,11 @@ from typing import Any
 import numba
 import numpy as np
 
+from rivals.decomposition import decomposed, full_matrix
 from rivals.method import Method, Result, Runs
 from rivals.scenes import Scene
 
-_SHARE = 12  # grid points in the shortest of the periods: a guard bends but once between two
-
-
-def _matrices(p: dict[str, float]) -> np.ndarray:
-    """The full system x' = A x + ..., without friction."""
-    c, k, kc = p["c"], p["k"], p["kc"]
-    return np.array([[0, 1, 0, 0], [-(k + kc), -c, kc, 0], [0, 0, 0, 1], [kc, 0, -(k + kc), -c]], dtype=float)
-
-
-def _decomposed(full: np.ndarray, F0: float, w: float) -> tuple[np.ndarray, ...]:
-    """Per pattern (bit j: mass j is held): eigenvalues, vectors, their inverse, and the responses.
-
-    A held mass has no rates: its velocity is zero, and its place acts on the other as a constant. So every pattern is
-    x' = B x + constant friction + drive, with the rows of held masses zero. The two phasors with a positive imaginary
-    part are kept, twice their real part is the sum; what is zero is constant.
-    """
-    rates, vectors, inverses, centres, responses = [], [], [], [], []
-    for pattern in range(4):
-        free = [j for j in (0, 1) if not pattern >> j & 1]
-        index = [i for j in free for i in (2 * j, 2 * j + 1)]
-        held = [2 * j for j in (0, 1) if j not in free]
-        lam, vec = np.zeros(2, dtype=complex), np.zeros((4, 2), dtype=complex)
-        inv, centre = np.zeros((2, 4), dtype=complex), np.zeros((4, 4))
-        response = np.zeros(4, dtype=complex)
-        if free:
-            block = full[np.ix_(index, index)]
-            values, right = np.linalg.eig(block)
-            upper = [i for i in range(len(values)) if values[i].imag > 0]
-            left = np.linalg.inv(right)
-            for slot, i in enumerate(upper):
-                lam[slot], vec[index, slot], inv[slot, index] = values[i], right[:, i], left[i]
-            # at rest: block centre = -(what held masses and friction put in); columns: places held, friction forces
-            inside = -np.linalg.inv(block)
-            for column in held:
-                centre[index, column] = inside @ full[index, column]
-            for j in free:
-                push = np.zeros(len(index))
-                push[index.index(2 * j + 1)] = -1.0
-                centre[index, 2 * j + 1] = inside @ push
-            drive = np.zeros(len(index), dtype=complex)
-            if 0 in free:
-                drive[index.index(1)] = F0
-            response[index] = np.linalg.solve(1j * w * np.eye(len(index)) - block, drive)
-        rates.append(lam)
-        vectors.append(vec)
-        inverses.append(inv)
-        centres.append(centre)
-        responses.append(response)
-    return tuple(np.array(rows) for rows in (rates, vectors, inverses, centres, responses))
+_SHARE = 8  # grid points in the shortest of the periods: a guard bends but once between two
 
 
 @numba.njit(cache=True)
@@ -129,6 +82,17 @@ def _value(row: Any, c: Any, rates: Any, s: float) -> tuple[float, float, float]
     return value, slope, bend
 
 
+@numba.njit(cache=True, inline="always")
+def _cubic_zero(h: float, v0: float, slope0: float, v1: float, slope1: float) -> float:
+    """Where the cubic through both ends of an interval is zero, from its start; v0 > 0 >= v1."""
+    a, b = h * slope0, h * slope1
+    c2, c3 = 3.0 * (v1 - v0) - 2.0 * a - b, 2.0 * (v0 - v1) + a + b
+    u = v0 / (v0 - v1)
+    for _ in range(3):
+        u -= (v0 + u * (a + u * (c2 + u * c3))) / (a + u * (2.0 * c2 + u * 3.0 * c3))
+    return u * h
+
+
 @numba.njit(cache=True)
 def _follow(
     full: Any,
@@ -190,9 +154,11 @@ def _follow(
         for q in range(3):
             now[q] = c[q]
         for g in range(number):
+            before[g], slopes[g] = rows[g, 0].real, 0.0
             for q in range(3):
                 steep_rows[g, q] = rates[q] * rows[g, 1 + q]
-            before[g], slopes[g], _ = _value(rows[g], c, rates, 0.0)
+                before[g] += (rows[g, 1 + q] * c[q]).real
+                slopes[g] += (steep_rows[g, q] * c[q]).real
             if kinds[g, 1] == 0 and kinds[g, 0] == released:
                 before[g] = 0.0
         s, left = 0.0, end - start
@@ -218,7 +184,10 @@ def _follow(
                     if _value(rows[g], c, rates, dip)[0] <= 0.0:
                         high = dip
                 if high < math.inf:
-                    at = high if high < s else s - (value / slope if slope < 0.0 else 0.5 * h)
+                    if high == s and before[g] > 0.0:
+                        at = low + _cubic_zero(h, before[g], slopes[g], value, slope)
+                    else:
+                        at = high if high < s else s - (value / slope if slope < 0.0 else 0.5 * h)
                     for _ in range(80):
                         if not low < at < high:
                             at = 0.5 * (low + high)
@@ -288,8 +257,8 @@ def method() -> Method:
         if scene.name != "two-masses":
             return None
         p = scene.model.parameter_values()
-        full, F0, w = _matrices(p), p["F0"], p["omega"]
-        tables = _decomposed(full, F0, w)
+        full, F0, w = full_matrix(p), p["F0"], p["omega"]
+        tables = decomposed(full, F0, w)
         limits = np.array([p["L1"], p["L2"]])
         h = 2 * math.pi / max(w, float(np.max(tables[0].imag))) / _SHARE
         grid, none, nothing = scene.grid, np.empty(0), np.empty((0, 4))

@@ -70,17 +70,17 @@ def _rubbing(scene: Scene, tolerance: float, offset: float, rows: list[Any], sta
         plain = physics.push(math)
 
         def call(ta: Any, _: int) -> bool:
-            t = ta.time
-            if pars[2 * j + 1]:
-                after = FORWARD if plain(t, state)[j] > 0 else BACKWARD
-            else:
-                state[v] = belt
-                force = plain(t, state)[j]
+            t, x = ta.time, state.tolist()  # floats of Python are faster than those of NumPy
+            if modes[j]:
+                state[v] = x[v] = belt
+                force = plain(t, x)[j]
                 after = STICK if abs(force) <= limit else FORWARD if force > 0 else BACKWARD
-            pars[2 * j] = after
+            else:
+                after = FORWARD if plain(t, x)[j] > 0 else BACKWARD
+            modes[j] = pars[2 * j] = after
             pars[2 * j + 1] = after == 0
             rows.append((t, j, after))
-            states.append(state.tolist())
+            states.append(x)
             return True
 
         return call
@@ -90,13 +90,14 @@ def _rubbing(scene: Scene, tolerance: float, offset: float, rows: list[Any], sta
         for j, guard in enumerate(guards)
     ]
     integrator = hy.taylor_adaptive(
-        system, list(physics.x0), pars=[0.0] * (2 * n), tol=tolerance, t_events=events
+        system, list(physics.x0), pars=[0.0] * (2 * n), tol=tolerance, fast_math=True, t_events=events
     )
     state, pars = integrator.state, integrator.pars
+    modes = [0] * n
     first = []
     for j, force in enumerate(physics.push(math)(0.0, physics.x0)):
         moving = physics.x0[2 * j + 1] - physics.belts[j]
-        sign = np.sign(moving or (force if abs(force) > physics.limits[j] else 0.0))
+        sign = int(np.sign(moving or (force if abs(force) > physics.limits[j] else 0.0)))
         first += [sign, sign == 0]
 
     def begin() -> None:
@@ -106,6 +107,7 @@ def _rubbing(scene: Scene, tolerance: float, offset: float, rows: list[Any], sta
         integrator.reset_cooldowns()
         state[:] = physics.x0
         pars[:] = first
+        modes[:] = first[::2]
 
     return integrator, begin
 
@@ -124,7 +126,7 @@ def _striking(scene: Scene, tolerance: float, offset: float, rows: list[Any], st
         return True
 
     event = hy.t_event(physics.wall - x, callback=call, direction=hy.event_direction.negative)
-    integrator = hy.taylor_adaptive(system, list(physics.x0), tol=tolerance, t_events=[event])
+    integrator = hy.taylor_adaptive(system, list(physics.x0), tol=tolerance, fast_math=True, t_events=[event])
     state = integrator.state
 
     def begin() -> None:

@@ -25,6 +25,7 @@ def page(
     return text.format(
         machine=machine() + missing,
         ratios=_ratios(found),
+        wrong=_wrong(found),
         overhead=_overhead(found),
         scenes="\n\n".join(tables),
     )
@@ -99,6 +100,18 @@ def _ratios(found: Found) -> str:
         times = f"{seconds(r.second)} / {seconds(r.first)}"
         rows.append(f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.note} |")
     return "\n".join(rows)
+
+
+def _wrong(found: Found) -> str:
+    rows = []
+    for name, lines in found.items():
+        for line in lines:
+            if line.errors.right is False:
+                rows.append(
+                    f"| {name} | {line.method.label} | {_events(line.errors)} | {line.errors.states:.0e} |"
+                )
+    head = ["| scene | method | events | states, last period |", "| --- | --- | --- | --- |"]
+    return "\n".join([*head, *rows]) if rows else "None."
 
 
 def _overhead(found: Found) -> str:
