@@ -48,6 +48,7 @@ def charts(
             folder / "speed-events.png",
             "time, events alone",
             "error of event times / T",
+            "not drawn: wrong sequence of events",
             lambda line: (line.events.middle, line.errors.times) if line.events else None,
         ),
         _picture(
@@ -56,6 +57,7 @@ def charts(
             folder / "speed-grid.png",
             "time, with 2000 states",
             "error of states / amplitude",
+            "hollow: wrong sequence of events",
             lambda line: (line.grid.middle, line.errors.states),
         ),
     )
@@ -67,6 +69,7 @@ def _picture(
     path: Path,
     across: str,
     up: str,
+    wrong: str,
     point: Callable[[Line], tuple[float, float] | None],
 ) -> Path:
     rows = math.ceil(len(found) / 2)
@@ -119,7 +122,7 @@ def _picture(
         marker="o",
         markerfacecolor="white",
         linewidth=0,
-        label="hollow: wrong sequence of events",
+        label=wrong,
     )
     figure.legend(handles=[*handles, hollow], loc="outside upper left", ncols=5, frameon=False, fontsize=9)
     FigureCanvasAgg(figure).draw()

@@ -55,6 +55,7 @@ def methods() -> tuple[list[Method], list[str]]:
         closed_form_two_states.method(),
         closed_form_four_states.method(),
         ours.method("exact"),
+        ours.method("exact", label="exact, with objects", shown=False, objects=True),
         ours.method("taylor", 1e-12),
         ours.method("taylor", 1e-10, shown=False),
         ours.method("taylor", 1e-11, shown=False),

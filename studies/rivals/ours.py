@@ -12,10 +12,16 @@ _AFTER = {"stick": STICK, "slip+": FORWARD, "slip-": BACKWARD, "free": STRUCK}
 
 
 def method(
-    integrator: str, rtol: float | None = None, label: str = "", shown: bool = True, **options: Any
+    integrator: str,
+    rtol: float | None = None,
+    label: str = "",
+    shown: bool = True,
+    objects: bool = False,
+    **options: Any,
 ) -> Method:
-    """An integrator at a tolerance."""
+    """An integrator at a tolerance; objects: with `sol.events`, an object for each event, with its states."""
     name = integrator if rtol is None else f"{integrator}@{rtol:.0e}"
+    name += "+objects" if objects else ""
     text = label or (integrator if rtol is None else f"{integrator} {rtol:.0e}".replace("e-0", "e-"))
 
     def start(scene: Scene) -> Runs | None:
@@ -26,7 +32,8 @@ def method(
 
         def events() -> Any:
             sol = hs.simulate(model, span, save="events", **keywords)
-            return sol, [sol.event_times(name) for name in components], None
+            found = sol.events if objects else [sol.event_times(name) for name in components]
+            return sol, found, None
 
         def on_grid() -> Any:
             sol = hs.simulate(model, span, t_eval=grid, **keywords)
