@@ -31,6 +31,7 @@ _ACCEPT = 2.0**-30
 _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
 _MOST_PIECES = 200_000  # a guard that needs more oscillates some 20 000 times within one step
+_CLOSEST = 40  # halvings toward the start of a step in search of a value that rounding has not made
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 
 # Chebyshev points of the second kind on [0, 1]
@@ -193,6 +194,21 @@ def quiet(
     return result
 
 
+def _before(
+    sample: Callable[[np.ndarray], np.ndarray], theta: float, side: int, rounding: Callable[[], float]
+) -> float:
+    """A point up to theta at which a function that starts from zero is still on its side, theta itself if need be.
+
+    The leading coefficient is known by decree; where it is within the bound of the representation a zero close to the
+    start has been made nothing of, and what is known of the function are its values.
+    """
+    if side * sample(np.array([theta]))[0] > 0.0:
+        return theta
+    places = theta * 2.0 ** -np.arange(1.0, _CLOSEST)
+    certain = np.flatnonzero(side * sample(places) > rounding())
+    return float(places[certain[0]]) if len(certain) else theta
+
+
 def find_roots(
     sample: Callable[[np.ndarray], np.ndarray],
     first: np.ndarray,
@@ -209,7 +225,7 @@ def find_roots(
     sample : callable, thetas (k,) -> values (k,)
     first : values at `POINTS` over the whole step
     order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
-    rounding : bound of the rounding error of one value; asked for only where halving a piece does not help
+    rounding : bound of the rounding error of one value; asked for only where nothing else tells
     floor : what the location of the last event leaves uncertain, where the function starts from zero
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
@@ -257,6 +273,8 @@ def find_roots(
                 last = int(sign)
             elif sign != last:
                 start = open_from if open_from >= 0.0 else x
+                if a == 0.0 and order > 0:
+                    start = _before(sample, start, last, rounding)
                 crossings.append(Crossing(start, x, int(sign)))
                 last = int(sign)
                 if stop_at_first == sign:

@@ -264,6 +264,19 @@ def test_what_has_just_fired_does_not_fire_again_from_rounding(
         assert search.roots[0] == pytest.approx(root, abs=1e-14 / root**order)
 
 
+@pytest.mark.parametrize("floor", [0.0, 1e-12])
+@pytest.mark.parametrize("root", [1e-6, 1e-9, 1e-11])
+def test_a_zero_next_to_a_decreed_one_is_where_the_values_change_sign(root: float, floor: float) -> None:
+    """The rate at the start is within the bound of the representation; the values tell, down to rounding."""
+
+    def f(theta: np.ndarray) -> np.ndarray:
+        return theta * (root - theta) / (1.2 + np.cos(1000 * theta))
+
+    search = Search(f, order=1, side=1, stop=-1, floor=floor, rounding=1e-30)
+    assert [c.direction for c in search.crossings] == [-1]
+    assert search.roots[0] == pytest.approx(root, rel=1e-12)
+
+
 def test_a_decreed_side_holds_even_where_the_first_value_is_of_the_other_sign() -> None:
     """v = 0 by decree and rising, computed as -1e-17 at the start."""
     search = Search(lambda theta: theta * (1.0 + theta) - 1e-17, order=1, side=1, stop=-1)
