@@ -95,7 +95,7 @@ def _scene_table(scene: Scene, exact: Truth, lines: Sequence[Line]) -> str:
 
 
 def _ratios(found: Found) -> str:
-    rows = ["| ratio | asked | scene | times | ratio | |", "| --- | --- | --- | --- | --- | --- |"]
+    rows = ["| ratio | aim | scene | times | ratio | |", "| --- | --- | --- | --- | --- | --- |"]
     for r in ratios(found):
         times = f"{seconds(r.second)} / {seconds(r.first)}"
         rows.append(f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.note} |")

@@ -1,4 +1,4 @@
-"""The ratios that are asked of the engine, from the lines of one run."""
+"""The ratios that the engine aims at, from the lines of one run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BOUND = 1e-11
 
 @dataclass(frozen=True)
 class Ratio:
-    """What is compared on a scene, with the smaller and the larger side's times in seconds, and what was asked."""
+    """What is compared on a scene, with the smaller and the larger side's times in seconds, and the aim."""
 
     what: str
     scene: str
