@@ -46,7 +46,8 @@ if ENABLED:
                 words += (array.ctypes.data, *array.shape, *_REST[array.ndim])
             self.table = np.array(words, dtype=np.int64)
             self.address = self.table.ctypes.data
-            self.numba_type = _type_of_arrays(type(arrays), tuple((a.dtype, a.ndim) for a in arrays))
+            kind: Any = type(arrays)
+            self.numba_type = _type_of_arrays(kind, tuple((a.dtype, a.ndim) for a in arrays))
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self.arrays, name)
@@ -68,8 +69,8 @@ if ENABLED:
             return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
 
     @cache
-    def _type_of_arrays(kind: type, fields: tuple[tuple[np.dtype, int], ...]) -> PackType:
-        named = zip(kind._fields, fields, strict=True)  # type: ignore[attr-defined]  # of a named tuple
+    def _type_of_arrays(kind: Any, fields: tuple[tuple[np.dtype, int], ...]) -> PackType:
+        named = zip(kind._fields, fields, strict=True)
         return PackType(kind.__name__, tuple((name, str(dtype), n) for name, (dtype, n) in named))
 
     @typeof_impl.register(Packed)

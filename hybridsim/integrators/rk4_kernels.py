@@ -104,8 +104,8 @@ def rk4_step(
     rule, every_stage, eps = law
     k, states, modes, surfaces, guards = work
     stage, n = states[0], x.shape[0]
-    for c in range(z.shape[0]):
-        modes[c] = z[c]
+    for i in range(z.shape[0]):
+        modes[i] = z[i]
     slope(addresses, rule, table, s, x, p, modes, k[0], states[1])
     for j in range(1, 4):
         c = 0.5 if j < 3 else 1.0
