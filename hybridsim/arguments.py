@@ -44,6 +44,8 @@ def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
     """Real numbers in one dimension."""
     if not is_row(value):
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf":
+        return value.astype(float)
     return np.array([number(item, f"a value of {what}", remedy) for item in value], dtype=float)
 
 

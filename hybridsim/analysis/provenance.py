@@ -16,7 +16,8 @@ _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 def provenance(model: Model) -> dict[str, Any]:
     """Versions, machine and model of a result, ready for JSON.
 
-    The hash is that of the model written out, with the parameters and initial values of this run.
+    The hash is that of the model written out, with the parameters and initial values of this run; None for a model of
+    Python functions, which has no text.
     """
     from hybridsim import __version__
 
@@ -28,7 +29,7 @@ def provenance(model: Model) -> dict[str, Any]:
         "processor": platform.machine(),
         "cpus": os.cpu_count(),
         "model": model.name,
-        "model_sha256": hashlib.sha256(model.to_toml().encode()).hexdigest(),
+        "model_sha256": None if model.flow else hashlib.sha256(model.to_toml().encode()).hexdigest(),
     }
 
 

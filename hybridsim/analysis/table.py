@@ -126,6 +126,16 @@ def _form_notes(comparison: Comparison) -> list[str]:
     return lines
 
 
+def turns(count: int) -> str:
+    """How many turns a time is the median of, in words."""
+    return "one turn" if count == 1 else f"median over {count} turns"
+
+
+def _hash(facts: Mapping[str, Any]) -> str:
+    text = facts.get("model_sha256")
+    return f"SHA-256 {text[:12]}..." if text else "made of Python functions"
+
+
 def _notes(comparison: Comparison) -> list[str]:
     unit = "periods T" if comparison.period else "the model's unit of time"
     facts = comparison.provenance
@@ -136,9 +146,9 @@ def _notes(comparison: Comparison) -> list[str]:
         *_graph_notes(comparison),
         *_form_notes(comparison),
         *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
-        f"Wall time of a call: median over {comparison.repeat} turns of all rows, of several calls where short,",
+        f"Wall time of a call: {turns(comparison.repeat)} of all rows, of several calls where short,",
         f"after a warm-up; fewer turns of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
         versions(facts),
-        f"model {facts.get('model')}, SHA-256 {str(facts.get('model_sha256'))[:12]}...",
+        f"model {facts.get('model')}, {_hash(facts)}",
         *(f"warning: {warning}" for warning in comparison.warnings),
     ]

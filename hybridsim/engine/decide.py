@@ -51,6 +51,16 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 
 @inlined
+def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int) -> int:
+    """A candidate's verdict so far, and with one more guard, whose side just after is known."""
+    if side < 0:
+        return LEAVES
+    if side == 0 and verdict == FINE and open_question(series, bounds, decreed):
+        return UNDECIDED
+    return verdict
+
+
+@inlined
 def judge(
     series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
 ) -> int:
@@ -69,33 +79,37 @@ def judge(
         else:
             side, order = side_after(series[g], bounds[g], decreed[g])
         sides[g], orders[g] = side, order
-        if side < 0:
-            verdict = LEAVES
-        elif side == 0 and verdict == FINE and open_question(series[g], bounds[g], decreed[g]):
-            verdict = UNDECIDED
+        verdict = verdict_with(verdict, series[g], bounds[g], decreed[g], side)
     return verdict
 
 
-@kernel
+@inlined
+def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
+    """Rank of a joint candidate of n components: most keep their mode, and then most hold; n*(n + 1) if all keep it."""
+    kept, held = 0, 0
+    for i in range(n):
+        kept += modes[i] == current[i]
+        held += modes[i] == holds[i]
+    return held + (n + 1) * kept
+
+
+@inlined
 def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
     """Choose among joint candidates: rows of `modes`, one column for each component of the cluster.
 
     The current modes stay if admissible (undecided counts: what is open keeps its mode); else, among the
-    certainly admissible, most components keep their mode and then most hold; a tie is NONUNIQUE. Candidates
-    that are merely undecided are taken only where none is certain. NONE if there is none at all.
+    certainly admissible, those of the highest `preference`; a tie is NONUNIQUE. Candidates that are merely undecided
+    are taken only where none is certain. NONE if there is none at all.
     """
     best, best_score, ties = -1, -1, 0
     n = modes.shape[1]
     for c in range(modes.shape[0]):
         if verdicts[c] == LEAVES:
             continue
-        kept, held = 0, 0
-        for i in range(n):
-            kept += modes[c, i] == current[i]
-            held += modes[c, i] == holds[i]
-        if kept == n:
+        rank = preference(modes[c], current, holds, n)
+        if rank >= n * (n + 1):
             return c
-        score = held + (n + 1) * (kept + (n + 1) * (verdicts[c] == FINE))
+        score = rank + (n + 1) * (n + 1) * (verdicts[c] == FINE)
         if score > best_score:
             best, best_score, ties = c, score, 0
         elif score == best_score:
@@ -106,25 +120,35 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
 
 
 @inlined
+def decreed_zeros(is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool) -> int:
+    """How many leading coefficients of a guard of a candidate mode the event decrees to be zero.
+
+    is_first: the first guard of a mode beside a surface is that surface. is_on: the surface is zero; is_holding: the
+    candidate holds it; is_smooth: the component is released from it and all unknowns stay as they were, so that the
+    surface starts with a zero rate as well. is_fired: the guard was located at zero and its mode goes on.
+    """
+    if is_first and is_on and not is_holding:
+        return 2 if is_smooth else 1
+    return 1 if is_fired else 0
+
+
+@kernel
 def decree_orders(
     guards_of: Any, holding: Any, on_surface: Any, released: Any, continuous: bool, fired: Any, decreed: Any
 ) -> None:
-    """Count the leading zeros that the event decrees for the guards of one candidate.
+    """Count the leading zeros that the event decrees for the guards of one candidate; see `decreed_zeros`.
 
     guards_of (components, widest): active guard numbers, -1 where none; holding[c]: component c holds its surface
     in this candidate; on_surface[c]: its surface is zero; released[c]: c leaves its holding mode here;
-    continuous: every change of this candidate leaves the unknowns as they were, so that a released surface starts
-    with a zero rate as well; fired[g]: guard g was located at zero and its mode goes on.
-    The first guard of a mode beside a surface is that surface.
+    continuous: every change of this candidate leaves the unknowns as they were; fired[g]: guard g was located at zero
+    and its mode goes on.
     """
     for c in range(guards_of.shape[0]):
         for j in range(guards_of.shape[1]):
             g = guards_of[c, j]
-            if g < 0:
-                continue
-            decreed[g] = 1 if fired[g] else 0
-            if on_surface[c] and not holding[c] and j == 0:
-                decreed[g] = 2 if released[c] and continuous else 1
+            if g >= 0:
+                smooth = released[c] and continuous
+                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, fired[g])
 
 
 def joint_candidates(sizes: list[int]) -> np.ndarray:

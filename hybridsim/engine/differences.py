@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import allocating_kernel, call, kernel
 
 # Weights of f(k h) - f(-k h), for even derivatives of f(k h) + f(-k h) - 2 f(0), k = 1..4, over k! of the derivative:
 # the better formula, then the one on seven points that it is held against.
@@ -63,7 +63,7 @@ def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any
     call(function, s + moving * h, x, p, z, out)
 
 
-@kernel
+@allocating_kernel
 def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, low: Any, high: Any) -> Any:
     """Rounding (m,) of a function's values, that of its arguments included; t is the whole time."""
     m, n = low.shape[0], C.shape[0]
@@ -87,7 +87,7 @@ def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, lo
     return noise
 
 
-@kernel
+@allocating_kernel
 def along(
     function: Any, s: float, t: float, moving: float, C: Any, p: Any, z: Any, D: Any, B: Any, H: Any
 ) -> None:
@@ -159,7 +159,7 @@ def along(
                 D[i, k], B[i, k] = np.nan, np.nan
 
 
-@kernel
+@allocating_kernel
 def _path(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, C: Any, E: Any, H: Any) -> None:
     """Taylor coefficients C (n, 4) of the states along the flow with bounds E, and steps H (n, 4) of their rates."""
     D, B = np.empty_like(C), np.empty_like(C)
@@ -174,7 +174,7 @@ def _path(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, C: Any, E: Any,
         E[:, 1] = B[:, 0]
 
 
-@kernel
+@allocating_kernel
 def _series(
     flow: Any,
     watched: Any,
@@ -195,7 +195,7 @@ def _series(
         along(watched, s, t, 1.0, C, p, z, G, GE, np.empty_like(G))
 
 
-@kernel
+@allocating_kernel
 def run_differences(
     flow: Any, watched: Any, s: float, t: float, s_error: float, x: Any, x_error: Any, p: Any, z: Any, C: Any, G: Any,
     GE: Any,
@@ -242,7 +242,7 @@ def run_differences(
                 GE[i, ORDER] += slope * E[j, 2] / H[j, 1]
 
 
-@kernel
+@allocating_kernel
 def run_jacobian(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
     """d(dx/dt)/dx (n, n)."""
     n = x.shape[0]

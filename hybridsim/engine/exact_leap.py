@@ -17,23 +17,31 @@ from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_kernels import (
     first_zero,
     functions_of_time,
+    guard_terms,
     moved,
+    slopes_of,
     state_sizes,
     states_of,
     to_modal,
 )
+from hybridsim.engine.linear_tables import TERMS
 from hybridsim.engine.ordinary_event import Before, find_modes, put
-from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import is_crowded, moved_on, settle_and_move_on, state_errors
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
 
 
 class Room(NamedTuple):
-    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), a state."""
+    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state.
+
+    hints (K, G): how long a segment lasted that a guard ended.
+    """
 
     c: np.ndarray
     v: np.ndarray
     terms: np.ndarray
+    starts: np.ndarray
+    hints: np.ndarray
     y: np.ndarray
     y1: np.ndarray
     y_error: np.ndarray
@@ -69,28 +77,41 @@ def first_exit_of(
     sides: Any,
     orders: Any,
     floors: Any,
+    hints: Any,
+    starts: Any,
     room: Any,
     v: Any,
 ) -> tuple[int, float]:
     """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
 
-    All guards are followed up to one horizon, and then to one four times as far: most stay positive for long.
+    The guard that falls fastest goes first: the others need to be followed no farther than it lasts. All are followed
+    up to one horizon, and then to one four times as far: most stay positive for long.
     """
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
-    horizon = bound
-    if last - first > 1:
-        for i in range(first, last):
-            horizon = min(horizon, lin.farthest[k, tapes.active[i]])
+    lead, soonest, horizon = first, math.inf, bound
+    for i in range(first, last):
+        g = tapes.active[i]
+        start = starts[i - first]
+        start[TERMS], start[TERMS + 1] = guard_terms(lin, k, g, c, start)
+        if start[1] < 0.0 and -start[0] < soonest * -start[1]:
+            lead, soonest = i, start[0] / -start[1]
+        if last - first > 1:
+            horizon = min(horizon, lin.farthest[k, g])
     while True:
         fired, s = _NONE, min(horizon, bound)
-        for i in range(first, last):
+        for j in range(first, last):
+            i = lead if j == first else (j - 1 if j <= lead else j)
             g = tapes.active[i]
-            outcome, at = first_zero(lin, k, g, c, s, sides[g], orders[g], floors[g], room, v)
+            outcome, at = first_zero(
+                lin, k, g, c, s, sides[g], orders[g], floors[g], hints[k, g], starts[i - first], room, v
+            )
             if outcome == OPEN:
                 return _OPEN, at
             if outcome == FOUND:
                 fired, s = g, at
         if fired >= 0 or horizon >= bound:
+            if fired >= 0:
+                hints[k, fired] = s
             return fired, s
         horizon *= 4.0
 
@@ -117,6 +138,7 @@ def exact_leap(
     segments and events are written to.
     """
     rates, origin_at, phases_at, discrete_at, n_discrete = places
+    place = (origin_at, phases_at)
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
     c, v, terms, scale, slopes = room.c, room.v, room.terms, room.scale, room.slopes
@@ -126,6 +148,10 @@ def exact_leap(
     n, n_segments = x.shape[0], 0
     pace = room.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
+    hints, is_known = room.hints, False
+    for k in range(hints.shape[0]):
+        for g in range(hints.shape[1]):
+            hints[k, g] = 0.0
     while True:
         k = find_modes(tapes.modes, z)
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
@@ -135,10 +161,11 @@ def exact_leap(
             return STOPPED, n_segments
         if n_segments >= ends.shape[0]:
             return FULL, n_segments
-        set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
-        functions_of_time(lin, 0.0, 0.0, p, work.factors, work.w, work.w_error)
+        if not is_known:
+            set_origin(place, rates, clock[0], clock[1], p)
+            functions_of_time(lin, 0.0, 0.0, p, work.factors, work.w, work.w_error)
         to_modal(lin, k, x, work.w, c)
-        fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, terms, v)
+        fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, hints, room.starts, terms, v)
         if fired == _OPEN:
             return STOPPED, n_segments
         if s > longest:
@@ -171,18 +198,27 @@ def exact_leap(
             return AT_TARGET, n_segments + 1
         if is_crowded(s, clock, pace):
             return STOPPED, n_segments
+        # the event is settled at the origin of the segment that follows, whose functions of time these are
+        high, low = clock[0], clock[1]
+        clock[0], clock[1] = moved_on(high, low, s)
+        set_origin(place, rates, clock[0], clock[1], p)
         s_error = 2.0 * 2.0**-52 * s
-        functions_of_time(lin, s, 0.0, p, work.factors, work.w, work.w_error)
+        functions_of_time(lin, 0.0, s_error, p, work.factors, work.w, work.w_error)
         value, slope = _value_and_slope(lin, k, fired, y, work.w)
-        if slope != 0.0 and math.isfinite(value / slope):
-            s_error = max(s_error, abs(value / slope))
-        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, y_error)
-        event = Before(s, s_error, y, y_error, p, z)
+        if abs(value) > s_error * abs(slope) and slope != 0.0 and math.isfinite(value / slope):
+            s_error = abs(value / slope)
+            functions_of_time(lin, 0.0, s_error, p, work.factors, work.w, work.w_error)
+        slopes_of(lin, k, y, work.w, slopes)
+        state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
+        event = Before(0.0, s_error, y, y_error, p, z)
         if not settle_and_move_on(
             functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,
             (y1, slopes, z1, p1),
         ):  # fmt: skip
+            clock[0], clock[1] = high, low
+            set_origin(place, rates, high, low, p)
             return STOPPED, n_segments
+        is_known = automata.hold[automata.owner[fired]] >= 0  # others may have changed what is in p
         put(y1, jumps[n_segments, 2])
         n_segments += 1
 

@@ -91,6 +91,8 @@ class ExactLeaper:
             c=np.zeros(widest, dtype=complex),
             v=np.zeros(widest, dtype=complex),
             terms=np.zeros((2, TERMS)),
+            starts=np.zeros((self.system.guard_count, TERMS + 2)),
+            hints=np.zeros(tables.farthest.shape),
             z=np.empty(len(self.system.automata), dtype=np.int64),
             p=np.empty(self.system.layout.size),
             pace=np.empty(3),

@@ -10,26 +10,25 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from hybridsim.engine.jit import kernel
 
 NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, a question of rounding
 _DEEPEST = 40  # halvings; a piece that narrow and still open is a touch
 _POLISH = 100  # iterations: bisection alone needs 53
+_NEAR = 1e-10  # relative change by Newton's method that leaves an error below rounding, even where the slope halves
 
 
 @kernel
 def to_bernstein(a: Any, b: Any) -> None:
     """Bernstein coefficients b_j = sum_{k<=j} C(j, k)/C(n, k) a_k of sum_k a_k theta**k, n the degree."""
     n = a.shape[0] - 1
-    b[:] = a
+    b[0] = a[0]
     binomial = 1.0
     for k in range(1, n + 1):
         binomial *= (n - k + 1.0) / k
         b[k] = a[k] / binomial
-    for k in range(n, 0, -1):  # from differences to values: sums over Pascal's triangle
-        for j in range(k, n + 1):
+    for k in range(1, n + 1):  # from differences to values: sums over Pascal's triangle
+        for j in range(n, k - 1, -1):  # backward, so that no sum waits for another
             b[j] += b[j - 1]
 
 
@@ -39,7 +38,8 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
 
     The first `order` coefficients are zero by decree and the next is positive; error bounds the distance of p from the
     function that it stands for. (NEVER, 1) where p stays above the bound; (FOUND, theta); (OPEN, theta) where it comes
-    within the bound without a certain change of sign up to the next certain one, or at the end.
+    within the bound without a certain change of sign up to the next certain one, or at the end. b (m,), stack (64, m +
+    2): room for m coefficients, and for pieces with their left ends and widths.
     """
     m = a.shape[0] - order
     for i in range(m):
@@ -52,12 +52,11 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
     if order > 0:
         b[0] = max(b[0], 2.0 * error)  # positive by decree, whatever rounding made of it
     to_bernstein(b[:m], stack[0, :m])
-    positions, widths = np.empty(_DEEPEST + 2), np.empty(_DEEPEST + 2)
-    positions[0], widths[0] = 0.0, 1.0
+    stack[0, m], stack[0, m + 1] = 0.0, 1.0
     top, touched, last = 1, -1.0, 0.0
     while top > 0:
         top -= 1
-        left, width = positions[top], widths[top]
+        left, width = stack[top, m], stack[top, m + 1]
         low, high = math.inf, -math.inf
         for i in range(m):
             low, high = min(low, stack[top, i]), max(high, stack[top, i])
@@ -82,8 +81,8 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
             stack[top, m - 1 - step] = b[m - 1 - step]
             for i in range(m - 1 - step):
                 b[i] = 0.5 * (b[i] + b[i + 1])
-        positions[top], widths[top] = left + 0.5 * width, 0.5 * width
-        positions[top + 1], widths[top + 1] = left, 0.5 * width
+        stack[top, m], stack[top, m + 1] = left + 0.5 * width, 0.5 * width
+        stack[top + 1, m], stack[top + 1, m + 1] = left, 0.5 * width
         top += 2
     return (NEVER, 1.0) if touched < 0.0 else (OPEN, touched)
 
@@ -116,10 +115,10 @@ def polished(a: Any, order: int, left: float, right: float) -> float:
             right = theta
         else:
             return theta
-        moved = theta - value / slope if slope != 0.0 else math.nan
+        moved, near = theta - value / slope if slope != 0.0 else math.nan, _NEAR
         if not left < moved < right:
-            moved = 0.5 * (left + right)
-        if abs(moved - theta) <= 2.0**-53 * theta or not left < moved < right:
+            moved, near = 0.5 * (left + right), 2.0**-53
+        if abs(moved - theta) <= near * theta or not left < moved < right:
             return moved
         theta = moved
     return theta

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import allocating_kernel, kernel
 from hybridsim.engine.stepping import Dense
 
 
@@ -80,7 +80,7 @@ def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack:
     return total < math.inf
 
 
-@kernel
+@allocating_kernel
 def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
     """`fit_in_time` for many steps: steps (m, 2) with lengths last, ends (m, n, 2 K) left series and then right."""
     count = shift.shape[0]
@@ -89,7 +89,7 @@ def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
         fit_in_time(ends[i, :, :count], ends[i, :, count:], steps[i, 1], shift, inverse, lack, out[i])
 
 
-@kernel
+@allocating_kernel
 def _evaluate(
     c: np.ndarray, s0: float, s1: float, left: np.ndarray, right: np.ndarray, s: np.ndarray
 ) -> np.ndarray:

@@ -334,8 +334,9 @@ def run_series(
     """
     constants, values, parameters = inputs.constants, inputs.values, inputs.parameters
     sources, phases, time, states = inputs.sources, inputs.phases, inputs.time[0], inputs.states
-    V[:] = 0.0
-    E[:] = 0.0
+    for r in range(V.shape[0]):
+        for k in range(V.shape[1]):
+            V[r, k], E[r, k] = 0.0, 0.0
     for i in range(constants.shape[0]):
         V[constants[i], 0], E[constants[i], 0] = values[i, 0], values[i, 1]
     for i in range(parameters.shape[0]):

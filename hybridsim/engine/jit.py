@@ -44,7 +44,11 @@ if ENABLED:
             numba.config.CACHE_DIR = previous
 
     def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-        """A kernel with numba's options; literal arguments make versions of it, which run up to twice as fast."""
+        """A kernel with numba's options; literal arguments make versions of it, which run up to twice as fast.
+
+        Without the option `_nrt` each read of an array from a pack would be two calls that count references, across
+        which nothing stays in a register.
+        """
         return _with_cache_folder(
             str(kernel_folder()),
             lambda: numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function),
@@ -52,15 +56,19 @@ if ENABLED:
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile a function of the engine once, cached on disk; division by zero gives inf or nan, as in numpy."""
-        return _compiled(function)
+        return _compiled(function, _nrt=False)
+
+    def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """A kernel that makes arrays of its own."""
+        return _compiled(function, _nrt=True)
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
         """A short kernel, made part of its callers."""
-        return _compiled(function, forceinline=True)
+        return _compiled(function, forceinline=True, _nrt=False)
 
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
-        return _compiled(function, forceinline=True, fastmath={"contract"})
+        return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
 
     def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
         """Compile one generated function; return its address and the object that keeps it alive."""
@@ -95,7 +103,7 @@ else:
         """Leave the function as it is: the compiler is switched off."""
         return function
 
-    inlined = polynomial_kernel = kernel
+    inlined = allocating_kernel = polynomial_kernel = kernel
 
     def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""

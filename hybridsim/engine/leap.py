@@ -275,7 +275,8 @@ def leap(
                 state_at(states, order, d, V, y1)
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             for i in range(n):
-                series[n_steps, i] = V[states[i]]
+                for j in range(order + 1):
+                    series[n_steps, i, j] = V[states[i], j]
             n_steps += 1
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
             if outcome == FOUND:
@@ -283,7 +284,8 @@ def leap(
             put(y1, y)
             for i in range(n):
                 scale[i] = max(scale[i], abs(y1[i]))
-            side_now[:], order_now[:], floor_now[:] = 1, 0, 0.0
+            for g in range(side_now.shape[0]):
+                side_now[g], order_now[g], floor_now[g] = 1, 0, 0.0
         if holding(automata, z):
             call(functions.project, s, y, p, z, y1)
             put(y1, y)
@@ -305,7 +307,8 @@ def leap(
         value, slope = value_and_slope(rows, flow_places, tapes.guards[k, fired], s, y, W)
         if slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
-        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, y_error)
+        call(functions.flow, s, y, p, z, slopes)
+        state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
         at = Before(s, s_error, y, y_error, p, z)
         if not settle_and_move_on(
             functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), at, fired, clock, state, work,

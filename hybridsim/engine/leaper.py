@@ -238,7 +238,7 @@ class TaylorLeaper(Leaper):
                 W=np.zeros((registers, order + 1)),
                 a=np.empty(order + 1),
                 b=np.empty(order + 1),
-                stack=np.empty((64, order + 1)),
+                stack=np.empty((64, order + 3)),
                 z=np.empty(count, dtype=np.int64),
                 p=np.empty(system.layout.size),
                 floors=np.empty(guards),

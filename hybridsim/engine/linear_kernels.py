@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
-from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import inlined, kernel, polynomial_kernel
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jit import allocating_kernel, inlined, kernel, polynomial_kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_tables import TERMS
 
@@ -21,6 +21,11 @@ _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
 _POLISH = 6  # iterations of it from nearby
 _SAFE = 0.95  # to end on the safe side
+_HALVINGS = 5
+# a monomial x**i on [0, 1] in Bernstein form of degree TERMS - 1: C(j, i)/C(TERMS - 1, i)
+_BERNSTEIN = np.array(
+    [[math.comb(j, i) / math.comb(TERMS - 1, i) for j in range(TERMS)] for i in range(TERMS)]
+)
 
 
 @inlined
@@ -75,18 +80,22 @@ def linear_series(
     lin: Any, tapes: Any, k: int, x: Any, x_error: Any, w: Any, w_error: Any, values: Any, bounds: Any
 ) -> None:
     """Taylor coefficients of the active guards of the modes in row k at y = (x, w), with bounds."""
-    n = x.shape[0]
+    n, count = x.shape[0], w.shape[0]
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
-        for j in range(ORDER + 1):
-            values[g, j], bounds[g, j] = 0.0, 0.0
-        for m in range(n + w.shape[0]):
+        rows, roundings = lin.series[k, g], lin.roundings[k, g]
+        # written out, for the sums to stay in registers: there are ORDER + 1 = 4 coefficients
+        v0 = v1 = v2 = v3 = e0 = e1 = e2 = e3 = 0.0
+        for m in range(n + count):
             y, error = (x[m], x_error[m]) if m < n else (w[m - n], w_error[m - n])
             size = abs(y) + error
-            for j in range(ORDER + 1):
-                row = lin.series[k, g, m, j]
-                values[g, j] += row * y
-                bounds[g, j] += abs(row) * error + lin.roundings[k, g, m, j] * size
+            r0, r1, r2, r3 = rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3]
+            v0, e0 = v0 + r0 * y, e0 + (abs(r0) * error + roundings[m, 0] * size)
+            v1, e1 = v1 + r1 * y, e1 + (abs(r1) * error + roundings[m, 1] * size)
+            v2, e2 = v2 + r2 * y, e2 + (abs(r2) * error + roundings[m, 2] * size)
+            v3, e3 = v3 + r3 * y, e3 + (abs(r3) * error + roundings[m, 3] * size)
+        values[g, 0], values[g, 1], values[g, 2], values[g, 3] = v0, v1, v2, v3
+        bounds[g, 0], bounds[g, 1], bounds[g, 2], bounds[g, 3] = e0, e1, e2, e3
 
 
 @inlined
@@ -121,7 +130,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
         j = end
 
 
-@kernel
+@allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
     """A block of several coordinates: exp(mean d) times the series of the rest, in parts where that is large."""
     size = end - first
@@ -167,6 +176,19 @@ def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
             b = lin.basis[k, i, j]
             total += b.real * c[j].real - b.imag * c[j].imag
         x[i] = total
+
+
+@inlined
+def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
+    """Rates of the states at y = (x, w)."""
+    n = x.shape[0]
+    for i in range(n):
+        total = 0.0
+        for m in range(n):
+            total += lin.slopes[k, i, m] * x[m]
+        for m in range(w.shape[0]):
+            total += lin.slopes[k, i, n + m] * w[m]
+        out[i] = total
 
 
 @inlined
@@ -261,25 +283,94 @@ def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
     return d if left_out <= 0.25 * UNIT * size else math.nan
 
 
+@inlined
+def stays_positive(terms: Any, first: int, rest: float, d: float, backward: Any) -> bool:
+    """Whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], m the number of terms.
+
+    By its coefficients in Bernstein form there. backward: room for them.
+    """
+    for j in range(TERMS):
+        backward[j] = 0.0
+    power, total = 1.0, 0.0
+    for i in range(TERMS - first):
+        value = terms[first + i] * power
+        power *= d
+        total += abs(value)
+        for j in range(TERMS):
+            backward[j] += _BERNSTEIN[i, j] * value
+    lowest = rest * power + 2.0 * TERMS * UNIT * total
+    for j in range(TERMS):
+        if not backward[j] > lowest:
+            return False
+    return True
+
+
+@inlined
+def falls_over(terms: Any, rest: float, longest: float) -> float:
+    """How far on either side a guard falls at least half as fast as here, by its Taylor polynomial; 0 if not at all."""
+    steepness = -terms[1]
+    if not steepness > 0.0:
+        return 0.0
+    d = min(longest, 0.25 * steepness / abs(terms[2])) if terms[2] != 0.0 else longest
+    for _ in range(_HALVINGS):
+        change, power = TERMS * rest * d ** (TERMS - 1), 1.0
+        for i in range(2, TERMS):
+            power *= d
+            change += i * abs(terms[i]) * power
+        if change <= 0.5 * steepness:
+            return d
+        d *= 0.5
+    return 0.0
+
+
 @kernel
 def first_zero(
-    lin: Any, k: int, g: int, c: Any, bound: float, side: int, order: int, floor: float, room: Any, v: Any
+    lin: Any,
+    k: int,
+    g: int,
+    c: Any,
+    bound: float,
+    side: int,
+    order: int,
+    floor: float,
+    hint: float,
+    start: Any,
+    room: Any,
+    v: Any,
 ) -> tuple[int, float]:
     """When a guard first goes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s): a question of rounding.
 
-    The guard is positive just after 0; its first `order` coefficients are zero by decree, to within `floor`. From point
-    to point it is bounded from below by its Taylor polynomial less the largest remainder, so that no zero is jumped
-    over; once the polynomial holds to rounding up to the zero, that is the polynomial's. room (2, TERMS), v: scratch.
+    The guard is positive just after 0; its first `order` coefficients are zero by decree, to within `floor`. start: its
+    Taylor coefficients at 0, and behind them the bounds that come with them. hint: where it may be zero (0: no idea);
+    if it is, and positive up to there for certain, that is the zero. Else, from point to point, the guard is bounded
+    from below by its Taylor polynomial less the largest remainder, so that no zero is jumped over; once the polynomial
+    holds to rounding up to the zero, that is the polynomial's. room (2, TERMS), v: scratch.
     """
     terms, lower = room[0], room[1]
-    size, rest = guard_terms(lin, k, g, c, terms)
+    size, rest = start[TERMS], start[TERMS + 1]
     if not size < math.inf:
         return OPEN, 0.0
     if size == 0.0 and side >= 0:
         return NEVER, bound
-    if side <= 0 or order >= TERMS - 3 or not terms[order] > 0.0:
+    if side <= 0 or order >= TERMS - 3 or not start[order] > 0.0:
         return OPEN, 0.0
     farthest, grown = lin.farthest[k, g], lin.grown[k, g]
+    margin = (16.0 + 2.0 * lin.counts[k]) * UNIT
+    if bound <= farthest and stays_positive(start, order, grown * rest, bound, lower):
+        return NEVER, bound
+    if 0.0 < hint <= farthest:
+        moved(lin, k, c, hint, v)
+        size_there, rest_there = guard_terms(lin, k, g, v, terms)
+        error = margin * size_there + floor
+        d = zero_of_terms(terms, grown * rest_there, size_there, lower)
+        if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
+            width = falls_over(terms, grown * rest_there, hint)
+            if abs(d) < width and (
+                width == hint or stays_positive(start, order, grown * rest, hint - width, lower)
+            ):
+                return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
+    for i in range(TERMS):
+        terms[i] = start[i]
     s = 0.0
     while True:
         d = safe_step(terms, order, grown * rest, min(bound - s, farthest), lower)
@@ -290,7 +381,7 @@ def first_zero(
         s += d
         moved(lin, k, c, s, v)
         size, rest = guard_terms(lin, k, g, v, terms)
-        error = (16.0 + 2.0 * lin.counts[k]) * UNIT * size + floor
+        error = margin * size + floor
         order, floor = 0, 0.0
         d = zero_of_terms(terms, grown * rest, size, lower)
         # beyond the zero the guard has to go below what its error could hide

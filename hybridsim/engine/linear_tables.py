@@ -16,8 +16,8 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import UsageError
 
-TERMS = 10  # of the series that bounds a guard from below
-_FARTHEST = 6.0  # in units of the fastest rate: the bound by so few terms ends before
+TERMS = 16  # of the series that bounds a guard from below
+_FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 _ROUNDINGS = (
     8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
@@ -33,7 +33,8 @@ class LinearTables(NamedTuple):
     y of size 1. counts (K,), values (K, J), upper (K, J, J), ends (K, J): the flow in modal coordinates; basis (K, n,
     J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
     in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
-    the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor.
+    the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor. slopes (K,
+    n, n + M): rates of the states.
     """
 
     kinds: np.ndarray
@@ -58,6 +59,7 @@ class LinearTables(NamedTuple):
     rests: np.ndarray
     farthest: np.ndarray
     grown: np.ndarray
+    slopes: np.ndarray
 
 
 class LinearMode:
@@ -99,7 +101,7 @@ def no_tables() -> LinearTables:
         np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f), np.zeros(0, i),
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0), c), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)),
     ))  # fmt: skip
     return tables
 
@@ -162,6 +164,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon:
             rests=rests,
             farthest=farthest,
             grown=grown,
+            slopes=np.array([A[:n] for A in matrices]).reshape(count, n, size),
         )
     )
     return tables

@@ -12,7 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.decide import FINE, NONE, NONUNIQUE, choose, decree_orders, judge, side_after
+from hybridsim.engine.decide import (
+    FINE,
+    LEAVES,
+    NONE,
+    NONUNIQUE,
+    choose,
+    decreed_zeros,
+    preference,
+    side_after,
+    verdict_with,
+)
 from hybridsim.engine.jets import ORDER, UNIT, run_series
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.linear_kernels import functions_of_time, linear_series
@@ -33,9 +43,10 @@ class Functions(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one event: series with bounds (registers, 4), guards' rows of them, vectors of flags, candidates.
+    """Room for one event: series with bounds (registers, 4), guards' rows of them, what holds after it, candidates.
 
-    factors, w, w_error: functions of time of linear modes. The last ones have a row for each joint candidate.
+    factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled. sides,
+    orders, floors (G,): of the guards just after it. The last ones have a row for each joint candidate.
     """
 
     V: np.ndarray
@@ -45,14 +56,10 @@ class Work(NamedTuple):
     w_error: np.ndarray
     values: np.ndarray
     bounds: np.ndarray
-    decreed: np.ndarray
-    active: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
-    fired: np.ndarray
-    holding: np.ndarray
+    floors: np.ndarray
     on_surface: np.ndarray
-    released: np.ndarray
     jumps: np.ndarray
     out: np.ndarray
     everything: np.ndarray
@@ -60,9 +67,9 @@ class Work(NamedTuple):
     current: np.ndarray
     holds: np.ndarray
     trial: np.ndarray
-    table: np.ndarray
     asked: np.ndarray
     candidates: np.ndarray
+    ranks: np.ndarray
     verdicts: np.ndarray
     smooth: np.ndarray
     all_sides: np.ndarray
@@ -107,19 +114,19 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
     Linear modes have them as rows over states and functions of time, which the work space holds at this time; other
     modes by the tape.
     """
+    values, bounds = work.values, work.bounds
     if lin.kinds.shape[0] > 0:
-        linear_series(lin, tapes, k, x, x_error, work.w, work.w_error, work.values, work.bounds)
+        linear_series(lin, tapes, k, x, x_error, work.w, work.w_error, values, bounds)
         return
+    V, E = work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
-    run_series(
-        constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, work.V, work.E
-    )
+    run_series(constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, V, E)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         r = tapes.guards[k, g]
-        for j in range(work.values.shape[1]):
-            work.values[g, j], work.bounds[g, j] = work.V[r, j], work.E[r, j]
+        for j in range(values.shape[1]):
+            values[g, j], bounds[g, j] = V[r, j], E[r, j]
 
 
 @inlined
@@ -153,31 +160,43 @@ def is_continuous(
 
 
 @inlined
-def decree(automata: Any, at: Any, z: Any, fired: int, is_on: bool, continuous: bool, work: Any) -> None:
-    """Leading zeros of all guards in the candidate z; `is_on`: the located guard is still to be crossed."""
-    work.fired[:] = False
-    work.fired[fired] = is_on and z[automata.owner[fired]] == at.z[automata.owner[fired]]
-    for c in range(z.shape[0]):
-        work.holding[c] = automata.hold[c] >= 0 and z[c] == automata.hold[c]
-        work.released[c] = is_release(automata, at.z, z, c, fired)
-        for j in range(work.table.shape[1]):
-            work.table[c, j] = automata.guards_of[c, z[c], j]
-    work.decreed[:] = 0
-    decree_orders(
-        work.table, work.holding, work.on_surface, work.released, continuous, work.fired, work.decreed
-    )
+def judge_members(
+    automata: Any,
+    at: Any,
+    z: Any,
+    members: Any,
+    fired: int,
+    is_on: bool,
+    continuous: bool,
+    work: Any,
+    sides: Any,
+    orders: Any,
+    floors: Any,
+) -> int:
+    """Verdict on the guards of some components in the candidate z; sides, orders and bounds of all guards' values.
 
-
-@inlined
-def judge_members(automata: Any, z: Any, members: Any, work: Any) -> int:
-    """Verdict on the guards of some components; their sides and orders stay in the work space."""
-    work.active[:] = False
+    is_on: the located guard is still to be crossed. continuous: all unknowns stay as they were.
+    """
+    values, bounds, on_surface = work.values, work.bounds, work.on_surface
+    guards_of, hold = automata.guards_of, automata.hold
+    verdict = FINE
+    for g in range(sides.shape[0]):
+        sides[g], orders[g], floors[g] = 1, 0, 0.0
     for i in range(members.shape[0]):
         c = members[i]
-        for j in range(automata.guards_of.shape[2]):
-            if automata.guards_of[c, z[c], j] >= 0:
-                work.active[automata.guards_of[c, z[c], j]] = True
-    return judge(work.values, work.bounds, work.decreed, work.active, False, work.sides, work.orders)
+        is_holding = hold[c] >= 0 and z[c] == hold[c]
+        is_smooth = continuous and is_release(automata, at.z, z, c, fired)
+        for j in range(guards_of.shape[2]):
+            g = guards_of[c, z[c], j]
+            if g < 0:
+                continue
+            is_fired = is_on and g == fired and z[c] == at.z[c]
+            zeros = decreed_zeros(j == 0, on_surface[c], is_holding, is_smooth, is_fired)
+            side, order = side_after(values[g], bounds[g], zeros)
+            sides[g], orders[g] = side, order if order <= ORDER else 0
+            floors[g] = bounds[g, 0] if order > 0 else 0.0
+            verdict = verdict_with(verdict, values[g], bounds[g], zeros, side)
+    return verdict
 
 
 @inlined
@@ -202,62 +221,65 @@ def settle_ordinary(
     lin: Any,
     at: Any,
     fired: int,
-    n_discrete: int,
-    discrete_at: int,
+    discrete: Any,
     x: Any,
     x_error: Any,
     z: Any,
     p: Any,
     work: Any,
 ) -> tuple[int, bool]:
-    """What holds just after the event, written to x, x_error, z and p; (SETTLED, whether the flow goes on smoothly).
+    """What holds just after the event, written to x, x_error and z; (SETTLED, whether the flow goes on smoothly).
 
-    NOT_ORDINARY leaves the event to others, whatever has been written. Sides, orders and bounds of the guards' values
-    in the new modes are in the work space.
+    A transition of a component without a surface may change the run-time vector: it is written to p then. NOT_ORDINARY
+    leaves the event to others, whatever has been written. Sides, orders and floors of the guards in the new modes are
+    in the work space. discrete: how many discrete states there are and where in p.
     """
     put(at.x, x)
     put(at.x_error, x_error)
     put(at.z, z)
-    put(at.p, p)
-    work.on_surface[:] = False
+    on_surface, sides, orders, floors = work.on_surface, work.sides, work.orders, work.floors
+    for i in range(on_surface.shape[0]):
+        on_surface[i] = False
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
-    if lin.kinds.shape[0] > 0:
-        functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
-    if tapes.active_start[k + 1] - tapes.active_start[k] > 1:
+    is_known = tapes.active_start[k + 1] - tapes.active_start[k] > 1
+    if is_known:
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
         if not is_alone(tapes, k, fired, work):
             return NOT_ORDINARY, False
     c = automata.owner[fired]
     if automata.hold[c] >= 0:
-        number = decide_surface(functions, automata, tapes, inputs, lin, at, fired, x, x_error, z, work)
+        number = decide_surface(
+            functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, z, work
+        )
         if number < 0:
             return NOT_ORDINARY, False
         if (
             automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]
         ):  # all has been judged there
-            for g in range(work.sides.shape[0]):
-                work.sides[g], work.orders[g] = work.all_sides[number, g], work.all_orders[number, g]
-                work.bounds[g, 0] = work.all_floors[number, g]
+            put(work.all_sides[number], sides)
+            put(work.all_orders[number], orders)
+            put(work.all_floors[number], floors)
             return SETTLED, work.smooth[number]
         continuous = is_continuous(functions, automata, at, x, z, work.everything, fired, work.jumps)
-        is_on = z[c] == at.z[c]
+        is_on, vector = z[c] == at.z[c], at.p
     else:
-        if not take_choice(functions, automata, at, fired, n_discrete, discrete_at, x, x_error, z, p, work):
+        put(at.p, p)
+        if not take_choice(functions, automata, at, fired, discrete, x, x_error, z, p, work):
             return NOT_ORDINARY, False
         if lin.kinds.shape[0] > 0:
             functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
-        continuous, is_on = False, False
+        continuous, is_on, vector = False, False, p
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
-    after = Before(at.s, at.s_error, x, x_error, p, at.z)
+    after = Before(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    decree(automata, at, z, fired, is_on, continuous, work)
-    if judge_members(automata, z, work.everything, work) != FINE:
-        return NOT_ORDINARY, False
-    return SETTLED, continuous
+    verdict = judge_members(
+        automata, at, z, work.everything, fired, is_on, continuous, work, sides, orders, floors
+    )
+    return (SETTLED, continuous) if verdict == FINE else (NOT_ORDINARY, False)
 
 
 @kernel
@@ -269,6 +291,7 @@ def decide_surface(
     lin: Any,
     at: Any,
     fired: int,
+    is_known: bool,
     x: Any,
     x_error: Any,
     z: Any,
@@ -276,54 +299,66 @@ def decide_surface(
 ) -> int:
     """The admissible modes, written to z, of the components of a cluster that are at their surfaces.
 
-    Returns the number of that candidate; -1 where it is not plain.
+    Returns the number of that candidate; -1 where it is not plain. Candidates are tried in the order in which `choose`
+    prefers them, up to the first that it will take. is_known: the guards' series of the modes before are there.
     """
+    members, trial, candidates, verdicts = work.members, work.trial, work.candidates, work.verdicts
+    hold, pin, current, holds = automata.hold, automata.pin, work.current, work.holds
+    ranks = work.ranks
     c = automata.owner[fired]
     cluster = automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
     count = 0
     for i in range(cluster.shape[0]):
         d = cluster[i]
-        if d == c or z[d] == automata.hold[d]:
-            if count == work.members.shape[0]:
+        if d == c or z[d] == hold[d]:
+            if count == members.shape[0]:
                 return -1
-            work.members[count] = d
+            members[count], current[count], holds[count] = d, z[d], hold[d]
             count += 1
             work.on_surface[d] = True
-    total, trial = 3**count, work.trial  # a surface has three modes
     put(z, trial)
     for i in range(count):
-        d = work.members[i]
-        trial[d] = automata.hold[d]
+        trial[members[i]] = hold[members[i]]
     call(functions.project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        d = work.members[i]
-        x_error[automata.pin[d]] = UNIT * abs(x[automata.pin[d]])
+        x_error[pin[members[i]]] = UNIT * abs(x[pin[members[i]]])
+    for i in range(x.shape[0]):
+        is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
+    total = 3**count  # a surface has three modes
     for number in range(total):
         rest = number
         for i in range(count - 1, -1, -1):
-            work.candidates[number, i] = rest % 3
-            trial[work.members[i]] = rest % 3
+            candidates[number, i] = rest % 3
             rest //= 3
-        k = find_modes(tapes.modes, trial)
-        if k < 0:
-            return -1
-        guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-        continuous = is_continuous(functions, automata, at, x, trial, cluster, fired, work.jumps)
-        decree(automata, at, trial, fired, True, continuous, work)
-        work.verdicts[number] = judge_members(automata, trial, cluster, work)
-        work.smooth[number] = continuous
-        for g in range(work.sides.shape[0]):
-            work.all_sides[number, g], work.all_orders[number, g] = work.sides[g], work.orders[g]
-            work.all_floors[number, g] = work.bounds[g, 0]
-    for i in range(count):
-        work.current[i], work.holds[i] = z[work.members[i]], automata.hold[work.members[i]]
-    number = choose(
-        work.candidates[:total, :count], work.verdicts[:total], work.current[:count], work.holds[:count]
-    )
-    if number in (NONE, NONUNIQUE) or work.verdicts[number] != FINE:
+        verdicts[number] = LEAVES
+        ranks[number] = preference(candidates[number], current, holds, count)
+    is_found = False
+    for rank in range((count + 1) * (count + 1) - 1, -1, -1):
+        if is_found:
+            break
+        for number in range(total):
+            if ranks[number] != rank:
+                continue
+            for i in range(count):
+                trial[members[i]] = candidates[number, i]
+            k = find_modes(tapes.modes, trial)
+            if k < 0:
+                return -1
+            is_current = rank >= (count + 1) * count
+            if not (is_current and is_known):
+                guard_series(tapes, inputs, lin, k, at, x, x_error, work)
+            continuous = is_continuous(functions, automata, at, x, trial, cluster, fired, work.jumps)
+            sides, orders, floors = work.all_sides[number], work.all_orders[number], work.all_floors[number]
+            verdict = judge_members(
+                automata, at, trial, cluster, fired, True, continuous, work, sides, orders, floors
+            )
+            verdicts[number], work.smooth[number] = verdict, continuous
+            is_found = is_found or verdict == FINE or (is_current and verdict != LEAVES)
+    number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
+    if number in (NONE, NONUNIQUE) or verdicts[number] != FINE:
         return -1
     for i in range(count):
-        z[work.members[i]] = work.candidates[number, i]
+        z[members[i]] = candidates[number, i]
     return number
 
 
@@ -333,8 +368,7 @@ def take_choice(
     automata: Any,
     at: Any,
     fired: int,
-    n_discrete: int,
-    discrete_at: int,
+    discrete: Any,
     x: Any,
     x_error: Any,
     z: Any,
@@ -346,9 +380,10 @@ def take_choice(
         if automata.hold[d] >= 0:
             return False
     c, n, count = automata.owner[fired], x.shape[0], z.shape[0]
+    n_discrete, discrete_at = discrete
     mode, place = at.z[c], automata.place[fired]
     asked = work.asked
-    asked[:count] = at.z
+    put(at.z, asked)
     asked[count], asked[count + 1], asked[count + 2] = c, mode, place
     call(functions.choose, at.s, at.x, at.p, asked, work.out)
     number = int(work.out[0])
@@ -357,10 +392,16 @@ def take_choice(
     z[c] = automata.target[c, mode, place, number]
     reset = automata.reset[c, mode, place, number]
     if reset >= 0:
-        work.out[:n], work.out[n : n + n_discrete] = at.x, at.p[discrete_at : discrete_at + n_discrete]
+        out = work.out
+        put(at.x, out)
+        for i in range(n_discrete):
+            out[n + i] = at.p[discrete_at + i]
         asked[count] = reset
-        call(functions.reset, at.s, at.x, at.p, asked, work.out)
-        x[:], p[discrete_at : discrete_at + n_discrete] = work.out[:n], work.out[n : n + n_discrete]
+        call(functions.reset, at.s, at.x, at.p, asked, out)
+        for i in range(n):
+            x[i] = out[i]
+        for i in range(n_discrete):
+            p[discrete_at + i] = out[n + i]
         for i in range(automata.reset_start[reset], automata.reset_start[reset + 1]):
             slot = automata.reset_slot[i]
             if slot < n:
@@ -374,7 +415,6 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
     """Room for the events of one system; for linear modes also for their functions of time."""
     guards, count = system.guard_count, len(system.automata)
     registers = system.registers.count
-    widest = max((len(g) for a in system.automata for g in a.guards), default=0) or 1
     together = min(_MOST, len(system.surface_of))
     joint = 3**together
 
@@ -393,14 +433,10 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
             w_error=np.zeros(monomials),
             values=np.empty((guards, ORDER + 1)),
             bounds=np.empty((guards, ORDER + 1)),
-            decreed=numbers(guards),
-            active=flags(guards),
             sides=np.ones(guards, dtype=np.int64),
             orders=numbers(guards),
-            fired=flags(guards),
-            holding=flags(count),
+            floors=np.zeros(guards),
             on_surface=flags(count),
-            released=flags(count),
             jumps=np.zeros(2 * max(len(system.surface_of), 1)),
             out=np.zeros(max(system.n + len(system.model.discrete), 1)),
             everything=np.arange(count, dtype=np.int64),
@@ -408,9 +444,9 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
             current=numbers(together),
             holds=numbers(together),
             trial=numbers(count),
-            table=numbers(count, widest),
             asked=numbers(count + 3),
             candidates=numbers(joint, together),
+            ranks=numbers(joint),
             verdicts=numbers(joint),
             smooth=flags(joint),
             all_sides=numbers(joint, guards),

@@ -8,6 +8,7 @@ Whoever calls the kernel holds the arrays meanwhile.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from hybridsim.engine.jit import ENABLED
 
 _WORDS = 6  # of an array in the table: its address, and up to five lengths
+_REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
     from llvmlite import ir
@@ -38,16 +40,14 @@ if ENABLED:
 
         def __init__(self, arrays: Any) -> None:
             self.arrays = arrays
-            self.table = np.zeros((len(arrays), _WORDS), dtype=np.int64)
-            for row, array in zip(self.table, arrays, strict=True):
+            words: list[int] = []
+            for array in arrays:
                 assert array.flags.c_contiguous
-                row[0] = array.ctypes.data
-                row[1 : 1 + array.ndim] = array.shape
+                words += (array.ctypes.data, *array.shape, *_REST[array.ndim])
+            self.table = np.array(words, dtype=np.int64)
             self.address = self.table.ctypes.data
-            fields = zip(arrays._fields, arrays, strict=True)
-            self.numba_type = PackType(
-                type(arrays).__name__, tuple((name, str(a.dtype), a.ndim) for name, a in fields)
-            )
+            kind: Any = type(arrays)
+            self.numba_type = _type_of_arrays(kind, tuple((a.dtype, a.ndim) for a in arrays))
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self.arrays, name)
@@ -67,6 +67,11 @@ if ENABLED:
             """Type of a field."""
             _, dtype, dimensions = self.fields[self.place(name)]
             return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
+
+    @cache
+    def _type_of_arrays(kind: Any, fields: tuple[tuple[np.dtype, int], ...]) -> PackType:
+        named = zip(kind._fields, fields, strict=True)
+        return PackType(kind.__name__, tuple((name, str(dtype), n) for name, (dtype, n) in named))
 
     @typeof_impl.register(Packed)
     def _type_of(value: Packed, context: Any) -> PackType:

@@ -201,7 +201,8 @@ def is_zero(
 ) -> bool:
     """Whether a guard is zero within twice the rounding of the state and that of the instant."""
     s_error = 8.0 * 2.0**-52 * s
-    state_errors(functions, automata, s, s_error, y, room.scale, x_error, p, z, room.slopes, room.y_error)
+    call(functions.flow, s, y, p, z, room.slopes)
+    state_errors(automata, s_error, y, room.scale, x_error, z, room.slopes, room.y_error)
     for i in range(y.shape[0]):
         room.y_error[i] *= 2.0
     event = Before(s, s_error, y, room.y_error, p, z)
@@ -369,7 +370,8 @@ def rk_leap(
         s_error = 2.0 * 2.0**-52 * s
         if slope != 0.0 and abs(value / slope) < math.inf:
             s_error = max(s_error, abs(value / slope))
-        state_errors(functions, automata, s, s_error, y, scale, x_error, p, z, slopes, room.y_error)
+        call(functions.flow, s, y, p, z, slopes)
+        state_errors(automata, s_error, y, scale, x_error, z, slopes, room.y_error)
         event = Before(s, s_error, y, room.y_error, p, z)
         if not settle_and_move_on(
             functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,

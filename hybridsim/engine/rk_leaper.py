@@ -92,7 +92,7 @@ class RungeKuttaLeaper(Leaper):
                 W=np.zeros((registers, columns)),
                 a=np.empty(columns),
                 b=np.empty(columns),
-                stack=np.empty((64, columns)),
+                stack=np.empty((64, columns + 2)),
                 stages=np.empty((len(self.tableau.c), n)),
                 left=np.empty((n, TERMS)),
                 right=np.empty((n, TERMS)),

@@ -18,7 +18,7 @@ from math import comb
 
 import numpy as np
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import allocating_kernel, kernel
 from hybridsim.engine.stepping import StepFailure
 
 DEGREE = 8
@@ -71,7 +71,7 @@ class Grazing:
     distance: float
 
 
-@kernel
+@allocating_kernel
 def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The two halves of a polynomial in Bernstein form (de Casteljau)."""
     n = b.shape[0]
@@ -105,7 +105,7 @@ def _within(b: np.ndarray, bound: np.ndarray) -> bool:
     return True
 
 
-@kernel
+@allocating_kernel
 def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
     """Intervals of certain and of open sign: rows (left, right, sign), adjacent ones of one sign merged."""
     n = b.shape[0]
@@ -171,7 +171,7 @@ def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: in
     return n
 
 
-@kernel
+@allocating_kernel
 def quiet(
     values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray, floors: np.ndarray
 ) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import allocating_kernel, call, kernel
 
 
 @kernel
@@ -20,7 +20,7 @@ def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: A
         call(function, times[k], states[k], p, z, out[k])
 
 
-@kernel
+@allocating_kernel
 def project_and_evaluate(
     project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any
 ) -> None:

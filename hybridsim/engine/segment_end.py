@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.ordinary_event import SETTLED, put, settle_ordinary
 from hybridsim.engine.timepair import two_sum
 
@@ -39,27 +39,23 @@ def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
     return pace[2] > 2.0 or gap <= _ULPS * 2.0**-52 * abs(clock[0])
 
 
-@kernel
+@inlined
 def state_errors(
-    functions: Any,
-    automata: Any,
-    s: float,
-    s_error: float,
-    y: Any,
-    scale: Any,
-    x_error: Any,
-    p: Any,
-    z: Any,
-    slopes: Any,
-    out: Any,
+    automata: Any, s_error: float, y: Any, scale: Any, x_error: Any, z: Any, slopes: Any, out: Any
 ) -> None:
     """Bounds of the states at an event: rounding on the segment (of sizes `scale`), what was left, the instant's."""
-    call(functions.flow, s, y, p, z, slopes)
     for i in range(y.shape[0]):
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
             out[automata.pin[c]] = UNIT * abs(y[automata.pin[c]])
+
+
+@inlined
+def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
+    """An instant and a time after it."""
+    high, rest = two_sum(high, s)
+    return two_sum(high, rest + low)
 
 
 @kernel
@@ -82,34 +78,19 @@ def settle_and_move_on(
     lin: tables of linear modes, empty for others. discrete: how many discrete states there are and where in p. at:
     `Before`. state: `State`, moved on with the clock. room: (n,), (n,), like z, like p.
     """
-    sides, orders, floors = state.sides, state.orders, state.floors
     x_after, x_error_after, z_after, p_after = room
     outcome, _ = settle_ordinary(
-        functions,
-        automata,
-        tapes,
-        inputs,
-        lin,
-        at,
-        fired,
-        discrete[0],
-        discrete[1],
-        x_after,
-        x_error_after,
-        z_after,
-        p_after,
-        work,
-    )
+        functions, automata, tapes, inputs, lin, at, fired, discrete, x_after, x_error_after, z_after, p_after, work
+    )  # fmt: skip
     if outcome != SETTLED:
         return False
-    s = at.s
     put(x_after, state.x)
     put(x_error_after, state.x_error)
     put(z_after, state.z)
-    put(p_after, state.p)
-    for g in range(sides.shape[0]):
-        sides[g], orders[g] = work.sides[g], work.orders[g] if work.orders[g] <= ORDER else 0
-        floors[g] = work.bounds[g, 0] if work.orders[g] > 0 else 0.0
-    high, low = two_sum(clock[0], s)
-    clock[0], clock[1] = two_sum(high, low + clock[1])
+    if automata.hold[automata.owner[fired]] < 0:
+        put(p_after, state.p)
+    put(work.sides, state.sides)
+    put(work.orders, state.orders)
+    put(work.floors, state.floors)
+    clock[0], clock[1] = moved_on(clock[0], clock[1], at.s)
     return True

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import allocating_kernel, call
 from hybridsim.engine.pieces import Segment
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
@@ -36,7 +36,7 @@ class SeriesPieces:
         return out
 
 
-@kernel
+@allocating_kernel
 def series_states(
     project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
 ) -> None:

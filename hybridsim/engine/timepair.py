@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import inlined, kernel
 
 _SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
 # 2*pi to 107 + 53 bits as an unevaluated sum of three doubles
@@ -35,7 +35,7 @@ class Instant(NamedTuple):
         return float(self.high + self.low)  # a NumPy double would be refused here
 
 
-@kernel
+@inlined
 def two_sum(a: float, b: float) -> tuple[float, float]:
     """Rounded sum and its exact error."""
     s = a + b
@@ -43,7 +43,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
     return s, (a - (s - v)) + (b - v)
 
 
-@kernel
+@inlined
 def two_product(a: float, b: float) -> tuple[float, float]:
     """Rounded product and its exact error (barring overflow and underflow)."""
     product = a * b

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import allocating_kernel, call, kernel
 
 # why a stretch of steps ended
 BOUND, FULL, GUARD, MONITOR, NOT_FINITE = 0, 1, 2, 3, 4
@@ -68,7 +68,7 @@ def choose_modes(
             break
 
 
-@kernel
+@allocating_kernel
 def slope(
     addresses: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, out: Any, work: Any
 ) -> None:
@@ -104,7 +104,8 @@ def rk4_step(
     rule, every_stage, eps = law
     k, states, modes, surfaces, guards = work
     stage, n = states[0], x.shape[0]
-    modes[:] = z
+    for i in range(z.shape[0]):
+        modes[i] = z[i]
     slope(addresses, rule, table, s, x, p, modes, k[0], states[1])
     for j in range(1, 4):
         c = 0.5 if j < 3 else 1.0
@@ -204,7 +205,7 @@ def _halve_step(
     return high
 
 
-@kernel
+@allocating_kernel
 def run_steps(
     addresses: Any,
     settings: Any,

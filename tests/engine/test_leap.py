@@ -22,7 +22,7 @@ PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 
 def exit_of(a: list[float], error: float = 1e-14, order: int = 0) -> tuple[int, float]:
     values = np.array(a)
-    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a))))
+    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a) + 2)))
     return int(outcome), float(theta)
 
 

@@ -378,3 +378,22 @@ def test_functions_and_expressions_give_the_same_run() -> None:
     ]
     assert len(done.events) >= 4
     np.testing.assert_allclose([e.t for e in done.events], [e.t for e in told.events], atol=1e-9)
+
+
+def test_a_comparison_of_a_model_of_functions() -> None:
+    """Two methods on a spring of known motion: x = cos(2 t)."""
+    model = hs.Model(
+        "spring", states={"x": 1.0, "v": 0.0}, parameters={"k": 4.0}, flow=lambda t, x, p: (x[1], -p.k * x[0])
+    )
+    comparison = hs.compare(
+        model,
+        t_span=(0, 5),
+        integrators=["dop853", "exact"],
+        rtols=[1e-8],
+        repeat=1,
+        reference=lambda t: np.array([np.cos(2 * np.asarray(t)), -2 * np.sin(2 * np.asarray(t))]),
+    )
+    done, refused = comparison.rows
+    assert done.errors is not None and done.errors.state < 1e-7
+    assert "works on a tape" in refused.message
+    assert "made of Python functions" in comparison.table()

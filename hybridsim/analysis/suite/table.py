@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.suite.verdict import COMMON, USELESS
-from hybridsim.analysis.table import differences, milliseconds, setting, versions
+from hybridsim.analysis.table import differences, milliseconds, setting, turns, versions
 
 if TYPE_CHECKING:
     from hybridsim.analysis.suite.result import SuiteComparison
@@ -64,7 +64,7 @@ def _notes(suite: SuiteComparison) -> list[str]:
     return [
         "State errors: the largest of all states over the run, relative to each one's amplitude in the reference.",
         "Event times are in periods of the forcing where there is one, else in the model's unit of time.",
-        f"Wall times: median over {suite.repeat} turns of all runs of all scenes, of several calls where short.",
+        f"Wall times: {turns(suite.repeat)} of all runs of all scenes, of several calls where short.",
         f"It took {suite.seconds:.0f} s of {suite.budget:g} s.",
         versions(suite.provenance),
         *(["Not as asked:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
