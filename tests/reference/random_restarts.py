@@ -250,7 +250,7 @@ def searched(tally: Searches, rng: np.random.Generator) -> None:
         low, high = Fraction(max(theta - width, 0.0)), Fraction(theta + width)
         if exact.count(zero, low) and deepest(q, theta) > 2.0 * error:
             wrong = "missed"
-        elif not exact.count(zero, low) and not (exact.sign(low) >= 0 >= exact.sign(high)):
+        elif not exact.count(zero, high):
             wrong = "spurious"
     else:
         tally.counts[d, "said to be open"] += 1

@@ -26,10 +26,6 @@ class Sturm:
         """Zeros in (low, high]."""
         return self._changes(low) - self._changes(high)
 
-    def sign(self, t: Fraction) -> int:
-        """The polynomial's sign at t."""
-        return _sign(self.chain[0], t.numerator, t.denominator)
-
     def _changes(self, t: Fraction) -> int:
         signs = [s for p in self.chain if (s := _sign(p, t.numerator, t.denominator))]
         return sum(a != b for a, b in pairwise(signs))
