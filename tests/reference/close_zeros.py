@@ -118,7 +118,7 @@ def truth_of(guard: Closed, span: float, grid: int = GRID) -> Truth:
             if not (0.0 < zeros[0] < place < zeros[1] < span) or zeros[1] - zeros[0] > CLOSE * span:
                 continue
             extremes.append(Extreme(float(place), float(depth), (zeros[0], zeros[1])))
-    shared = Counter(z for e in extremes if e.zeros for z in np.round(np.array(e.zeros) / span, 9))
+    shared = Counter(z for e in extremes if e.zeros for z in set(np.round(np.array(e.zeros) / span, 9)))
     for e in [e for e in extremes if e.zeros and max(shared[np.round(z / span, 9)] for z in e.zeros) > 1]:
         extremes.remove(e)  # three zeros in a row are no pair
         singles += [z for z in e.zeros or () if all(abs(z - other) > 1e-6 * span for other in singles)]
