@@ -269,6 +269,7 @@ def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
         return math.nan
     for i in range(TERMS):
         backward[i] = terms[TERMS - 1 - i]
+    change = math.inf
     for _ in range(_POLISH):
         value, slope = value_and_slope(backward, TERMS, d, 0.0)
         if not slope < 0.5 * terms[1]:
@@ -277,10 +278,16 @@ def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
         d -= change
         if abs(change) <= _NEAR * abs(d):
             break
-    left_out = rest
+    if not abs(change) <= _NEAR * abs(d):
+        return math.nan
+    left_out, rising, power = rest, terms[1], 1.0
+    for i in range(2, TERMS):
+        power *= abs(d)
+        rising += i * power * (max(terms[i], 0.0) if d > 0.0 else abs(terms[i]))
     for _ in range(TERMS):
         left_out *= abs(d)
-    return d if left_out <= 0.25 * UNIT * size else math.nan
+    # a guard that falls all the way has one zero there; else Newton's method may have passed over the first
+    return d if left_out <= 0.25 * UNIT * size and rising < 0.0 else math.nan
 
 
 @inlined

@@ -49,13 +49,7 @@ def zeros_of(truth: Truth, allowed: float) -> list[tuple[float, float]]:
     return sorted(found)
 
 
-POLYNOMIAL = pytest.param(
-    "polynomial",
-    marks=pytest.mark.xfail(reason="first_zero takes a later zero of a polynomial of degree five or six"),
-)
-
-
-@pytest.mark.parametrize("kind", [POLYNOMIAL, "waves", "driven", "mixed"])
+@pytest.mark.parametrize("kind", ["polynomial", "waves", "driven", "mixed"])
 def test_exact(kind: str) -> None:
     for seed in range(60):
         compare(LINEAR[kind], linear_draw(kind, np.random.default_rng([7, seed])), SPANS[kind], "exact")
