@@ -16,6 +16,7 @@ from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_kernels import (
     first_zero,
+    first_zero_of_wave,
     functions_of_time,
     guard_terms,
     moved,
@@ -29,6 +30,7 @@ from hybridsim.engine.ordinary_event import Before, find_modes, put
 from hybridsim.engine.segment_end import is_crowded, moved_on, settle_and_move_on, state_errors
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
+_DONE = -1.0  # in place of a guard's size: its first zero is known
 
 
 class Room(NamedTuple):
@@ -84,23 +86,33 @@ def first_exit_of(
 ) -> tuple[int, float]:
     """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
 
-    The guard that falls fastest goes first: the others need to be followed no farther than it lasts. All are followed
-    up to one horizon, and then to one four times as far: most stay positive for long.
+    Waves have their zeros in closed form. Of the others the guard that falls fastest goes first: the rest need to be
+    followed no farther than it lasts. All are followed up to one horizon, and then to one four times as far: most stay
+    positive for long.
     """
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
-    lead, soonest, horizon = first, math.inf, bound
+    lead, soonest, horizon, known, until = first, math.inf, bound, _NONE, bound
     for i in range(first, last):
         g = tapes.active[i]
         start = starts[i - first]
+        if lin.waves[k, g] >= 0 and orders[g] == 0 and sides[g] > 0:
+            outcome, at = first_zero_of_wave(lin, k, g, c, until)
+            if outcome != OPEN:
+                start[TERMS] = _DONE
+                if outcome == FOUND:
+                    known, until = g, at
+                continue
         start[TERMS], start[TERMS + 1] = guard_terms(lin, k, g, c, start)
-        if start[1] < 0.0 and -start[0] < soonest * -start[1]:
+        if start[1] < 0.0 and start[0] < soonest * -start[1]:
             lead, soonest = i, start[0] / -start[1]
         if last - first > 1:
             horizon = min(horizon, lin.farthest[k, g])
     while True:
-        fired, s = _NONE, min(horizon, bound)
+        fired, s = (known, until) if until <= horizon else (_NONE, min(horizon, bound))
         for j in range(first, last):
             i = lead if j == first else (j - 1 if j <= lead else j)
+            if starts[i - first, TERMS] == _DONE:
+                continue
             g = tapes.active[i]
             outcome, at = first_zero(
                 lin, k, g, c, s, sides[g], orders[g], floors[g], hints[k, g], starts[i - first], room, v

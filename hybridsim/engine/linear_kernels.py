@@ -330,6 +330,32 @@ def falls_over(terms: Any, rest: float, longest: float) -> float:
     return 0.0
 
 
+@inlined
+def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
+    """As `first_zero`, where a guard is a + r cos(omega s + phase) and positive now; OPEN where it hardly gets below zero."""
+    j, terms = lin.waves[k, g], lin.terms
+    level, size = 0.0, 0.0
+    for i in range(lin.counts[k]):
+        size += lin.sizes[k, g, i] * size_of(c[i])
+        if i != j:
+            level += terms[k, g, i, 0, 0] * c[i].real - terms[k, g, i, 1, 0] * c[i].imag
+    u, v = terms[k, g, j, 0, 0], terms[k, g, j, 1, 0]
+    real, imaginary = u * c[j].real - v * c[j].imag, u * c[j].imag + v * c[j].real
+    error = (16.0 + 2.0 * lin.counts[k]) * UNIT * size
+    radius = math.sqrt(real * real + imaginary * imaginary)
+    if level > radius + error:
+        return NEVER, bound
+    steepness = (radius - level) * (radius + level)  # the square of its slope at the zero, over omega**2
+    # beyond the zero the guard has to go below what its error could hide
+    if not (level + real > error and steepness > 0.0 and 8.0 * error * abs(level) <= steepness):
+        return OPEN, 0.0
+    angle = math.acos(-level / radius) - math.atan2(imaginary, real)
+    if angle <= 0.0:
+        angle += 2.0 * math.pi
+    s = angle / lin.values[k, j].imag
+    return (FOUND, s) if s <= bound else (NEVER, bound)
+
+
 @kernel
 def first_zero(
     lin: Any,

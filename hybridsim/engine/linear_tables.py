@@ -34,7 +34,8 @@ class LinearTables(NamedTuple):
     J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
     in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
     the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor. slopes (K,
-    n, n + M): rates of the states.
+    n, n + M): rates of the states. waves (K, G): the modal coordinate that turns without damping, where a guard sees one
+    such and else constants; -1 otherwise.
     """
 
     kinds: np.ndarray
@@ -60,6 +61,7 @@ class LinearTables(NamedTuple):
     farthest: np.ndarray
     grown: np.ndarray
     slopes: np.ndarray
+    waves: np.ndarray
 
 
 class LinearMode:
@@ -101,7 +103,7 @@ def no_tables() -> LinearTables:
         np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f), np.zeros(0, i),
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0), c), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0), i),
     ))  # fmt: skip
     return tables
 
@@ -131,6 +133,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon:
     terms = np.zeros((count, guards, widest, 2, TERMS))
     sizes, rests = np.zeros((count, guards, widest)), np.zeros((count, guards, widest))
     farthest, grown = np.full((count, guards), np.inf), np.ones((count, guards))
+    waves = np.full((count, guards), -1, dtype=np.int64)
     for k, (mode, A, flow) in enumerate(zip(modes, matrices, flows, strict=True)):
         for g, form in mode.guards.items():
             row = np.zeros(size)
@@ -141,6 +144,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon:
             gamma = row @ flow.full_basis
             _modal_terms(gamma, flow, terms[k, g, :J])
             sizes[k, g, :J], rests[k, g, :J] = _bounds(gamma, flow)
+            waves[k, g] = _wave(gamma, flow)
             seen = rests[k, g, :J] > 0.0
             fastest, growth = max(flow.speeds[seen], default=0.0), max(flow.growth[seen], default=0.0)
             if fastest > 0.0:
@@ -165,6 +169,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon:
             farthest=farthest,
             grown=grown,
             slopes=np.array([A[:n] for A in matrices]).reshape(count, n, size),
+            waves=waves,
         )
     )
     return tables
@@ -201,6 +206,16 @@ def _bounds(gamma: np.ndarray, flow: Modal) -> tuple[np.ndarray, np.ndarray]:
         rests[here] = sizes[here] * power / math.factorial(TERMS)
         first = here.stop
     return sizes, rests
+
+
+def _wave(gamma: np.ndarray, flow: Modal) -> int:
+    """The coordinate that turns, where Re(gamma c) is a constant and one undamped wave; else -1."""
+    seen = np.flatnonzero(gamma)
+    turning = seen[flow.values[seen] != 0.0]
+    if len(turning) != 1 or flow.upper[seen].any():  # what others drive is no wave
+        return -1
+    value = flow.values[turning[0]]
+    return int(turning[0]) if value.real == 0.0 and value.imag > 0.0 else -1
 
 
 def _atom_arrays(atoms: Atoms, monomials: list[Monomial]) -> dict[str, np.ndarray]:
