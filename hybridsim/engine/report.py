@@ -43,8 +43,9 @@ class Report:
 
 def describe(model: Model) -> Report:
     """Lower a model (nothing is compiled) and say what came of it; what no run would start with is refused."""
-    known = is_cached(model)
     system = System(model)
+    model = system.model
+    known = is_cached(model)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)
     modes = np.array([automaton.initial for automaton in system.automata], dtype=np.int64)
     refuse_driving(system, 0.0, system.start_state({}), discrete, modes)

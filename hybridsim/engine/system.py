@@ -18,9 +18,14 @@ from hybridsim.engine.packs import packed
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase
+from hybridsim.model.component import Corner
+from hybridsim.model.smoothing import smoothed
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
+
+
+CORNER = "corner"  # the kind of an event that is a corner's change of side
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,12 @@ class Automaton:
     below: int = -1
     hold: int = -1
     initial: int = -1
+    is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
+
+    @property
+    def kind(self) -> str:
+        """What a change of its mode is called."""
+        return CORNER if self.is_corner else "transition"
 
     @property
     def has_surface(self) -> bool:
@@ -134,14 +145,21 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
             else (-1, -1, -1)
         ),
         initial=-1 if component.initial is None else names.index(component.initial),
+        is_corner=isinstance(component, Corner),
     )
 
 
 class System:
-    """A model with values: what integrators and the mode loop work on."""
+    """A model with values: what integrators and the mode loop work on.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    Parameters
+    ----------
+    as_written : take corners inside a mode as they stand, instead of as components (`hybridsim.model.smoothing`), which
+        come after those that the model declares.
+    """
+
+    def __init__(self, model: Model, as_written: bool = False) -> None:
+        self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data
         self.names = tuple(s.name for s in model.states)
@@ -171,6 +189,8 @@ class System:
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
+        self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
+        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
         self.has_tape: bool = data["tape"] is not None  # it is made from expressions
         if self.has_tape:
             self._registers: _Registers = self.code.shared(

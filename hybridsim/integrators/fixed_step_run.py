@@ -265,7 +265,7 @@ class FixedStepRun:
             record.occurrences.append(
                 Occurrence(
                     instant,
-                    "transition",
+                    automaton.kind,
                     automaton.name,
                     change.guard,
                     source,
