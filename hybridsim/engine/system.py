@@ -12,7 +12,7 @@ import numpy as np
 from hybridsim.engine.differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
+from hybridsim.engine.lean_tape import LeanTape, has_corners, lean, twins_of
 from hybridsim.engine.modules import compiled
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rows import evaluate, evaluate_rows
@@ -72,7 +72,8 @@ class _Registers:
     """Where the tape's inputs are, as index arrays."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        self.count: int = tape["registers"]
+        self.twins = twins_of(tape)
+        self.count: int = tape["registers"] + len(self.twins)
         time: int = tape["time"]
         constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
         values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)
@@ -363,7 +364,8 @@ class System:
         """The tape of the modes z for series of any order."""
         key = z.tobytes()
         if key not in self._lean:
-            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), np.flatnonzero(self.active(z)))
+            active = np.flatnonzero(self.active(z))
+            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), active, self._registers.twins)
         return self._lean[key]
 
     def series(
