@@ -51,9 +51,9 @@ def polynomial(node: ast.expr) -> Polynomial:
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
             return _power(polynomial(left), polynomial(right), node)
         case ast.IfExp(test=ast.Compare(left=left, ops=[op], comparators=[right]), body=body, orelse=orelse):
-            number = constant_of(difference(left, right))
-            if number is not None and type(op) in _COMPARE:
-                return polynomial(body if _COMPARE[type(op)](number) else orelse)
+            apart = constant_of(difference(left, right))
+            if apart is not None and type(op) in _COMPARE:
+                return polynomial(body if _COMPARE[type(op)](apart) else orelse)
         case ast.Call(func=ast.Name(id=name), args=args):
             return _call(name, args, node)
     return _thing(node)

@@ -1,4 +1,4 @@
-"""What the names of a model stand for in a mode's equations: what moves, what waits for a force, the tree behind a name."""
+"""What the names of a model stand for: what moves, what waits for a force that a mode solves for, the tree behind."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Meanings:
         return frozenset(found), sign
 
     def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
-        """The signs that a mode implies while it lasts, by family: of its guards, of its surface (0 where it holds it)."""
+        """The signs that a mode implies while it lasts, by family: its guards', and 0 for a surface that it holds."""
         surface = component.surface
         known: dict[Family, int] = {}
         for guard in mode.guards:

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 COMPONENT, MODE, KEPT, POWER = "component", "mode", "kept", "power"
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
+_ZERO = ast.Constant(0)
+_HOLDS = {  # whether a comparison holds where its left side less its right one is positive, zero, negative
+    ast.Gt: (True, False, False),
+    ast.GtE: (True, True, False),
+    ast.Lt: (False, False, True),
+    ast.LtE: (False, True, True),
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,7 @@ def _expressions(model: Model) -> Iterator[Expression]:
 
 
 def limited(node: ast.expr, meanings: Meanings) -> ast.expr | None:
-    """The first part of a tree that has no value on one side of some border: a root, a logarithm, a fractional power."""
+    """The first part of a tree without a value beyond some border: a root, a logarithm, a fractional power."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _LIMITED:
@@ -95,3 +102,32 @@ def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanin
             return True
     value = number_of(node, numbers, meanings.lookup)
     return value is not None and value > 0.0
+
+
+Sides = tuple[ast.expr, ast.expr, ast.expr, ast.expr]
+"""Argument; the value where it is positive, negative, zero."""
+
+
+def sides_of(node: ast.expr) -> Sides | None:
+    """The sides of a primitive; None for any other node."""
+    match node:
+        case ast.Call(func=ast.Name(id="abs"), args=[u]):
+            return u, u, ast.UnaryOp(ast.USub(), u), u
+        case ast.Call(func=ast.Name(id="sign"), args=[u]):
+            return u, ast.Constant(1), ast.UnaryOp(ast.USub(), ast.Constant(1)), _ZERO
+        case ast.Call(func=ast.Name(id="max"), args=[a, b]):
+            return _minus(a, b), a, b, a
+        case ast.Call(func=ast.Name(id="min"), args=[a, b]):
+            return _minus(a, b), b, a, a
+        case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=body, orelse=orelse) if (
+            type(op) in _HOLDS
+        ):
+            above, at_zero, below = (body if holds else orelse for holds in _HOLDS[type(op)])
+            return _minus(a, b), above, below, at_zero
+    return None
+
+
+def _minus(a: ast.expr, b: ast.expr) -> ast.expr:
+    if isinstance(b, ast.Constant) and b.value == 0:
+        return a
+    return ast.BinOp(a, ast.Sub(), b)
