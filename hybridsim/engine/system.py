@@ -160,6 +160,7 @@ class System:
     """
 
     def __init__(self, model: Model, as_written: bool = False) -> None:
+        self.written = model  # held for as long as the system is: `recent` knows systems by it
         self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data

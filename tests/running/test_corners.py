@@ -173,3 +173,14 @@ def test_a_comparison_goes_across_them() -> None:
     )
     assert [row.integrator for row in result.rows] == ["dop853", "taylor"]
     assert all(row.status == "finished" and row.errors.state < 1e-7 for row in result.rows)
+
+
+def test_models_that_come_and_go_are_not_mixed_up() -> None:
+    """Each is let go of after its run, and the next may stand at its place in memory."""
+    for k in range(40):
+        start = 1.0 + k
+        sol = hs.simulate(
+            hs.Model("fading", states=[hs.State("x", start, der="-abs(x)")]), (0, 1), integrator="exact"
+        )
+        assert sol(0.0)[0] == start
+        del sol
