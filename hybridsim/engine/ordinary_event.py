@@ -175,7 +175,8 @@ def judge_members(
 ) -> int:
     """Verdict on the guards of some components in the candidate z; sides, orders and bounds of all guards' values.
 
-    is_on: the located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns stay as they were.
+    is_on: the located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns
+    stay as they were.
     """
     values, bounds, on_surface = work.values, work.bounds, work.on_surface
     guards_of, hold = automata.guards_of, automata.hold
