@@ -180,7 +180,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
     z = np.array([a.initial for a in system.automata], dtype=np.int64)
     if z0 is None:
         return z
-    components = [a.name for a in system.automata]
+    components = [a.name for a in system.declared]
     if not isinstance(z0, Mapping):
         raise UsageError(f"z0 is {z0!r}", remedy="give a mapping from names of components to names of modes")
     for name, mode in z0.items():

@@ -66,7 +66,7 @@ def to_ivp(
     model = model if isinstance(model, Model) else load(model)
     model = model.with_(**(params or {})).validate()
     announce_compilation()
-    system = System(model)
+    system = System(model, as_written=True)
     modes = _modes(system, z or {})
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
 

@@ -268,6 +268,20 @@ class Solution:
     def events(self) -> tuple[Event, ...]:
         """All events in order of time: transitions, monitors, scheduled events, near-grazings."""
         self._require_events()
+        return tuple(event for event in self._happened if event.kind != "corner")
+
+    @property
+    def corners(self) -> tuple[Event, ...]:
+        """The instants at which a corner (`abs`, `min`, `max`) inside a mode changed its side: kind "corner".
+
+        Nothing happens there to the model; the run goes on with the other side's equations. `events` and `modes`
+        leave them out.
+        """
+        self._require_events()
+        return tuple(event for event in self._happened if event.kind == "corner")
+
+    @cached_property
+    def _happened(self) -> tuple[Event, ...]:
         return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
@@ -286,7 +300,7 @@ class Solution:
             return self._modes_of_events()
         numbers, ends = self._segments.modes(), self._ends
         result = {}
-        for c, automaton in enumerate(self._system.automata):
+        for c, automaton in enumerate(self._system.declared):
             changed = np.flatnonzero(np.diff(numbers[:, c])) + 1
             first = np.concatenate([[0], changed]) if len(numbers) else changed
             last = np.append(changed, len(numbers))[: len(first)] - 1
@@ -297,7 +311,7 @@ class Solution:
 
     def _modes_of_events(self) -> dict[str, tuple[ModeInterval, ...]]:
         result = {}
-        for automaton, last in zip(self._system.automata, self._segments.modes()[-1].tolist(), strict=True):
+        for automaton, last in zip(self._system.declared, self._segments.modes()[-1].tolist(), strict=False):
             changes = [e for e in self.events if e.component == automaton.name and e.source != e.target]
             times = [self.t_start, *(e.t for e in changes), self.t_end]
             names = [*(e.source for e in changes), automaton.modes[last]]
@@ -398,16 +412,17 @@ class Solution:
         names = [d.name for d in model.discrete]
         names += [q for q in self._system.quantities if " in " not in q]
         columns = {name: np.empty(len(t)) for name in (*self.names, *names)}
-        numbers = np.empty((len(self._system.automata), len(t)), dtype=np.int64)
+        declared = self._system.declared
+        numbers = np.empty((len(declared), len(t)), dtype=np.int64)
         for segment, chosen, s in pieces:
             found = self._quantities(names, segment, s, x[chosen])
             for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
                 columns[name][chosen] = values
-            numbers[:, chosen] = segment.z[:, None]
+            numbers[:, chosen] = segment.z[: len(declared), None]
         return Table(
             t,
             columns,
-            {a.name: (a.modes, row) for a, row in zip(self._system.automata, numbers, strict=True)},
+            {a.name: (a.modes, row) for a, row in zip(declared, numbers, strict=True)},
             {name: unit for name, unit in ({"t": time_unit(model)} | units_of(model)).items() if unit},
             {"model": model.name, "title": model.title, "integrator": self.integrator, "status": self.status},
         )

@@ -6,13 +6,16 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER
+
 if TYPE_CHECKING:
     from hybridsim.engine.report import Report
     from hybridsim.expr import Expression
     from hybridsim.model import Component, Guard, Input, Mode, Model, Monitor, Schedule
+    from hybridsim.model.nonsmooth import Primitive
 
 
-def lines_of(model: Model, report: Report) -> Iterator[str]:
+def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> Iterator[str]:
     """The whole description, line by line."""
     yield f"{model.name}: {model.title}" if model.title else model.name
     for label in ("source", "look"):
@@ -27,10 +30,24 @@ def lines_of(model: Model, report: Report) -> Iterator[str]:
     for component in model.all_components():
         kind = f"contact, law {laws[component.name]}" if component.name in laws else "component"
         yield from _section(f"{component.name}: {kind}", _component(component, report))
+    yield from _section("corners and jumps", map(_primitive, primitives))
     yield from _section("monitors", map(_monitor, model.monitors))
     yield from _section("schedules", map(_schedule, model.schedules))
     yield from _section("outputs", (f"{output.name} = {_flat(output.expr)}" for output in model.outputs))
     yield from _section("engine", _engine(report))
+
+
+def _primitive(primitive: Primitive) -> str:
+    """A line on what became of it."""
+    text, remark = primitive.text, primitive.remark
+    became = {
+        COMPONENT: "two modes that agree where they change"
+        + (f", those of {remark}" if remark != text else ""),
+        MODE: remark,
+        KEPT: f"integrated as it stands, {remark}; exact and taylor refuse it",
+        POWER: f"a fractional power, {remark}",
+    }
+    return f"{text} in {', '.join(primitive.where)}: {became[primitive.became]}"
 
 
 def _flat(expression: Expression) -> str:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.expr import Expression
     from hybridsim.model import Mode, Model
     from hybridsim.model.hygiene import Caution
+    from hybridsim.model.nonsmooth import Primitive
 
 
 def add_to(commands: Any) -> None:
@@ -36,20 +37,24 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     """Print the expanded automaton, and warnings; a bad model has already been refused on loading."""
     from hybridsim.engine.report import describe
     from hybridsim.model.hygiene import warnings_of
+    from hybridsim.model.smoothing import smoothing_of
 
     model = values.changed_model(args)
     report = describe(model)
     cautions = warnings_of(model)
+    primitives = smoothing_of(model).primitives
     if args.json:
-        print_json(_record(model, report, cautions))
+        print_json(_record(model, report, cautions, primitives))
     else:
-        print("\n".join(lines_of(model, report)))
+        print("\n".join(lines_of(model, report, primitives)))
     for caution in cautions:
         complain(f"warning: {caution}")
     return 0
 
 
-def _record(model: Model, report: Report, cautions: Iterable[Caution]) -> dict[str, Any]:
+def _record(
+    model: Model, report: Report, cautions: Iterable[Caution], primitives: Iterable[Primitive]
+) -> dict[str, Any]:
     return {
         "name": model.name,
         "title": model.title,
@@ -63,7 +68,20 @@ def _record(model: Model, report: Report, cautions: Iterable[Caution]) -> dict[s
             for component in model.all_components()
         },
         "engine": asdict(report),
+        "primitives": [_primitive_record(primitive) for primitive in primitives],
         "warnings": [_caution_record(caution) for caution in cautions],
+    }
+
+
+def _primitive_record(primitive: Primitive) -> dict[str, Any]:
+    place = primitive.place
+    return {
+        "text": primitive.text,
+        "where": primitive.where,
+        "became": primitive.became,
+        "remark": primitive.remark,
+        "file": place.file if place else None,
+        "line": place.line if place else None,
     }
 
 

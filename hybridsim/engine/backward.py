@@ -22,7 +22,7 @@ def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
     """Why a guard of a component without a surface cannot be crossed backward; empty if none fired."""
     for g in fired:
         automaton = system.automata[int(system.owner[g])]
-        if not automaton.has_surface:
+        if not (automaton.has_surface or automaton.is_corner):
             mode = automaton.modes[z[system.owner[g]]]
             return f"mode {mode} of {automaton.name} began here or came through a transition: its past is not unique"
     return ""
@@ -41,7 +41,7 @@ def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
     """The ways into the present modes by declared transitions that reset nothing."""
     found = []
     for c, automaton in enumerate(system.automata):
-        if automaton.has_surface:
+        if automaton.has_surface or automaton.is_corner:
             continue
         for m, guards in enumerate(automaton.guards):
             for j, g in enumerate(guards):
@@ -65,6 +65,8 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
     for g in fired:
         c = int(system.owner[g])
         automaton = system.automata[c]
+        if automaton.is_corner:
+            continue
         other = automaton.below if before[c] == automaton.above else automaton.above
         rest = before.copy()
         rest[c] = automaton.hold

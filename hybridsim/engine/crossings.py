@@ -75,9 +75,9 @@ class Crossings(Sequence[Occurrence]):
         return (self._instants[:, 0] + self._instants[:, 1])[self._places[0]]
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component; all are transitions."""
+        """Mask of those of a component; all are transitions, or changes of a corner's side."""
         names = [a.name for a in self._system.automata]
-        if component not in names or kind not in (None, "transition"):
+        if component not in names or kind not in (None, self._system.automata[names.index(component)].kind):
             return np.zeros(len(self), dtype=np.bool_)
         return self._places[1] == names.index(component)
 
@@ -109,4 +109,4 @@ class Crossings(Sequence[Occurrence]):
             if component == owner[fired]:
                 guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
             names = (automaton.name, guard, automaton.modes[source], automaton.modes[target])
-            yield Occurrence(Instant(high, low), "transition", *names, -1, x_minus, x_plus)
+            yield Occurrence(Instant(high, low), automaton.kind, *names, -1, x_minus, x_plus)

@@ -7,8 +7,9 @@ multiplication an order instead of a convolution.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -71,8 +72,46 @@ class LeanTape:
     monitors: np.ndarray
 
 
-def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable[int]) -> LeanTape:
-    """The lean form of the rows of one vector of modes, with its active guards."""
+def twins_of(tape: dict[str, Any]) -> dict[int, int]:
+    """Registers that are constant in some modes and not in others, with the register that each has where it is.
+
+    A compiled loop keeps its registers from mode to mode and writes of a constant the leading coefficient alone: what
+    another mode has left behind that would still stand there.
+    """
+    kinds = [dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR} for _ in range(2)]
+    least, most = kinds
+    paired: set[int] = set()
+    for _, branches in tape["parts"]:
+        found: dict[int, list[tuple[int, int]]] = {}
+        for branch in branches:
+            below, above = dict(least), dict(most)
+            for op, *given, out in branch:
+                for kind in (below, above):
+                    kind[out] = _kind(op, [kind.get(r, CONSTANT) for r in given[: _registers(op)]])
+                    if op in _PAIRED:
+                        kind[out + 1] = kind[out]
+                if op in _PAIRED:
+                    paired.add(out)
+                for r in (out, out + 1) if op in _PAIRED else (out,):
+                    found.setdefault(r, []).append((below[r], above[r]))
+        for out, seen in found.items():
+            least[out], most[out] = min(low for low, _ in seen), max(high for _, high in seen)
+    twins: dict[int, int] = {}
+    for out in sorted(most):
+        if most[out] != CONSTANT and least[out] == CONSTANT and out not in twins:
+            twins[out] = tape["registers"] + len(twins)
+            if out in paired:
+                twins[out + 1] = tape["registers"] + len(twins)
+    return twins
+
+
+def lean(
+    tape: dict[str, Any],
+    rows: Iterable[tuple[int, ...]],
+    active: Iterable[int],
+    twins: Mapping[int, int] = MappingProxyType({}),
+) -> LeanTape:
+    """The lean form of the rows of one vector of modes, with its active guards; twins as found by `twins_of`."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     same: dict[int, int] = {}  # a copy -> what it is a copy of
     constant_rows: list[tuple[int, ...]] = []
@@ -88,7 +127,10 @@ def lean(tape: dict[str, Any], rows: Iterable[tuple[int, ...]], active: Iterable
         if op in _PAIRED:
             kind[out + 1] = kind[out]
         if kind[out] == CONSTANT:
-            constant_rows.append((op, a, b, c, out))
+            for r in (out, out + 1) if op in _PAIRED else (out,):
+                same[r] = twins.get(r, r)
+                kind[same[r]] = CONSTANT
+            constant_rows.append((op, a, b, c, same[out]))
         else:
             series_rows.append((*_special(op, a, b, c, kinds), out))
 

@@ -78,8 +78,9 @@ def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
 class Locator:
     """Searches the steps of one segment; remembers on which side each guard and monitor is."""
 
-    def __init__(self, flow: Flow, watch: Watch) -> None:
+    def __init__(self, flow: Flow, watch: Watch, rounding: Callable[[], np.ndarray]) -> None:
         self.flow = flow
+        self.rounding = rounding  # of the states, on the segment so far
         self.numbers = watch.guards
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
@@ -100,6 +101,9 @@ class Locator:
             for g in self.numbers[~still]:
                 sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
                 order = int(self.orders[g]) if side else 0
+                floor = self.floors[g]
+                if flow.system.is_corner[flow.system.owner[g]]:  # within rounding either of its sides will do
+                    floor = max(floor, self._bound(step, int(g), self.rounding()))
                 found, grazed, guard_ends[g], gap = find_roots(
                     sample,
                     values[:, g],
@@ -107,7 +111,7 @@ class Locator:
                     side or 1,
                     -1,
                     self._rounding(step, int(g), False),
-                    self.floors[g],
+                    floor,
                 )
                 grazings += [(int(g), z) for z in grazed]
                 exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
@@ -153,15 +157,17 @@ class Locator:
 
         def bound() -> float:
             if not known:
-                flow = self.flow
                 errors = 4.0 * UNIT * np.maximum(np.abs(step.x0), np.abs(step.x1))
-                s_error = math.ulp(max(abs(step.s0), abs(step.s1)))
-                series = flow.system.series(step.s1, step.x1, flow.p, flow.z, errors, s_error)
-                bounds = series.monitor_bounds if is_monitor else series.guard_bounds
-                known.append(float(bounds[number, 0]))
+                known.append(self._bound(step, number, errors, is_monitor))
             return known[0]
 
         return bound
+
+    def _bound(self, step: Step, number: int, errors: np.ndarray, is_monitor: bool = False) -> float:
+        """How far a guard or monitor is off at the end of a step where the states are so far off."""
+        flow, s_error = self.flow, math.ulp(max(abs(step.s0), abs(step.s1)))
+        series = flow.system.series(step.s1, step.x1, flow.p, flow.z, errors, s_error)
+        return float((series.monitor_bounds if is_monitor else series.guard_bounds)[number, 0])
 
     def _sampler(
         self, step: Step, function: Callable[[np.ndarray, np.ndarray], np.ndarray], column: int

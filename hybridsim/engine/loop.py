@@ -163,7 +163,8 @@ class ModeLoop:
         if len(run.knots) > 1:
             record.segments.append(run.segment())
         passed = [(seen.s, self._sighting(seen)) for seen in run.sightings]
-        passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in run.grazings]
+        declared = (g for g in run.grazings if not self.system.is_corner[self.system.owner[g[0]]])
+        passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in declared]
         record.occurrences.extend(occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0])))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
@@ -365,7 +366,7 @@ class ModeLoop:
             automaton = system.automata[change.component]
             self._occur(
                 instant,
-                "transition",
+                automaton.kind,
                 automaton.name,
                 change.guard,
                 automaton.modes[change.source],

@@ -18,7 +18,8 @@ class Automata(NamedTuple):
 
     guards_of (C, M, W); hold, above, pin, surface (C,); owner, place (G,): component of a guard, index in its mode;
     cluster_start (C + 1,), cluster (members): the cluster of each component; target, reset (C, M, W, T) of choices;
-    reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index).
+    reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index);
+    is_corner (C,).
     """
 
     guards_of: np.ndarray
@@ -34,6 +35,7 @@ class Automata(NamedTuple):
     reset: np.ndarray
     reset_start: np.ndarray
     reset_slot: np.ndarray
+    is_corner: np.ndarray
 
 
 class Tapes(NamedTuple):
@@ -100,6 +102,7 @@ def _automata(system: System) -> Automata:
         target,
         reset,
         *_flat(reset_slots),
+        system.is_corner,
     )
 
 

@@ -175,7 +175,8 @@ def judge_members(
 ) -> int:
     """Verdict on the guards of some components in the candidate z; sides, orders and bounds of all guards' values.
 
-    is_on: the located guard is still to be crossed. continuous: all unknowns stay as they were.
+    is_on: the located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns
+    stay as they were.
     """
     values, bounds, on_surface = work.values, work.bounds, work.on_surface
     guards_of, hold = automata.guards_of, automata.hold
@@ -190,7 +191,7 @@ def judge_members(
             g = guards_of[c, z[c], j]
             if g < 0:
                 continue
-            is_fired = is_on and g == fired and z[c] == at.z[c]
+            is_fired = is_on and g == fired and (z[c] == at.z[c] or automata.is_corner[c])
             zeros = decreed_zeros(j == 0, on_surface[c], is_holding, is_smooth, is_fired)
             side, order = side_after(values[g], bounds[g], zeros)
             sides[g], orders[g] = side, order if order <= ORDER else 0
@@ -270,7 +271,7 @@ def settle_ordinary(
             return NOT_ORDINARY, False
         if lin.kinds.shape[0] > 0:
             functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
-        continuous, is_on, vector = False, False, p
+        continuous, is_on, vector = False, automata.is_corner[c], p
     k = find_modes(tapes.modes, z)
     if k < 0:
         return NOT_ORDINARY, False
@@ -377,7 +378,7 @@ def take_choice(
 ) -> bool:
     """The declared transition of the guard, with its reset; False where surfaces may have been jumped over."""
     for d in range(z.shape[0]):
-        if automata.hold[d] >= 0:
+        if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
             return False
     c, n, count = automata.owner[fired], x.shape[0], z.shape[0]
     n_discrete, discrete_at = discrete

@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.driving import refuse_driving
 from hybridsim.engine.modules import compiled, is_cached
 from hybridsim.engine.system import System
+from hybridsim.model.smoothing import smoothed
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -43,8 +44,9 @@ class Report:
 
 def describe(model: Model) -> Report:
     """Lower a model (nothing is compiled) and say what came of it; what no run would start with is refused."""
+    model = smoothed(model)
     known = is_cached(model)
-    system = System(model)
+    system = System(model, as_written=True)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)
     modes = np.array([automaton.initial for automaton in system.automata], dtype=np.int64)
     refuse_driving(system, 0.0, system.start_state({}), discrete, modes)

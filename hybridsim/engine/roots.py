@@ -226,7 +226,8 @@ def find_roots(
     first : values at `POINTS` over the whole step
     order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
     rounding : bound of the rounding error of one value; asked for only where nothing else tells
-    floor : what the location of the last event leaves uncertain, where the function starts from zero
+    floor : what the location of the last event leaves uncertain, where the function starts from zero; values below it
+        are not looked into
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
     Returns the crossings and grazings in order, the sign at the end of the step (0 where it is within the bound), and
@@ -253,7 +254,7 @@ def find_roots(
             undefined = min(undefined, b if np.isfinite(samples[0]) else a)
             last, open_from, low = 0, -1.0, math.inf
             continue
-        resolved = error <= _ACCEPT * largest or depth == _DEEPEST
+        resolved = error <= _ACCEPT * largest or depth == _DEEPEST or _GROWTH * largest <= floor
         if not resolved and not (depth >= _ROUNDING_DEPTH and error <= _GROWTH * rounding()):
             middle = 0.5 * (a + b)
             waiting += [(middle, b, None, depth + 1), (a, middle, None, depth + 1)]

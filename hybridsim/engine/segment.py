@@ -93,7 +93,7 @@ class SegmentRun:
         self.tolerances, self.counters, self.progress = tolerances, counters, progress
         self.watch = watch
         self.flow = Flow(system, p, z, counters, forward)
-        self.locator = Locator(self.flow, watch)
+        self.locator = Locator(self.flow, watch, self.rounding)
         self.monitors = system.model.monitors
         self.knots, self.states = [0.0], [x]
         self.interpolants: list[Dense] = []

@@ -35,7 +35,7 @@ class SeriesRun:
         tape, self.lean = system.code.data["tape"], system.lean_tape(z)
         self.rtol, self.atol = max(tolerances.rtol, _TIGHTEST), tolerances.atol
         self.order = series_order(self.rtol, system.is_linear)
-        self.V = np.zeros((tape["registers"], self.order + 1))
+        self.V = np.zeros((system.registers.count, self.order + 1))
         for register, value, _ in tape["constants"]:
             self.V[register, 0] = value
         for register, source in tape["parameters"]:

@@ -66,6 +66,8 @@ class Settling:
         self.released_by = self._release_guards(located)
         surfaces = self._surface_components()
         open_ = {c for c, _, _ in self._fired_guards()}
+        if (self.system.is_corner[list(open_)]).any():
+            open_ = self._past_corners(open_)
         failure = self._transitions(open_ - surfaces, list(resets))
         if failure:
             return self._stop(*failure)
@@ -105,6 +107,21 @@ class Settling:
             f"transitions follow each other over and over, {limit} rounds without rest ({names}); "
             f"guards that fire: {guards}",
         )
+
+    def _past_corners(self, open_: set[int]) -> set[int]:
+        """Let corners change their sides; return the other components whose guards fire on these sides as well.
+
+        What was located by a series past a corner, such as a zero of a guard that turns back there, does not.
+        """
+        corners = {c for c in open_ if self.system.is_corner[c]}
+        self._transitions(corners, [])
+        decreed = self._decreed(self.at.z, continuous=False)
+        staying = set()
+        for c in open_ - corners - self._surface_components():
+            if self._judge(self.at.z, self.at.x, decreed, [c]) != LEAVES:
+                staying.add(c)
+                self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
+        return open_ - corners - staying
 
     def _take_sides(self) -> set[int]:
         """Give every surface component the mode of the side it is on; return those that are on the surface."""
@@ -161,6 +178,8 @@ class Settling:
 
     def _note_undecided(self, component: int) -> None:
         automaton = self.system.automata[component]
+        if automaton.is_corner:
+            return  # either side will do
         mode = automaton.modes[self.at.z[component]]
         self.warnings.append(f"undecided at rounding: {automaton.name} keeps mode {mode}")
 
@@ -213,8 +232,10 @@ class Settling:
                 resets.append(("choice", c, mode, j, number))
                 taken.append((c, name, mode, target))
                 z_plus[c] = target
-            for j in range(len(automaton.guards[mode])):
-                self.fired[automaton.guards[mode][j]] = False
+            if not automaton.is_corner:  # a corner is still at zero, on its other side
+                self.fired[list(guards)] = False
+        if resets or any(not self.system.is_corner[c] for c, *_ in taken):
+            self.fired[self.system.is_corner[self.system.owner]] = False
         for key in resets:
             x_one, p_one = at.x.copy(), at.p.copy()
             system.apply_reset(key, at.s, at.x, at.p, at.z, x_one, p_one)
@@ -222,7 +243,7 @@ class Settling:
             if clash:
                 return "inconsistent", clash
         self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
-        self.jumped = self.jumped or bool(taken) or bool(resets)
+        self.jumped = self.jumped or any(not system.is_corner[c] for c, *_ in taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
         return None
 
@@ -358,7 +379,8 @@ class Settling:
         """Whether every change so far leaves all unknowns as they were: releases at the limit without a jump."""
         if self.jumped:
             return False
-        changed = [c for c in components if z[c] != self.before[c]]
+        is_corner = self.system.is_corner
+        changed = [c for c in components if z[c] != self.before[c] and not is_corner[c]]
         if not changed:
             return True
         jumps = self.system.jumps(self.at.s, self.at.x, self.at.p, z)

@@ -20,6 +20,8 @@ def settled_start(system: System, task: Task, p: np.ndarray, due: tuple[int, ...
         at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
         resets = [("schedule", k) for k in due]
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
+        # a corner has no side to change before it has found one
+        known.changes = [change for change in known.changes if not system.is_corner[change.component]]
         if len(system.starts) >= _MOST:
             system.starts.clear()
         system.starts[key] = known

@@ -12,15 +12,20 @@ import numpy as np
 from hybridsim.engine.differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
+from hybridsim.engine.lean_tape import LeanTape, has_corners, lean, twins_of
 from hybridsim.engine.modules import compiled
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase
+from hybridsim.model.component import Corner
+from hybridsim.model.smoothing import smoothed
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
+
+
+CORNER = "corner"  # the kind of an event that is a corner's change of side
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,12 @@ class Automaton:
     below: int = -1
     hold: int = -1
     initial: int = -1
+    is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
+
+    @property
+    def kind(self) -> str:
+        """What a change of its mode is called."""
+        return CORNER if self.is_corner else "transition"
 
     @property
     def has_surface(self) -> bool:
@@ -61,7 +72,8 @@ class _Registers:
     """Where the tape's inputs are, as index arrays."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        self.count: int = tape["registers"]
+        self.twins = twins_of(tape)
+        self.count: int = tape["registers"] + len(self.twins)
         time: int = tape["time"]
         constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
         values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)
@@ -134,14 +146,22 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
             else (-1, -1, -1)
         ),
         initial=-1 if component.initial is None else names.index(component.initial),
+        is_corner=isinstance(component, Corner),
     )
 
 
 class System:
-    """A model with values: what integrators and the mode loop work on."""
+    """A model with values: what integrators and the mode loop work on.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    Parameters
+    ----------
+    as_written : take corners inside a mode as they stand, instead of as components (`hybridsim.model.smoothing`), which
+        come after those that the model declares.
+    """
+
+    def __init__(self, model: Model, as_written: bool = False) -> None:
+        self.written = model  # held for as long as the system is: `recent` knows systems by it
+        self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data
         self.names = tuple(s.name for s in model.states)
@@ -171,6 +191,8 @@ class System:
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
+        self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
+        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
         self.has_tape: bool = data["tape"] is not None  # it is made from expressions
         if self.has_tape:
             self._registers: _Registers = self.code.shared(
@@ -343,7 +365,8 @@ class System:
         """The tape of the modes z for series of any order."""
         key = z.tobytes()
         if key not in self._lean:
-            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), np.flatnonzero(self.active(z)))
+            active = np.flatnonzero(self.active(z))
+            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), active, self._registers.twins)
         return self._lean[key]
 
     def series(

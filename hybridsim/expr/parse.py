@@ -22,6 +22,7 @@ from hybridsim.expr.grammar import (
     MAX_INTEGER,
     MAX_LENGTH,
 )
+from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
@@ -156,7 +157,7 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
         return expr
     where = expr.place or Place()
     try:
-        tree = _replaced(expr.tree, parts)
+        tree = with_names(expr.tree, parts)
         check_size(tree, expr.text, where, MAX_DERIVED_DEPTH, MAX_DERIVED_NODES)
         text = write(tree)
         names = check_tree(tree, text, where, columns=False)
@@ -165,27 +166,6 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
             f"'{_short(expr.text)}' is nested too deeply once its names are put in", remedy="simplify it."
         ) from None
     return Expression(text, names, expr.place, tree)
-
-
-def _replaced(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
-    """A copy of the tree with names exchanged; leaves are shared, since nothing ever changes a tree."""
-    match node:
-        case ast.Name(id=name):
-            return parts.get(name, node)
-        case ast.UnaryOp(op=op, operand=operand):
-            return ast.UnaryOp(op, _replaced(operand, parts))
-        case ast.BinOp(left=left, op=operator, right=right):
-            return ast.BinOp(_replaced(left, parts), operator, _replaced(right, parts))
-        case ast.BoolOp(op=boolean, values=values):
-            return ast.BoolOp(boolean, [_replaced(value, parts) for value in values])
-        case ast.Compare(left=left, ops=ops, comparators=others):
-            return ast.Compare(_replaced(left, parts), ops, [_replaced(other, parts) for other in others])
-        case ast.IfExp(test=test, body=body, orelse=orelse):
-            return ast.IfExp(_replaced(test, parts), _replaced(body, parts), _replaced(orelse, parts))
-        case ast.Call(func=func, args=args):
-            return ast.Call(func, [_replaced(arg, parts) for arg in args], [])
-        case _:
-            return node
 
 
 def _check_text(text: str, where: Place) -> None:

@@ -41,7 +41,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if steps > _MANY:
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
-        return Choice("dop853", "its modes are not stiff at the start, and have corners")
+        return Choice("dop853", "its modes are not stiff at the start, and jump inside")
     if rtol < _TIGHT:
         return Choice("taylor", "its modes are smooth and the tolerance is tight")
     return Choice("dop853", "its modes are smooth and not stiff at the start")

@@ -24,7 +24,7 @@ CAPABILITIES = {
     "accumulation": "events that follow each other ever faster, down to rounding",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
-    "corners": "corners and jumps (abs, min, max, sign, a condition) inside a mode",
+    "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",
     "functions": "models whose rates are a Python function",
     "stiff": "rates that differ by many decades",
     "nonlinear": "flows and guards that are not linear in the states",

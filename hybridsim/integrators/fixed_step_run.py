@@ -261,11 +261,13 @@ class FixedStepRun:
         self.x, self.z, self.discrete = outcome.x, outcome.z, system.discrete(outcome.p).copy()
         for change in outcome.changes:
             automaton = system.automata[change.component]
+            if starting and automaton.is_corner:
+                continue
             source, target = automaton.modes[change.source], automaton.modes[change.target]
             record.occurrences.append(
                 Occurrence(
                     instant,
-                    "transition",
+                    automaton.kind,
                     automaton.name,
                     change.guard,
                     source,

@@ -74,7 +74,7 @@ class RungeKuttaIntegrator(Integrator):
     """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
 
     Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
-    corners inside a mode and Python functions do, since it looks at guards through their series.
+    what jumps inside a mode and Python functions do, since it looks at guards through their series.
     """
 
     tableau: ClassVar[Tableau]

@@ -45,7 +45,10 @@ class NativeStepper:
         from scipy.integrate import solve_ivp
 
         self.flow = flow
-        guards = [int(g) for g in watch.guards]
+        system = flow.system
+        # the argument of a corner may stay at zero, which the test of signs takes for an event at every step
+        still = system.is_corner[system.owner[watch.guards]] & (watch.sides[watch.guards] == 0)
+        guards = [int(g) for g in watch.guards[~still]]
         monitors = list(range(len(watch.monitor_sides)))
         events = [self._guard(g) for g in guards] + [self._monitor(k) for k in monitors]
         longest, period = tolerances.max_step, system_period(flow.system)

@@ -110,7 +110,7 @@ class Taylor(Integrator):
     when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
     lacks: ClassVar[dict[str, str]] = {
         "stiff": "explicit: its step is bound by the fastest rate",
-        "corners": "a series follows one side of an abs, min, max, sign or condition past its corner",
+        "corners": "a series follows one side of what jumps inside a mode past its jump ('hybridsim check' names it)",
         "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True

@@ -136,3 +136,11 @@ class Component(Declared):
             if mode.name == name:
                 return mode
         raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Corner(Component):
+    """A component that the program makes of a corner such as ``abs(v)``; its two modes, ``+`` and ``-``, agree at zero.
+
+    It is decided as any other. A run keeps it apart from what the model declares (`hybridsim.model.smoothing`).
+    """

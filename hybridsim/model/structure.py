@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression
-from hybridsim.model.component import Component
+from hybridsim.model.component import Component, Corner
 from hybridsim.model.inputs import Input
 from hybridsim.model.schedule import Schedule
 
@@ -44,7 +44,8 @@ def _lines(model: Model) -> Iterator[str]:
 
 
 def _component(component: Component) -> Iterator[str]:
-    yield f"component {component.name} initial {component.initial}"
+    kind = "corner" if isinstance(component, Corner) else "component"
+    yield f"{kind} {component.name} initial {component.initial}"
     surface = component.surface
     if surface:
         yield (

@@ -39,3 +39,24 @@ def test_a_sound_model_leaves_stderr_empty(hybridsim: Callable) -> None:
     code, out, err = hybridsim("check", "dfcs", "--json")
     assert (code, err) == (0, "")
     assert json.loads(out)["warnings"] == []
+
+
+CORNERED = """schema = 1
+name = "cornered"
+[states]
+x = { start = 1, der = "v" }
+v = { start = 0, der = "-abs(x) - sign(v)" }
+"""
+
+
+def test_corners_and_jumps_are_accounted_for(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "cornered.toml").write_text(CORNERED)
+    code, out, _ = hybridsim("check", "cornered.toml")
+    assert code == 0
+    assert "abs(x) in state v: two modes that agree where they change" in out
+    assert "sign(v) in state v: integrated as it stands, it jumps" in out
+    primitives = json.loads(hybridsim("check", "cornered.toml", "--json")[1])["primitives"]
+    assert [(one["text"], one["became"], one["line"]) for one in primitives] == [
+        ("abs(x)", "component", 5),
+        ("sign(v)", "kept", 5),
+    ]

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from conformance import oscillators
+from conformance import corners, oscillators
 from conformance.checks import equals, exact_stick, says
 from conformance.facts import CASES, TRUTHS
 from conformance.scene import END, Scene, Truth
@@ -516,6 +516,7 @@ def left_once(solution: Any) -> list[str]:
 # Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
 NONLINEAR = {
     "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
+    "drag",
 }  # fmt: skip
 
 
@@ -536,5 +537,6 @@ SCENES: tuple[Scene, ...] = tuple(
         *scheduled(),
         *backward(),
         *coincidences(),
+        *corners.scenes(),
     )
 )

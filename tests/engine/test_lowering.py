@@ -110,7 +110,7 @@ def close(found: float, true: mpmath.mpf, size: float) -> bool:
 
 def check_model(model: Model, seed: int, pinned: bool) -> None:
     """Flow, guards, surfaces, monitors and quantities at random states, in every combination of modes."""
-    system, rng = System(model), np.random.default_rng(seed)
+    system, rng = System(model, as_written=True), np.random.default_rng(seed)
     for z in combinations(system):
         modes = system.mode_names(z)
         origin, s = Instant(float(rng.uniform(0, 5))), float(rng.uniform(0, 0.01))
@@ -212,7 +212,7 @@ def test_random_expressions_keep_their_values_in_the_generated_code() -> None:
         parameters={n: getattr(point, n) for n in ("a", "b", "c")},
         monitors=tuple(Monitor(f"m{k}", text, direction="both") for k, text in enumerate(texts)),
     )
-    system = System(model)
+    system = System(model, as_written=True)
     for _ in range(20):
         point = Point(*(pick.uniform(-1, 1) for _ in range(4)), pick.uniform(0, 1))
         x = np.array([[getattr(point, n) for n in STATES]])

@@ -57,7 +57,7 @@ def test_a_hundred_periods_of_dry_friction_to_rounding(F0: float, ratio: float) 
         ("sin(t**2) - x", "a sine or an exponential of what is not linear in time alone"),
         ("-tanh(v)", "a tangent of what moves"),
         ("sinh(x)", "a hyperbolic function of what moves"),
-        ("-abs(x)", "a corner, a jump or another function of what moves"),
+        ("-sign(x)", "a corner, a jump or another function of what moves"),
         ("-x if x > 0 else -v", "a corner, a jump or another function of what moves"),
         ("t**9 - x", "a product of more than 8 functions of time"),
     ],
@@ -67,7 +67,7 @@ def test_what_is_not_linear_is_refused_with_the_reason(rate: str, reason: str) -
         hs.simulate(oscillator(rate), (0, 1), integrator="exact")
 
 
-@pytest.mark.parametrize("guard", ["x*v + 1", "x + t*x", "sin(x) + 0.5", "abs(x) - 0.1"])
+@pytest.mark.parametrize("guard", ["x*v + 1", "x + t*x", "sin(x) + 0.5", "sign(x) - 0.1"])
 def test_a_guard_that_is_not_linear_is_refused_by_name(guard: str) -> None:
     with pytest.raises(hs.UsageError, match="guard g of c in mode a has"):
         hs.simulate(oscillator("-x", guard), (0, 1), integrator="exact")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from hybridsim.analysis.trajectory import Trajectory
 from hybridsim.errors import UsageError
+from hybridsim.model.component import Corner
+from hybridsim.model.smoothing import smoothed
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -25,7 +27,8 @@ def multiple_precision_trajectory(
 
     It reads the declaration alone: expressions become series in mpmath numbers, an event is where a guard's series
     leaves zero downward, and what follows it is found by trying the modes (`multiple_precision.settling` has the rules
-    in words). So it agrees with the engine only where both are right. Numbers are the doubles that the engine uses:
+    in words). So it agrees with the engine only where both are right. Corners inside a mode are components in both
+    (`hybridsim.model.smoothing`). Numbers are the doubles that the engine uses:
     parameters, initial values and times are worked out in double precision first and exact from there on.
 
     Parameters
@@ -41,7 +44,7 @@ def multiple_precision_trajectory(
 
     Errors
     ------
-    UsageError naming what is not supported: flows or guards with corners or conditionals, motion along a surface of a
+    UsageError naming what is not supported: flows or guards that jump inside a mode, motion along a surface of a
     general automaton, more than four coupled contacts at once, events that accumulate, running backward in time.
     SimulationError where the model has no unique motion, or a fatal guard ends it.
 
@@ -58,12 +61,13 @@ def multiple_precision_trajectory(
         raise UsageError(
             f"the multiple-precision run goes forward, and t_span is {t_span}", remedy="let t1 be after t0"
         )
-    model.validate()
+    model = smoothed(model.validate())
+    corners = {component.name for component in model.components if isinstance(component, Corner)}
     run = Run(model, t_span, Precision.of(digits), progress)
     run.follow()
     return Trajectory(
         states=run.motion,
         t_span=(t_span[0], float(run.now.point.t)),
-        events=tuple(run.events),
-        initial_modes=run.initial_modes,
+        events=tuple(event for event in run.events if event.component not in corners),
+        initial_modes={name: mode for name, mode in run.initial_modes.items() if name not in corners},
     )

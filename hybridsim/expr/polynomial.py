@@ -1,0 +1,148 @@
+"""The polynomial that a checked tree is, over whatever is no sum, product or whole power in it: what equals what."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+
+from hybridsim.expr.grammar import FUNCTIONS
+from hybridsim.expr.write import write
+
+Monomial = tuple[tuple[str, int], ...]
+"""Factors with their powers, in order; () is the constant."""
+Polynomial = Mapping[Monomial, Fraction]
+"""Monomials with their exact coefficients; none is zero."""
+
+_MOST_TERMS = 200  # a longer sum counts as a thing of its own
+_HIGHEST = 8  # so does a higher power
+_COMPARE = {
+    ast.Lt: lambda d: d < 0,
+    ast.LtE: lambda d: d <= 0,
+    ast.Gt: lambda d: d > 0,
+    ast.GtE: lambda d: d >= 0,
+}
+
+
+def polynomial(node: ast.expr) -> Polynomial:
+    """The polynomial of a tree; equal polynomials mean equal values (not the other way round).
+
+    Decimal numbers count with the exact value of their double. Functions and conditions of numbers that do not depend
+    on any name are worked out.
+    """
+    match node:
+        case ast.Constant(value=bool()):
+            return _thing(node)
+        case ast.Constant(value=int() | float() as number):
+            return _constant(Fraction(number))
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return polynomial(operand)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return scaled(polynomial(operand), Fraction(-1))
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return _sum(polynomial(left), polynomial(right))
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            return difference(left, right)
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return _product(polynomial(left), polynomial(right), node)
+        case ast.BinOp(left=left, op=ast.Div(), right=right):
+            return _quotient(polynomial(left), polynomial(right), node)
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            return _power(polynomial(left), polynomial(right), node)
+        case ast.IfExp(test=ast.Compare(left=left, ops=[op], comparators=[right]), body=body, orelse=orelse):
+            apart = constant_of(difference(left, right))
+            if apart is not None and type(op) in _COMPARE:
+                return polynomial(body if _COMPARE[type(op)](apart) else orelse)
+        case ast.Call(func=ast.Name(id=name), args=args):
+            return _call(name, args, node)
+    return _thing(node)
+
+
+def difference(left: ast.expr, right: ast.expr) -> Polynomial:
+    """The polynomial of left - right."""
+    return _sum(polynomial(left), scaled(polynomial(right), Fraction(-1)))
+
+
+def constant_of(p: Polynomial) -> Fraction | None:
+    """The value of a polynomial that is a number; None for any other."""
+    if not p:
+        return Fraction(0)
+    return p[()] if set(p) == {()} else None
+
+
+def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
+    """A polynomial times a number."""
+    return {m: c * factor for m, c in p.items()} if factor else {}
+
+
+def direction(p: Polynomial) -> tuple[frozenset[tuple[Monomial, Fraction]], int]:
+    """What all positive multiples of p and of -p have in common, and which of the two families p belongs to."""
+    first = min((m for m in p if m), default=())
+    lead = p[first]
+    return frozenset(scaled(p, 1 / lead).items()), 1 if lead > 0 else -1
+
+
+def _constant(value: Fraction) -> Polynomial:
+    return {(): value} if value else {}
+
+
+def _thing(node: ast.expr) -> Polynomial:
+    return {((write(node), 1),): Fraction(1)}
+
+
+def _named(text: str) -> Polynomial:
+    return {((text, 1),): Fraction(1)}
+
+
+def _sum(a: Polynomial, b: Polynomial) -> Polynomial:
+    total = {monomial: a.get(monomial, Fraction(0)) + b.get(monomial, Fraction(0)) for monomial in {**a, **b}}
+    return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
+
+
+def _product(a: Polynomial, b: Polynomial, node: ast.expr) -> Polynomial:
+    if len(a) * len(b) > _MOST_TERMS:
+        return _thing(node)
+    total: dict[Monomial, Fraction] = {}
+    for m, c in a.items():
+        for n, d in b.items():
+            powers = dict(m)
+            for factor, power in n:
+                powers[factor] = powers.get(factor, 0) + power
+            monomial = tuple(sorted(powers.items()))
+            total[monomial] = total.get(monomial, Fraction(0)) + c * d
+    return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
+
+
+def _quotient(a: Polynomial, b: Polynomial, node: ast.expr) -> Polynomial:
+    number = constant_of(b)
+    if number is not None:
+        return scaled(a, 1 / number) if number else _thing(node)
+    return _product(a, _named(f"1/({text_of(b)})"), node)
+
+
+def _power(base: Polynomial, exponent: Polynomial, node: ast.expr) -> Polynomial:
+    number = constant_of(exponent)
+    if number is None or number.denominator != 1 or not 0 <= number <= _HIGHEST:
+        return _named(f"({text_of(base)})**({text_of(exponent)})")
+    total: Polynomial = _constant(Fraction(1))
+    for _ in range(int(number)):
+        total = _product(total, base, node)
+    return total
+
+
+def _call(name: str, args: list[ast.expr], node: ast.expr) -> Polynomial:
+    parts = [polynomial(argument) for argument in args]
+    numbers = [number for part in parts if (number := constant_of(part)) is not None]
+    if len(numbers) == len(parts):
+        try:
+            value = float(FUNCTIONS[name].value(*map(float, numbers)))
+        except (ArithmeticError, ValueError):
+            return _thing(node)
+        return _constant(Fraction(value)) if math.isfinite(value) else _thing(node)
+    return _named(f"{name}({', '.join(map(text_of, parts))})")
+
+
+def text_of(p: Polynomial) -> str:
+    """A text that is the same for equal polynomials."""
+    return " + ".join(f"{c}*" + "*".join(f"{f}^{n}" for f, n in m) for m, c in sorted(p.items())) or "0"

@@ -1,0 +1,34 @@
+"""A copy of a checked tree in which each part has been exchanged for what a function makes of it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+
+Change = Callable[[ast.expr], ast.expr]
+
+
+def rebuilt(node: ast.expr, change: Change) -> ast.expr:
+    """The node with its direct parts changed; a leaf is returned as it is, since nothing ever changes a tree."""
+    match node:
+        case ast.UnaryOp(op=op, operand=operand):
+            return ast.UnaryOp(op, change(operand))
+        case ast.BinOp(left=left, op=operator, right=right):
+            return ast.BinOp(change(left), operator, change(right))
+        case ast.BoolOp(op=boolean, values=values):
+            return ast.BoolOp(boolean, [change(value) for value in values])
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            return ast.Compare(change(left), ops, [change(other) for other in others])
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            return ast.IfExp(change(test), change(body), change(orelse))
+        case ast.Call(func=func, args=args):
+            return ast.Call(func, [change(argument) for argument in args], [])
+        case _:
+            return node
+
+
+def with_names(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
+    """The tree with names exchanged, all at once."""
+    if isinstance(node, ast.Name):
+        return parts.get(node.id, node)
+    return rebuilt(node, lambda part: with_names(part, parts))

@@ -1,0 +1,94 @@
+"""What the names of a model stand for: what moves, what waits for a force that a mode solves for, the tree behind."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from hybridsim.expr.grammar import TIME
+from hybridsim.expr.polynomial import Polynomial, constant_of, direction, polynomial
+from hybridsim.expr.rebuild import with_names
+from hybridsim.model.one_sided import names_of
+
+if TYPE_CHECKING:
+    from hybridsim.model.component import Component, Mode
+    from hybridsim.model.model import Model
+
+Family = frozenset[object]
+"""Stands for an expression, its multiples by numbers and their negatives."""
+_MOST_PARTS = 2_000  # of a tree with its definitions written out; a larger one is compared as it was written
+
+
+class Meanings:
+    """Reads one model."""
+
+    def __init__(self, model: Model) -> None:
+        self.definitions = {name: expr.tree for name, expr in model.definitions}
+        components = model.all_components()
+        self.unknowns = {c.surface.unknown for c in components if c.surface}
+        behind = {name: [tree] for name, tree in self.definitions.items()}
+        for component in components:
+            for mode in component.modes:
+                for name, expr in mode.set.items():
+                    behind.setdefault(name, []).append(expr.tree)
+        given = {TIME, *(state.name for state in model.states), *(signal.name for signal in model.inputs)}
+        self.moving = _reaching(behind, given | self.unknowns)
+        self.forced = _reaching(behind, self.unknowns)
+
+    def lookup(self, name: str) -> ast.expr | None:
+        """The tree of a definition."""
+        return self.definitions.get(name)
+
+    def moves(self, node: ast.expr) -> bool:
+        """Whether a value can change while no mode does."""
+        return not names_of(node).isdisjoint(self.moving)
+
+    def reached(self, trees: Iterable[ast.expr]) -> set[str]:
+        """The definitions that trees depend on."""
+        open_ = {name for tree in trees for name in names_of(tree)} & self.definitions.keys()
+        found: set[str] = set()
+        while open_:
+            name = open_.pop()
+            found.add(name)
+            open_ |= (names_of(self.definitions[name]) & self.definitions.keys()) - found
+        return found
+
+    def written_out(self, node: ast.expr) -> ast.expr:
+        """A tree with its definitions put in."""
+        inner = node
+        while names_of(inner) & self.definitions.keys():
+            inner = with_names(inner, self.definitions)
+            if sum(1 for _ in ast.walk(inner)) > _MOST_PARTS:
+                return node
+        return inner
+
+    def family(self, node: ast.expr) -> tuple[Family, int]:
+        """The family of an expression and its sign in it; (empty, -1, 0 or 1) for a number."""
+        p: Polynomial = polynomial(self.written_out(node))
+        number = constant_of(p)
+        if number is not None:
+            return frozenset(), (number > 0) - (number < 0)
+        found, sign = direction(p)
+        return frozenset(found), sign
+
+    def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
+        """The signs that a mode implies while it lasts, by family: its guards', and 0 for a surface that it holds."""
+        surface = component.surface
+        known: dict[Family, int] = {}
+        for guard in mode.guards:
+            found, sign = self.family(guard.expr.tree)
+            if found:
+                known[found] = sign
+        if surface and mode.name == surface.hold:
+            known[self.family(surface.function.tree)[0]] = 0
+        return known
+
+
+def _reaching(behind: Mapping[str, Iterable[ast.expr]], given: set[str]) -> set[str]:
+    """The given names and all that depend on one of them."""
+    found, size = set(given), -1
+    while len(found) > size:
+        size = len(found)
+        found |= {name for name, trees in behind.items() if any(names_of(tree) & found for tree in trees)}
+    return found

@@ -1,0 +1,133 @@
+"""The primitives of expressions that are not smooth, and what became of each where a model uses it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import Place
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.one_sided import never_negative, number_of
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+    from hybridsim.model.model import Model
+
+# what became of a primitive
+COMPONENT, MODE, KEPT, POWER = "component", "mode", "kept", "power"
+_WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
+_LIMITED = ("sqrt", "log", "asin", "acos")
+_ZERO = ast.Constant(0)
+_HOLDS = {  # whether a comparison holds where its left side less its right one is positive, zero, negative
+    ast.Gt: (True, False, False),
+    ast.GtE: (True, True, False),
+    ast.Lt: (False, False, True),
+    ast.LtE: (False, True, True),
+}
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """One primitive that is not smooth and depends on what moves.
+
+    Parameters
+    ----------
+    text : as written, or as a law reads in its contact.
+    where : the rates, guards, definitions and variables that use it.
+    became : "component" (it switches like a component of two modes), "mode" (the modes of a component imply its side),
+        "kept" (integrated as it stands), "power" (a fractional power, which has no series at zero).
+    remark : the component, or the reason.
+    """
+
+    text: str
+    where: tuple[str, ...]
+    became: str
+    remark: str
+    place: Place | None
+
+
+def uses_primitives(model: Model) -> bool:
+    """Whether anything that is integrated or watched may have a corner or a jump, by a look at the words."""
+    return any(_WORD.search(expr.text) for expr in _expressions(model))
+
+
+def _expressions(model: Model) -> Iterator[Expression]:
+    yield from (state.der for state in model.states)
+    yield from (expr for _, expr in model.definitions)
+    for contact in model.contacts:
+        yield from (contact.velocity, contact.normal, contact.law.slip, contact.law.stick)
+        yield from (value for value in contact.law.parameters.values() if value is not None)
+        yield from contact.arguments.values()
+    for component in model.components:
+        for mode in component.modes:
+            yield from (*mode.der.values(), *mode.set.values(), *(guard.expr for guard in mode.guards))
+    yield from (monitor.expr for monitor in model.monitors)
+
+
+def limited(node: ast.expr, meanings: Meanings) -> ast.expr | None:
+    """The first part of a tree without a value beyond some border: a root, a logarithm, a fractional power."""
+    for part in ast.walk(node):
+        match part:
+            case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _LIMITED:
+                if meanings.moves(argument):
+                    return part
+            case ast.BinOp(left=base, op=ast.Pow(), right=exponent) if meanings.moves(base):
+                if not is_whole(exponent, meanings):
+                    return part
+    return None
+
+
+def is_whole(exponent: ast.expr, meanings: Meanings) -> bool:
+    """Whether an exponent is a whole number whatever the parameters are."""
+    value = number_of(exponent, {}, meanings.lookup)
+    return value is not None and value == round(value)
+
+
+def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanings) -> bool:
+    """Whether the form of an expression shows that it stays above zero: 1 + v**2, an exponential."""
+    match node:
+        case ast.Name(id=name) if (tree := meanings.lookup(name)) is not None:
+            return is_clear_of_zero(tree, numbers, meanings)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return any(
+                is_clear_of_zero(a, numbers, meanings) and never_negative(b, numbers, meanings.lookup)
+                for a, b in ((left, right), (right, left))
+            )
+        case ast.BinOp(left=left, op=ast.Mult() | ast.Div(), right=right):
+            return all(is_clear_of_zero(part, numbers, meanings) for part in (left, right))
+        case ast.Call(func=ast.Name(id="exp" | "cosh")):
+            return True
+    value = number_of(node, numbers, meanings.lookup)
+    return value is not None and value > 0.0
+
+
+Sides = tuple[ast.expr, ast.expr, ast.expr, ast.expr]
+"""Argument; the value where it is positive, negative, zero."""
+
+
+def sides_of(node: ast.expr) -> Sides | None:
+    """The sides of a primitive; None for any other node."""
+    match node:
+        case ast.Call(func=ast.Name(id="abs"), args=[u]):
+            return u, u, ast.UnaryOp(ast.USub(), u), u
+        case ast.Call(func=ast.Name(id="sign"), args=[u]):
+            return u, ast.Constant(1), ast.UnaryOp(ast.USub(), ast.Constant(1)), _ZERO
+        case ast.Call(func=ast.Name(id="max"), args=[a, b]):
+            return _minus(a, b), a, b, a
+        case ast.Call(func=ast.Name(id="min"), args=[a, b]):
+            return _minus(a, b), b, a, a
+        case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=body, orelse=orelse) if (
+            type(op) in _HOLDS
+        ):
+            above, at_zero, below = (body if holds else orelse for holds in _HOLDS[type(op)])
+            return _minus(a, b), above, below, at_zero
+    return None
+
+
+def _minus(a: ast.expr, b: ast.expr) -> ast.expr:
+    if isinstance(b, ast.Constant) and b.value == 0:
+        return a
+    return ast.BinOp(a, ast.Sub(), b)

@@ -1,0 +1,90 @@
+"""Scenes whose flows have corners: no event is seen, and the motion is as accurate as if there were none."""
+
+from __future__ import annotations
+
+import math
+
+from conformance.facts import TRUTHS
+from conformance.scene import Scene, Truth
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Bilinear spring, backlash, saturation, drag, a hinge, and the clipped elastogap."""
+    return _bilinear(), _backlash(), _saturation(), _drag(), _hinge(), _elastogap()
+
+
+def _bilinear() -> Scene:
+    """Frequency 2 on the right of x = 0, 1 on its left: half periods of pi/2 and pi."""
+    period = 1.5 * math.pi
+    quarter, root = math.pi / 4, math.sqrt(0.5)
+    states = (
+        (quarter / 2, (root, -2 * root)),
+        (quarter + math.pi / 2, (-2.0, 0.0)),
+        (period, (1.0, 0.0)),
+        (4 * period + quarter + 0.75 * math.pi, (-2 * root, 2 * root)),
+        (6 * period, (1.0, 0.0)),
+    )
+    return Scene("bilinear", "bilinear", (0.0, 6 * period), Truth((), states), unit=period, speed=2.0)
+
+
+def _backlash() -> Scene:
+    """Free flights of length 2 at speed 1 between half periods of a spring of frequency 2, an amplitude of 1/2."""
+    half = math.pi / 2
+    states = (
+        (0.5, (0.5, 1.0)),
+        (1 + half / 2, (1.5, 0.0)),
+        (1 + half + 0.5, (0.5, -1.0)),
+        (3 + half + half / 2, (-1.5, 0.0)),
+        (5 * (4 + 2 * half), (0.0, 1.0)),
+    )
+    return Scene("backlash", "backlash", (0.0, 5 * (4 + 2 * half)), Truth((), states), unit=7.0, speed=1.0)
+
+
+def _saturation() -> Scene:
+    """2 sin(t) is clipped between pi/6 and 5 pi/6; the rest integrates to 2 (1 - cos)."""
+    rise = 2 * (1 - math.cos(math.pi / 6))
+    top = rise + 2 * math.pi / 3
+    states = (
+        (math.pi / 6, (rise,)),
+        (math.pi / 2, (rise + math.pi / 3,)),
+        (5 * math.pi / 6, (top,)),
+        (math.pi, (top + rise,)),
+        (6 * math.pi, (0.0,)),
+    )
+    return Scene(
+        "saturation", "saturation", (0.0, 6 * math.pi), Truth((), states), unit=2 * math.pi, speed=3.0
+    )
+
+
+def _drag() -> Scene:
+    """Upward v = vt tan, downward -vt tanh, with vt the terminal speed."""
+    g, c, v0 = 9.81, 0.3, 5.0
+    terminal = math.sqrt(g / c)
+    rate = math.sqrt(g * c)
+    top = math.atan(v0 / terminal) / rate
+    states = (
+        (top / 2, (terminal * math.tan(rate * top / 2),)),
+        (top, (0.0,)),
+        (top + 0.5, (-terminal * math.tanh(rate * 0.5),)),
+        (top + 2.0, (-terminal * math.tanh(rate * 2.0),)),
+    )
+    return Scene("drag", "drag", (0.0, top + 2.0), Truth((), states), unit=1.0, speed=6.0)
+
+
+def _hinge() -> Scene:
+    states = tuple((t, (math.exp(-t), -math.exp(t), 0.0)) for t in (0.5, 2.0, 5.0))
+    return Scene("hinge", "hinge", (0.0, 5.0), Truth((), states), speed=100.0)
+
+
+def _elastogap() -> Scene:
+    """The motion of MSL-elastogap, whose modes are sides of corners here."""
+    states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
+    return Scene(
+        "elastogap-clipped",
+        "elastogap-clipped",
+        (0.0, 5.0),
+        Truth((), states),
+        unit=2.0,
+        speed=3.0,
+        tol_x=1e-7,
+    )
