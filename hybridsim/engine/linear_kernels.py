@@ -332,7 +332,7 @@ def falls_over(terms: Any, rest: float, longest: float) -> float:
 
 @inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
-    """As `first_zero`, where a guard is a + r cos(omega s + phase) and positive now; OPEN where it hardly gets below zero."""
+    """As `first_zero`, for a guard a + r cos(omega s + phase), positive now; OPEN where it hardly gets below zero."""
     j, terms = lin.waves[k, g], lin.terms
     level, size = 0.0, 0.0
     for i in range(lin.counts[k]):

@@ -34,8 +34,8 @@ class LinearTables(NamedTuple):
     J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
     in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
     the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor. slopes (K,
-    n, n + M): rates of the states. waves (K, G): the modal coordinate that turns without damping, where a guard sees one
-    such and else constants; -1 otherwise.
+    n, n + M): rates of the states. waves (K, G): the modal coordinate that turns without damping, where a guard sees
+    one such and else constants; -1 otherwise.
     """
 
     kinds: np.ndarray
