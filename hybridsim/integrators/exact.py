@@ -28,8 +28,9 @@ class Exact(Integrator):
     not is refused with what is in the way. B is block diagonal (see `hybridsim.engine.modal`), so that defective,
     oscillatory and stiff modes are taken alike. A guard that is one undamped wave has its zeros in closed form. Each
     other is followed by lower bounds made of its Taylor polynomial and the largest remainder, so that no zero is jumped
-    over, and its zeros are good to rounding. There is no step and no truncation: rtol and atol do not enter. A segment that holds something unusual (a monitor, an input, a question
-    of rounding, time running backward) is taken by its Taylor series to rounding, which converges everywhere.
+    over, and its zeros are good to rounding. There is no step and no truncation: rtol and atol do not enter. A segment
+    that holds something unusual (a monitor, an input, a question of rounding, time running backward) is taken by its
+    Taylor series to rounding, which converges everywhere.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """

@@ -222,7 +222,6 @@ def test_a_chirp_and_a_sine_have_their_angles() -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ('[states]\nx = { start = 0, der = "abs(x - 1) + 1" }\n', "abs"),
         ('[states]\nx = { start = 0, der = "1 if x < 1 else 2" }\n', "x < 1"),
         ('[states]\nx = { start = 0, der = "1 + x**0.5" }\n', r"power 0\.5"),
         (

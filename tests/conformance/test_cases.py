@@ -32,7 +32,13 @@ def test_scene(scene: Scene, name: str) -> None:
             assert any(reasons[capability] in str(refusal.value) for capability in missing)
 
 
-@pytest.mark.parametrize("name", [name for name in INTEGRATORS if name.startswith("scipy-")])
+NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
+QUICK = {"scipy-dop853", "scipy-rk45"}  # the others find their events by the same code of SciPy's
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NATIVE]
+)
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
 def test_events_found_by_scipy(scene: Scene, name: str) -> None:
     """Right, or wrong for a reason that is known; what is called wrong is."""
