@@ -30,6 +30,7 @@ from hybridsim.engine.trajectory import Trajectory
 _STEPS, _SEGMENTS = 4096, 1024  # room for one call
 # doubles for the series of one call, and how many steps there is room for in any case
 _ROOM, _FEWEST = 1 << 19, 64
+_GROWTH, _LARGEST = 8, 1 << 23  # of that room, for a segment that is longer
 _NONE = np.zeros(0, dtype=np.int64)  # the model has no monitors
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
@@ -88,6 +89,7 @@ class Leaper(ABC):
             layout.discrete,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
+        self.steps = min(max(_ROOM // (system.n * columns), _FEWEST), _STEPS)  # that there is room for
         self._renew()
 
     @abstractmethod
@@ -117,12 +119,11 @@ class Leaper(ABC):
     def _renew(self) -> None:
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
         n, count = self.system.n, len(self.system.automata)
-        steps = min(max(_ROOM // (n * self.columns), _FEWEST), _STEPS)
         self.used = (0, 0)  # rows of steps, rows of segments
         # one row more of segments: where each begins and where the last one ends
         self.record = (
-            np.empty((steps, 2)),
-            np.empty((steps, n, self.columns)),
+            np.empty((self.steps, 2)),
+            np.empty((self.steps, n, self.columns)),
             np.empty(_SEGMENTS + 1, dtype=np.int64),
             np.empty((_SEGMENTS + 1, 2)),
             np.empty((_SEGMENTS + 1, count), dtype=np.int64),
@@ -146,7 +147,7 @@ class Leaper(ABC):
             outcome.orders.copy(),
             outcome.guard_floors.copy(),
         )
-        as_packed = packed(state)
+        as_packed, n = packed(state), self.system.n
         try:
             work, room = self.spare.pop()
         except IndexError:
@@ -157,7 +158,10 @@ class Leaper(ABC):
             code, steps, count = self._go(to, clock, as_packed, work, room, rows)
             record.counters.kernel_time += perf_counter() - began
             self._count(record.counters, steps, room)
-            is_full = code == FULL and (count > 0 or self.used != (0, 0))
+            is_too_long = code == FULL and count == 0 and self.used == (0, 0)  # a single segment
+            if is_too_long:
+                self.steps *= _GROWTH
+            is_full = code == FULL and (not is_too_long or self.steps * n * self.columns <= _LARGEST)
             if count:
                 instants.append(self._commit(steps, count, state[2], clock, record))
             if is_full:

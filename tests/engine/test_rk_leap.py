@@ -12,7 +12,7 @@ from conformance.scene import Scene
 from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
-from hybridsim.engine import loop
+from hybridsim.engine import leaper, loop
 from hybridsim.engine.dense_guards import stays_positive
 from hybridsim.engine.hermite import bernstein_weights, fit_all, hermite, right_system, shift_matrix
 from hybridsim.engine.rk_leap import first_length
@@ -189,3 +189,22 @@ def test_dips_within_one_step(method: str) -> None:
         model = still(f"sin(40*x) + 1 + {lowest}")
         sol = hs.simulate(model, (0, 8), integrator=method, rtol=1e-9)
         assert [event.t for event in sol.events] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+def test_a_segment_of_more_steps_than_there_is_room_for(
+    integrator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is given more, by a loop that commits the same steps in blocks of its own."""
+    model = hs.Model(
+        "spring", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")], parameters={}
+    )
+    whole = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
+    monkeypatch.setattr(leaper, "_STEPS", 4)
+    cramped = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
+    assert cramped.stats["steps"] == whole.stats["steps"] > 4
+    assert cramped(200.0).tolist() == whole(200.0).tolist()
+    assert [type(b).__name__ for b in cramped._trajectory.segments.blocks] in (
+        ["SeriesBlock"],
+        ["HermiteBlock"],
+    )
