@@ -9,7 +9,9 @@ them, once the states at 2000 times besides. Writes docs/studies/speed.md and it
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -28,6 +30,7 @@ ROOT = Path(__file__).parents[1]
 def main() -> None:
     """Run the study."""
     options = _options()
+    os.chdir(tempfile.mkdtemp())  # a C compiler leaves files where it is called
     every, lacking = methods()
     if options.methods:
         wanted = options.methods.split(",")
@@ -60,7 +63,10 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--turns", type=int, default=15, help="turns of each method")
     parser.add_argument("--out", type=Path, default=ROOT / "docs", help="where studies/ and images/ are")
     parser.add_argument("--truth", type=Path, default=None, help="folder where exact motions are kept")
-    return parser.parse_args()
+    options = parser.parse_args()
+    options.out = options.out.resolve()
+    options.truth = options.truth and options.truth.resolve()
+    return options
 
 
 if __name__ == "__main__":

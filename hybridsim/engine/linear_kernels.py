@@ -14,7 +14,7 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import allocating_kernel, inlined, kernel, polynomial_kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
-from hybridsim.engine.linear_tables import TERMS
+from hybridsim.engine.linear_tables import FARTHEST, TERMS
 
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _ITERATIONS = 100
@@ -22,6 +22,8 @@ _NEAR = 1e-9  # relative change by Newton's method that leaves an error below ro
 _POLISH = 6  # iterations of it from nearby
 _SAFE = 0.95  # to end on the safe side
 _HALVINGS = 5
+# What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
+_BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 # a monomial x**i on [0, 1] in Bernstein form of degree TERMS - 1: C(j, i)/C(TERMS - 1, i)
 _BERNSTEIN = np.array(
     [[math.comb(j, i) / math.comb(TERMS - 1, i) for j in range(TERMS)] for i in range(TERMS)]
@@ -395,9 +397,10 @@ def first_zero(
         moved(lin, k, c, hint, v)
         size_there, rest_there = guard_terms(lin, k, g, v, terms)
         error = margin * size_there + floor
-        d = zero_of_terms(terms, grown * rest_there, size_there, lower)
+        rest_there *= _BACKWARD * grown
+        d = zero_of_terms(terms, rest_there, size_there, lower)
         if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
-            width = falls_over(terms, grown * rest_there, hint)
+            width = falls_over(terms, rest_there, min(hint, _BACK * farthest))
             if abs(d) < width and (
                 width == hint or stays_positive(start, order, grown * rest, hint - width, lower)
             ):

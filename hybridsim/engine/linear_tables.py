@@ -17,7 +17,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.errors import UsageError
 
 TERMS = 16  # of the series that bounds a guard from below
-_FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
+FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 _ROUNDINGS = (
     8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
@@ -148,7 +148,7 @@ def linear_tables(system: System, met: list[np.ndarray], p: np.ndarray, horizon:
             seen = rests[k, g, :J] > 0.0
             fastest, growth = max(flow.speeds[seen], default=0.0), max(flow.growth[seen], default=0.0)
             if fastest > 0.0:
-                farthest[k, g] = _FARTHEST / fastest
+                farthest[k, g] = FARTHEST / fastest
             if growth > 0.0:
                 farthest[k, g], grown[k, g] = min(farthest[k, g], math.log(2.0) / growth), 2.0
     tables: LinearTables = packed(
