@@ -24,8 +24,6 @@ _DEFECT = 100.0  # as in the taylor integrator
 _SHORTER = 0.25
 _TRIALS = 30
 _SMALLEST = 10.0
-_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
-_ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
 class Room(NamedTuple):
