@@ -203,8 +203,8 @@ TAIL = """
 The deepest pair that is flagged and not found has a depth of {exact:.1e} of the size (`exact`) and {taylor:.1e}
 (`taylor`). The error bounds that the compiled searches work with are (16 + 2 J) 2^-53 of the size for J modal
 coordinates, 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k| of the guard's series on the step, at most 4
-rtol = {bound:.0e} of its largest value. So no pair whose dip exceeds ten times the bound is missed. Of the others each is
-found or flagged, but for those that the table counts as lost, far below the rounding of the guard's own terms.
+rtol = {bound:.0e} of its largest value. So no pair whose dip exceeds ten times the bound is missed. Of the others
+each is found or flagged, but for those that the table counts as lost, below the rounding of the guard's own terms.
 
 How to run: `python studies/guards.py [guards]`; the first run compiles. {minutes:.0f} minutes on one core.
 """
