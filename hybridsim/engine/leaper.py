@@ -159,9 +159,9 @@ class Leaper(ABC):
             record.counters.kernel_time += perf_counter() - began
             self._count(record.counters, steps, room)
             is_too_long = code == FULL and count == 0 and self.used == (0, 0)  # a single segment
-            if is_too_long:
-                self.steps *= _GROWTH
-            is_full = code == FULL and (not is_too_long or self.steps * n * self.columns <= _LARGEST)
+            if is_too_long and self.steps * _GROWTH * n * self.columns <= _LARGEST:
+                self.steps, is_too_long = self.steps * _GROWTH, False
+            is_full = code == FULL and not is_too_long
             if count:
                 instants.append(self._commit(steps, count, state[2], clock, record))
             if is_full:

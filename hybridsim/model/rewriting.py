@@ -155,7 +155,7 @@ class Rewriting:
             found = self.corners[family] = Found(self._title(node), self.walk(argument, here), sign)
         self.note(node, COMPONENT, found.name, here)
         pair = (self.walk(above, here), self.walk(below, here))
-        return self._variable(found.values, pair if sign == found.sign else pair[::-1])  # type: ignore[arg-type]
+        return self._variable(found.values, pair if sign == found.sign else pair[::-1])  # type: ignore[arg-type]  # a slice of two is two
 
     def _agrees(self, node: ast.expr, parts: Sides) -> bool:
         argument, above, below, _ = parts

@@ -150,6 +150,7 @@ class _Smoothing:
     def _watched(self, expr: Expression, here: Here) -> Expression:
         if self._has_corner(expr.tree):
             minus = isinstance(expr.tree, ast.UnaryOp) and isinstance(expr.tree.op, ast.USub)
+            # mypy does not see that minus means a UnaryOp
             if self.work.never_negative(expr.tree.operand if minus else expr.tree):  # type: ignore[attr-defined]
                 self.work.note(
                     expr.tree, MODE, "it never changes its sign, so that the monitor never fires", here
@@ -177,6 +178,7 @@ class _Smoothing:
         for m, (name, other) in enumerate((("+", "-"), ("-", "+"))):
             side = found.argument if m == 0 else ast.UnaryOp(ast.USub(), found.argument)
             values = {variable: self._expression(pair[m]) for variable, pair in found.values.items()}
+            # a name stands for a Choice, as in any declaration
             guard = Guard("side", self._expression(side), then=(other,))  # type: ignore[arg-type]
             modes.append(Mode(name, (guard,), set=values))
         return Corner(found.name, tuple(modes), initial="+")
