@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation
-from hybridsim.engine.fixed_dense import StepDense
+from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Situation
-from hybridsim.engine.pieces import Occurrence, Segment
+from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -71,10 +71,12 @@ class FixedStepRun:
         self.counts = np.zeros(3, dtype=np.int64)
         located = settings.step * 2.0**-settings.halvings  # how well an event is located
         self.accumulation = Accumulation(located, 4.0 * located)
-        self.scale = np.abs(self.x)  # largest size of each state lately: what rounding is relative to
+        self.lately = self.x[None, :]  # states of the last stretch, the size of which rounding is relative to
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.law = (settings.rule, settings.every_stage, settings.eps)
-        self.work = workspace(system.n, len(self.z), len(self.table), system.guard_count)
+        self.work = workspace(
+            system.n, len(self.z), len(self.table), system.guard_count, len(system.monitor_names)
+        )
 
     def run(self) -> Trajectory:
         """Step to the end; what was computed is kept in any case."""
@@ -138,8 +140,10 @@ class FixedStepRun:
             self.counts,
         )
         self.fresh[:] = False
-        self.scale = np.abs(states[:count]).max(axis=0)
-        self._keep(p, times[:count], states[:count], modes[:count], start_z)
+        if count < _ROWS:  # a short stretch does not hold on to room for a long one
+            times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
+        self.lately = states
+        self._keep(p, times, states, modes, start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
         instant = target if why == BOUND else self.origin.plus(s)
@@ -251,7 +255,8 @@ class FixedStepRun:
         sides = np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
         s_error = self.settings.step * 2.0**-self.settings.halvings if fired or monitors else 0.0
-        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale) + s_error * np.abs(
+        scale = np.abs(self.lately).max(axis=0)
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), scale) + s_error * np.abs(
             system.flow(0.0, self.x, p, self.z)
         )
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
@@ -307,21 +312,20 @@ class FixedStepRun:
     # -- the record -----------------------------------------------------------------------------------------
 
     def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
-        """Segments of constant modes out of the rows of one stretch, and the mode changes between them."""
+        """The rows of one stretch as segments of constant modes, and the mode changes between them."""
         record = self.record
         record.counters.steps += len(s) - 1
         if self.settings.rule == SIGN:
             self._side_of_zeros(z)
-        changed = np.flatnonzero((z[1:] != z[:-1]).any(axis=1)) + 1
-        if len(record.segments) and (z[0] != before).any():
-            self._changes(s[0], before, z[0], x[0])
-        for first, last in zip([0, *changed], [*changed, len(s) - 1], strict=True):
-            if last > first:
-                rows = slice(first, last + 1)
-                dense = StepDense(self.system, p, z[first].copy(), s[rows].copy(), x[rows].copy())
-                record.segments.append(Segment(self.origin, dense.z, p, dense.s, dense.x, dense))
-        for k in changed:
-            self._changes(s[k], z[k - 1], z[k], x[k])
+        sources = np.concatenate([(before if len(record.segments) else z[0])[None], z[:-1]])
+        rows, components = np.nonzero(sources != z)
+        segments = StepSegments(self.system, self.origin, p, s, x, z, np.unique(rows[rows > 0]))
+        record.segments.add(segments)
+        record.counters.events += len(rows)
+        places = (rows, components)
+        record.occurrences.add(
+            StepOccurrences(self.system, self.origin, rows, components, sources[places], z[places], s, x)
+        )
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
         """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
@@ -330,21 +334,3 @@ class FixedStepRun:
                 z[k, c] = z[k + 1, c]
             if z[-1, c] == hold and len(z) > 1:
                 z[-1, c] = z[-2, c]
-
-    def _changes(self, s: float, source: np.ndarray, target: np.ndarray, x: np.ndarray) -> None:
-        for c in np.flatnonzero(source != target):
-            automaton = self.system.automata[c]
-            self.record.counters.events += 1
-            self.record.occurrences.append(
-                Occurrence(
-                    self.origin.plus(float(s)),
-                    "transition",
-                    automaton.name,
-                    "",
-                    automaton.modes[source[c]],
-                    automaton.modes[target[c]],
-                    -1,
-                    x,
-                    x,
-                )
-            )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import allocating_kernel, call, kernel
+from hybridsim.engine.jit import call, inlined, kernel
 
 # why a stretch of steps ended
 BOUND, FULL, GUARD, MONITOR, NOT_FINITE = 0, 1, 2, 3, 4
@@ -14,7 +14,7 @@ BOUND, FULL, GUARD, MONITOR, NOT_FINITE = 0, 1, 2, 3, 4
 ZONE, SIGN = 0, 1
 
 
-@kernel
+@inlined
 def _any_held(table: Any, z: Any) -> bool:
     """Whether a surface component is in its holding mode."""
     for k in range(table.shape[0]):
@@ -23,7 +23,7 @@ def _any_held(table: Any, z: Any) -> bool:
     return False
 
 
-@kernel
+@inlined
 def choose_modes(
     addresses: Any,
     rule: int,
@@ -68,29 +68,56 @@ def choose_modes(
             break
 
 
-@allocating_kernel
-def slope(
-    addresses: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, out: Any, work: Any
+@kernel
+def _mean_of_sides(
+    flow: Any, table: Any, s: float, x: Any, p: Any, z: Any, sides: Any, out: Any, other: Any
 ) -> None:
-    """dx/dt; under SIGN an exact zero takes the mean of both sides, which is sgn(0) = 0 for a symmetric law."""
-    at_zero = False
-    if rule == SIGN:
-        for k in range(table.shape[0]):
-            at_zero = at_zero or z[table[k, 0]] == table[k, 3]
-    if not at_zero:
-        call(addresses[0], s, x, p, z, out)
-        return
-    sides = z.copy()
+    """dx/dt where velocities are exactly zero: the mean of both sides, which is sgn(0) = 0 for a symmetric law."""
+    for i in range(z.shape[0]):
+        sides[i] = z[i]
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3]:
             sides[table[k, 0]] = table[k, 1]
-    call(addresses[0], s, x, p, sides, out)
+    call(flow, s, x, p, sides, out)
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3]:
             sides[table[k, 0]] = table[k, 2]
-    call(addresses[0], s, x, p, sides, work)
+    call(flow, s, x, p, sides, other)
     for i in range(out.shape[0]):
-        out[i] = 0.5 * (out[i] + work[i])
+        out[i] = 0.5 * (out[i] + other[i])
+
+
+@inlined
+def _slope(
+    flow: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, sides: Any, out: Any, other: Any
+) -> None:
+    """dx/dt in the modes z."""
+    if rule == SIGN and _any_held(table, z):
+        _mean_of_sides(flow, table, s, x, p, z, sides, out, other)
+    else:
+        call(flow, s, x, p, z, out)
+
+
+@inlined
+def _step(
+    addresses: Any, law: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, out: Any, work: Any
+) -> None:
+    """See `rk4_step`: this is it, made part of its callers."""
+    rule, every_stage, eps = law
+    k, stage, other, modes, sides, surfaces, guards = work[:7]
+    n = x.shape[0]
+    for i in range(z.shape[0]):
+        modes[i] = z[i]
+    _slope(addresses[0], rule, table, s, x, p, modes, sides, k[0], other)
+    for j in range(1, 4):
+        c = 0.5 if j < 3 else 1.0
+        for i in range(n):
+            stage[i] = x[i] + c * h * k[j - 1, i]
+        if every_stage:
+            choose_modes(addresses, rule, eps, table, s + c * h, stage, p, modes, surfaces, guards)
+        _slope(addresses[0], rule, table, s + c * h, stage, p, modes, sides, k[j], other)
+    for i in range(n):
+        out[i] = x[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
 
 
 @kernel
@@ -99,37 +126,25 @@ def rk4_step(
 ) -> None:
     """One classic Runge-Kutta step of length h from (s, x) in z; the modes held over it, or chosen at every stage.
 
-    law: rule, every stage, eps. work: slopes (4, n), states (2, n), modes, surface values, guard values.
+    law: rule, every stage, eps. work: see `workspace`.
     """
-    rule, every_stage, eps = law
-    k, states, modes, surfaces, guards = work
-    stage, n = states[0], x.shape[0]
-    for i in range(z.shape[0]):
-        modes[i] = z[i]
-    slope(addresses, rule, table, s, x, p, modes, k[0], states[1])
-    for j in range(1, 4):
-        c = 0.5 if j < 3 else 1.0
-        for i in range(n):
-            stage[i] = x[i] + c * h * k[j - 1, i]
-        if every_stage:
-            choose_modes(addresses, rule, eps, table, s + c * h, stage, p, modes, surfaces, guards)
-        slope(addresses, rule, table, s + c * h, stage, p, modes, k[j], states[1])
-    for i in range(n):
-        out[i] = x[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+    _step(addresses, law, table, s, h, x, p, z, out, work)
 
 
-def workspace(n: int, components: int, surfaces: int, guards: int) -> tuple[np.ndarray, ...]:
-    """Arrays that `rk4_step` works in."""
-    return (
-        np.empty((4, n)),
-        np.empty((2, n)),
-        np.empty(components, dtype=np.int64),
-        np.empty(max(surfaces, 1)),
-        np.empty(max(guards, 1)),
-    )
+def workspace(n: int, components: int, surfaces: int, guards: int, monitors: int) -> tuple[np.ndarray, ...]:
+    """Arrays that the kernels work in.
+
+    For a step: slopes (4, n), a stage, another slope, modes, modes of one side, surface values, guard values. For the
+    march: surface values at both ends of a step, guard values, monitor values at both ends, a trial state, a held one.
+    """
+    surfaces, guards, monitors = max(surfaces, 1), max(guards, 1), max(monitors, 1)
+    modes = (np.empty(components, dtype=np.int64), np.empty(components, dtype=np.int64))
+    of_step = (np.empty((4, n)), np.empty(n), np.empty(n), *modes, np.empty(surfaces), np.empty(guards))
+    sizes = (surfaces, surfaces, guards, monitors, monitors, n, n)
+    return (*of_step, *(np.zeros(size) for size in sizes))
 
 
-@kernel
+@inlined
 def _leaves(values: Any, numbers: Any) -> bool:
     """Whether one of the watched guards is negative."""
     for i in range(numbers.shape[0]):
@@ -138,7 +153,7 @@ def _leaves(values: Any, numbers: Any) -> bool:
     return False
 
 
-@kernel
+@inlined
 def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
     """Row of the first slipping surface component whose sign changed over the step, -1 if none."""
     for k in range(table.shape[0]):
@@ -147,7 +162,7 @@ def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
     return -1
 
 
-@kernel
+@inlined
 def _released(values: Any, table: Any, z: Any) -> bool:
     """Whether a held component is beyond its limit."""
     for k in range(table.shape[0]):
@@ -205,7 +220,7 @@ def _halve_step(
     return high
 
 
-@allocating_kernel
+@kernel
 def run_steps(
     addresses: Any,
     settings: Any,
@@ -237,19 +252,20 @@ def run_steps(
     dichotomy, zeroed, located, rest = flags
     monitor_count = fresh.shape[0]
     n, s, direction = x.shape[0], 0.0, 1.0 if bound >= 0.0 else -1.0
-    surfaces, after, guards = work[3].copy(), work[3].copy(), work[4].copy()
-    monitors, monitors_after = np.zeros(max(monitor_count, 1)), np.zeros(max(monitor_count, 1))
-    trial, held = np.empty(n), np.empty(n)
+    surfaces, after, guards, monitors, monitors_after, trial, held = work[7:]
     planned, row = step, 0
     while True:
         choose_modes(addresses, rule, eps, table, s, x, p, z, surfaces, guards)
         if zeroed and _any_held(table, z):
             call(addresses[4], s, x, p, z, held)
-            x[:] = held
+            for i in range(n):
+                x[i] = held[i]
             call(addresses[1], s, x, p, z, surfaces)
         times[row] = s
-        states[row] = x
-        modes[row] = z
+        for i in range(n):
+            states[row, i] = x[i]
+        for i in range(z.shape[0]):
+            modes[row, i] = z[i]
         row += 1
         if s == bound:
             return row, BOUND
@@ -258,7 +274,7 @@ def run_steps(
         last = direction * (bound - s) <= planned * (1.0 + 1e-12)
         h = bound - s if last else direction * planned
         planned = step
-        rk4_step(addresses, law, table, s, h, x, p, z, trial, work)
+        _step(addresses, law, table, s, h, x, p, z, trial, work)
         counters[0] += 4
         for i in range(n):
             if not np.isfinite(trial[i]):
@@ -311,4 +327,5 @@ def run_steps(
                     planned = abs(h - tau)
                 h, last = tau, False
         s = bound if last else s + h
-        x[:] = trial
+        for i in range(n):
+            x[i] = trial[i]
