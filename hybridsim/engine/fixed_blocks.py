@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.blocks import OccurrenceList, SegmentList
+from hybridsim.engine.blocks import SegmentList
 from hybridsim.engine.fixed_dense import StepDense
 from hybridsim.engine.pieces import Occurrence, Segment
 from hybridsim.engine.system import System
@@ -50,17 +50,6 @@ class StepSegments(Sequence[Segment]):
         """End of the last one."""
         return self._origin.plus(float(self._s[self._last[-1]]))
 
-    @cached_property
-    def _made(self) -> SegmentList:
-        segments = SegmentList(self._system)
-        for first, last in zip(self._first.tolist(), self._last.tolist(), strict=True):
-            rows = slice(first, last + 1)
-            dense = StepDense(
-                self._system, self._p, self._z[first].copy(), self._s[rows].copy(), self._x[rows].copy()
-            )
-            segments.append(Segment(self._origin, dense.z, self._p, dense.s, dense.x, dense))
-        return segments
-
     @property
     def origins(self) -> np.ndarray:
         """Origins of local time (N, 2)."""
@@ -78,21 +67,30 @@ class StepSegments(Sequence[Segment]):
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """States (k, n) in the segments of these numbers, at local times (k,)."""
-        return self._made.states(index, s)
+        wanted, place = np.unique(index, return_inverse=True)
+        return SegmentList(self._system, (self[i] for i in wanted.tolist())).states(place, s)
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of segments, local times, states of all steps."""
-        return self._made.knots()
+        """Numbers of segments, local times, states of all steps; where segments meet, the row stands twice."""
+        counts = self._last - self._first + 1
+        starts = np.cumsum(counts) - counts
+        index = np.repeat(np.arange(len(self)), counts)
+        rows = np.arange(len(index)) - np.repeat(starts - self._first, counts)
+        return index, self._s[rows], self._x[rows]
 
-    def since(self, first: int) -> SegmentList:
+    def since(self, first: int) -> StepSegments:
         """Those from the first on."""
-        return self._made.since(first)
+        later = copy(self)
+        later._first, later._last = self._first[first:], self._last[first:]
+        return later
 
     def __getitem__(self, i: Any, /) -> Any:
-        return self._made[i]
-
-    def __iter__(self) -> Iterator[Segment]:
-        return iter(self._made)
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        first, last = int(self._first[i]), int(self._last[i])
+        s, x = self._s[first : last + 1].copy(), self._x[first : last + 1].copy()
+        dense = StepDense(self._system, self._p, self._z[first].copy(), s, x)
+        return Segment(self._origin, dense.z, self._p, s, x, dense)
 
 
 class StepOccurrences(Sequence[Occurrence]):
@@ -101,7 +99,7 @@ class StepOccurrences(Sequence[Occurrence]):
     Parameters
     ----------
     rows, components : (E,) the row at which each happens, in order, and the component that changes.
-    sources, targets : (E,) its modes.
+    changes : (E, 2) its modes before and after.
     s, x : local times and states of all rows of the stretch.
     """
 
@@ -111,13 +109,12 @@ class StepOccurrences(Sequence[Occurrence]):
         origin: Instant,
         rows: np.ndarray,
         components: np.ndarray,
-        sources: np.ndarray,
-        targets: np.ndarray,
+        changes: np.ndarray,
         s: np.ndarray,
         x: np.ndarray,
     ) -> None:
-        self._system, self._origin, self._components = system, origin, components
-        self._sources, self._targets = sources, targets
+        self._system, self._origin = system, origin
+        self._components, self._changes = components, changes
         self._s, self._x = s[rows], x[rows]
 
     def __len__(self) -> int:
@@ -128,34 +125,29 @@ class StepOccurrences(Sequence[Occurrence]):
         """Time of the last one."""
         return self._origin.plus(float(self._s[-1]))
 
-    @cached_property
-    def _made(self) -> OccurrenceList:
-        found = OccurrenceList()
-        rows = zip(
-            self._components.tolist(), self._sources.tolist(), self._targets.tolist(), self._s.tolist(), self._x,
-            strict=True,
-        )  # fmt: skip
-        for c, source, target, s, x in rows:
-            automaton = self._system.automata[c]
-            modes = (automaton.modes[source], automaton.modes[target])
-            found.append(Occurrence(self._origin.plus(s), "transition", automaton.name, "", *modes, -1, x, x))
-        return found
-
     @property
     def times(self) -> np.ndarray:
         """Times rounded to doubles."""
-        return self._made.times
+        return np.array([float(self._origin.plus(s)) for s in self._s.tolist()])
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component and kind."""
-        return self._made.chosen(component, kind)
+        """Mask of those of a component; all are transitions."""
+        names = [a.name for a in self._system.automata]
+        if component not in names or kind not in (None, "transition"):
+            return np.zeros(len(self), dtype=np.bool_)
+        return self._components == names.index(component)
 
-    def since(self, first: int) -> OccurrenceList:
+    def since(self, first: int) -> StepOccurrences:
         """Those from the first on."""
-        return self._made.since(first)
+        later = copy(self)
+        later._components, later._changes = self._components[first:], self._changes[first:]
+        later._s, later._x = self._s[first:], self._x[first:]
+        return later
 
     def __getitem__(self, i: Any, /) -> Any:
-        return self._made[i]
-
-    def __iter__(self) -> Iterator[Occurrence]:
-        return iter(self._made)
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        automaton, x = self._system.automata[self._components[i]], self._x[i]
+        source, target = (automaton.modes[m] for m in self._changes[i].tolist())
+        instant = self._origin.plus(float(self._s[i]))
+        return Occurrence(instant, "transition", automaton.name, "", source, target, -1, x, x)

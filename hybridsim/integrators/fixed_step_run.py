@@ -322,10 +322,8 @@ class FixedStepRun:
         segments = StepSegments(self.system, self.origin, p, s, x, z, np.unique(rows[rows > 0]))
         record.segments.add(segments)
         record.counters.events += len(rows)
-        places = (rows, components)
-        record.occurrences.add(
-            StepOccurrences(self.system, self.origin, rows, components, sources[places], z[places], s, x)
-        )
+        changes = np.stack([sources[rows, components], z[rows, components]], axis=1)
+        record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
         """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
