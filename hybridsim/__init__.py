@@ -43,8 +43,10 @@ _HOME = {
     # asking
     "Comparison": "hybridsim.analysis",
     "SuiteComparison": "hybridsim.analysis",
+    "Sweep": "hybridsim.analysis",
     "compare": "hybridsim.analysis",
     "compare_suite": "hybridsim.analysis",
+    "sweep": "hybridsim.analysis",
     # failing
     "ExpressionError": "hybridsim.errors",
     "HybridsimError": "hybridsim.errors",

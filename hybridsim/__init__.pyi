@@ -2,8 +2,10 @@
 
 from hybridsim.analysis import Comparison as Comparison
 from hybridsim.analysis import SuiteComparison as SuiteComparison
+from hybridsim.analysis import Sweep as Sweep
 from hybridsim.analysis import compare as compare
 from hybridsim.analysis import compare_suite as compare_suite
+from hybridsim.analysis import sweep as sweep
 from hybridsim.errors import ExpressionError as ExpressionError
 from hybridsim.errors import HybridsimError as HybridsimError
 from hybridsim.errors import ModelError as ModelError

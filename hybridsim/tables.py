@@ -70,7 +70,7 @@ class Table:
 
     def to_pandas(self) -> pd.DataFrame:
         """A data frame over t: a column for each quantity, a categorical one for each component's mode."""
-        pandas = _library("pandas")
+        pandas = library("pandas")
         columns: dict[str, Any] = dict(self.columns)
         for component, (names, numbers) in self.modes.items():
             columns[mode_title(component)] = pandas.Categorical.from_codes(numbers, categories=list(names))
@@ -80,7 +80,7 @@ class Table:
 
     def to_xarray(self) -> xr.Dataset:
         """A data set over t: a variable for each quantity with its unit, a coordinate for each component's mode."""
-        xarray = _library("xarray")
+        xarray = library("xarray")
         variables = {
             name: ("t", values, {"units": self.units[name]} if name in self.units else {})
             for name, values in self.columns.items()
@@ -110,10 +110,10 @@ def event_columns(events: Sequence[Any], states: Sequence[str]) -> dict[str, np.
 
 def event_frame(events: Sequence[Any], states: Sequence[str]) -> pd.DataFrame:
     """The events as a data frame, one row each."""
-    return _library("pandas").DataFrame(event_columns(events, states))
+    return library("pandas").DataFrame(event_columns(events, states))
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
     """pandas or xarray, which not everybody has."""
     try:
         return import_module(name)

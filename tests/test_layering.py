@@ -41,7 +41,7 @@ LIBRARIES = {
     "sksundae": {"integrators"},
     "scipy": {"engine", "integrators", "solution", "analysis"},
     "pandas": {"tables", "solution"},
-    "xarray": {"tables", "solution"},
+    "xarray": {"tables", "solution", "analysis"},
     "numpy": {
         "engine",
         "integrators",

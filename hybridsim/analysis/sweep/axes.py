@@ -1,0 +1,172 @@
+"""What a sweep runs over: values of parameters and initial values, as a grid or as a list of points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hybridsim.arguments import is_row, number
+from hybridsim.errors import UsageError, nearest
+from hybridsim.expr import Expression, parse
+from hybridsim.model import Model
+
+MODES = ("grid", "list")
+POINT = "point"  # the dimension of a list
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter or an initial value, and what it is set to.
+
+    Parameters
+    ----------
+    name, unit : as declared.
+    settings : what the model is given, numbers or expressions.
+    values : their numbers (k,); the texts where an expression depends on another axis and has no one number.
+    is_start : whether it is the initial value of a state.
+    """
+
+    name: str
+    unit: str
+    settings: tuple[float | Expression, ...]
+    values: np.ndarray
+    is_start: bool
+
+
+@dataclass(frozen=True)
+class Points:
+    """All points of a sweep, numbered in C order of the axes: the last one runs fastest.
+
+    Parameters
+    ----------
+    axes : in the order of the request.
+    mode : "grid", all combinations; "list", the k-th values of all axes together.
+    """
+
+    axes: tuple[Axis, ...]
+    mode: str
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the arrays of results."""
+        lengths = tuple(len(axis.settings) for axis in self.axes)
+        return lengths if self.mode == "grid" else lengths[:1]
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Name of each dimension of that shape."""
+        return tuple(axis.name for axis in self.axes) if self.mode == "grid" else (POINT,)
+
+    def settings(self, numbers: range) -> list[tuple[float | Expression, ...]]:
+        """What the axes are set to at some points."""
+        if self.mode == "list":
+            return [tuple(axis.settings[k] for axis in self.axes) for k in numbers]
+        places = np.unravel_index(np.asarray(numbers), self.shape)
+        columns: list[list[float | Expression]] = [
+            [row[i] for i in p.tolist()] for row, p in zip(self._parsed, places, strict=True)
+        ]
+        return list(zip(*columns, strict=True))
+
+    @cached_property
+    def _parsed(self) -> list[list[Expression]]:
+        """The settings of a grid as expressions: each is used many times, and parsed once."""
+        return [[parse(setting) for setting in axis.settings] for axis in self.axes]
+
+
+def points_of(model: Model, values: Any, mode: Any) -> Points:
+    """The points that are asked for.
+
+    Errors
+    ------
+    UsageError for names that the model does not have, values that are none, and lists of different lengths.
+    """
+    if mode not in MODES:
+        raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
+    if not isinstance(values, Mapping) or not values:
+        raise UsageError(
+            f"the values of the sweep are {values!r}",
+            remedy="give a mapping from names of parameters to values, {'F0': [20, 30, 40]}",
+        )
+    units = {p.name: p.unit for p in model.parameters}
+    starts = {s.name: s.unit for s in model.states} | {d.name: d.unit for d in model.discrete}
+    for name in values:
+        if name not in units and name not in starts:
+            raise UsageError(
+                f"model {model.name} has no parameter or state {name!r} to sweep over",
+                remedy=nearest(str(name), [*units, *starts], kind="parameters and states"),
+            )
+    settings = {name: _settings(name, row) for name, row in values.items()}
+    lengths = {name: len(row) for name, row in settings.items()}
+    if mode == "list" and len(set(lengths.values())) > 1:
+        counted = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise UsageError(
+            f"the lists of the sweep have different lengths: {counted}",
+            remedy="give one value of each for each point, or mode='grid'",
+        )
+    axes = tuple(
+        Axis(
+            name,
+            units.get(name, starts.get(name, "")),
+            row,
+            _values(model, name, row, name in starts, frozenset(settings)),
+            name in starts,
+        )
+        for name, row in settings.items()
+    )
+    return Points(axes, mode)
+
+
+def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
+    if not is_row(row):
+        raise UsageError(f"the values of {name} are {row!r}", remedy="give a list of numbers or expressions")
+    found = tuple(_setting(name, value) for value in row)
+    if not found:
+        raise UsageError(f"{name} has no values", remedy="give at least one")
+    return found
+
+
+def _setting(name: str, value: Any) -> float | Expression:
+    if isinstance(value, Expression):
+        return value
+    if isinstance(value, str):
+        return parse(value)
+    found = number(value, f"a value of {name}", "give a number or an expression")
+    if not math.isfinite(found):
+        raise UsageError(f"a value of {name} is {value!r}", remedy="give finite numbers")
+    return found
+
+
+def _values(
+    model: Model, name: str, row: Sequence[float | Expression], is_start: bool, swept: frozenset[str]
+) -> np.ndarray:
+    """The numbers of the settings, or their texts where a number would depend on another axis."""
+    others = swept - {name}
+    expressions = [setting for setting in row if isinstance(setting, Expression)]
+    if any(_depends(model, expression, others) for expression in expressions):
+        return np.array([s.text if isinstance(s, Expression) else f"{s!r}" for s in row], dtype=np.str_)
+    return np.array([_number(model, name, setting, is_start) for setting in row], dtype=float)
+
+
+def _depends(model: Model, expression: Expression, names: frozenset[str]) -> bool:
+    """Whether the value of an expression depends on some parameters, directly or through others."""
+    declared = {p.name: p.value.names for p in model.parameters}
+    seen: set[str] = set()
+    waiting = set(expression.names)
+    while waiting:
+        seen |= waiting
+        waiting = {name for known in waiting for name in declared.get(known, frozenset())} - seen
+    return bool(seen & names)
+
+
+def _number(model: Model, name: str, setting: float | Expression, is_start: bool) -> float:
+    if not isinstance(setting, Expression):
+        return setting
+    if is_start:
+        changed = model.with_start(**{name: setting})
+        return {**changed.start_values(), **changed.discrete_values()}[name]
+    return model.with_(**{name: setting}).parameter_values()[name]

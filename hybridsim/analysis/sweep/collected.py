@@ -1,0 +1,79 @@
+"""The results of a sweep as they come in, in any order, in arrays that have their place from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybridsim.analysis.sweep.job import NOT_RUN, Outcome
+from hybridsim.analysis.sweep.readings import Reading
+
+
+class Collected:
+    """Arrays of readings and statuses; the same ones whatever the order in which the points came.
+
+    A name that a point does not have is NaN there, or an empty text; so is what is missing at the end of an array
+    that is shorter than another point's.
+    """
+
+    def __init__(self, total: int) -> None:
+        self.status = np.full(total, NOT_RUN, dtype=object)
+        self.done = 0
+        self._arrays: dict[str, np.ndarray] = {}
+        self._places: dict[str, tuple[int, int]] = {}  # of each name: the first point that has it, and where
+
+    def put(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
+        """Take in some points; where there are fewer outcomes than numbers, the rest was not run."""
+        for number, (status, found) in zip(numbers, outcomes):
+            self.status[number] = status
+            for place, (name, value) in enumerate((found or {}).items()):
+                if (number, place) < self._places.get(name, (len(self.status), 0)):
+                    self._places[name] = number, place
+                array = self._arrays.get(name)
+                if array is None or not _fits(array, value):
+                    array = self._arrays[name] = self._room(array, value)
+                if array.ndim == 1:
+                    array[number] = value
+                else:
+                    array[number, : np.size(value)] = value
+        self.done += len(outcomes)
+
+    def values(self, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
+        """The arrays by name, in the order in which the first points have them."""
+        names = sorted(self._arrays, key=lambda name: self._places[name])
+        return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
+
+    def _room(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
+        """An array for such values and all that the old one holds."""
+        total, kind = len(self.status), _kind(value)
+        long = np.ndim(value) == 1
+        length = np.size(value) if long else None
+        if old is not None:
+            kind = max(kind, old.dtype, key=_KINDS.index)
+            if old.ndim == 2 or long:
+                length = max(length or 1, old.shape[1] if old.ndim == 2 else 1)
+        shape = (total,) if length is None else (total, length)
+        new = np.full(shape, "" if kind.hasobject else np.nan, dtype=kind)
+        if old is not None and new.ndim == 1:
+            new[:] = old
+        elif old is not None:
+            new[:, : old.shape[1] if old.ndim == 2 else 1] = old.reshape(total, -1)
+        return new
+
+
+_KINDS = [np.dtype(float), np.dtype(complex), np.dtype(object)]
+
+
+def _kind(value: Reading) -> np.dtype:
+    if isinstance(value, str):
+        return _KINDS[2]
+    return _KINDS[1] if np.iscomplexobj(value) else _KINDS[0]
+
+
+def _fits(array: np.ndarray, value: Reading) -> bool:
+    if isinstance(value, float):
+        return True
+    if _KINDS.index(_kind(value)) > _KINDS.index(array.dtype):
+        return False
+    return np.ndim(value) == 0 or (array.ndim == 2 and np.size(value) <= array.shape[1])

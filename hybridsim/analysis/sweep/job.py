@@ -1,0 +1,127 @@
+"""What a worker does: sets the model to each of some points and measures it; nothing that fails there stops it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from hybridsim.analysis.sweep.readings import Reading, not_numbers, readings
+from hybridsim.expr import Expression
+from hybridsim.model import Model
+
+DONE, NOT_RUN = "ok", "not run"
+_MOST = 4  # sweeps whose model a worker of another process keeps
+
+Settings = tuple[float | Expression, ...]
+
+
+class Measure(Protocol):
+    """Measures a model, and says what of the result is kept."""
+
+    def run(self, model: Model, previous: Any) -> Any:
+        """The result at a point; ``previous`` is that of the neighbour in a chain, or None."""
+
+    def read(self, result: Any) -> Any:
+        """What is kept of it: a number, an array, or a mapping of such and texts."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A sweep as its workers know it.
+
+    Parameters
+    ----------
+    token : tells sweeps apart.
+    model : with all that is the same at every point.
+    names : what is set at a point: parameters, and states with their initial values.
+    starts : which of these are states.
+    measure : what is measured.
+    chained : whether a point is given the result of the one before it.
+    """
+
+    token: str
+    model: Model
+    names: tuple[str, ...]
+    starts: frozenset[str]
+    measure: Measure
+    chained: bool
+
+    def at(self, settings: Settings) -> Model:
+        """The model at a point."""
+        if not self.starts:
+            return self.model.with_(**dict(zip(self.names, settings, strict=True)))
+        pairs = list(zip(self.names, settings, strict=True))
+        model = self.model.with_start(**{n: s for n, s in pairs if n in self.starts})
+        return model.with_(**{n: s for n, s in pairs if n not in self.starts})
+
+
+class Outcome(NamedTuple):
+    """A point: "ok", or what went wrong; and the readings, where there are any."""
+
+    status: str
+    found: dict[str, Reading] | None
+
+
+class Batch(NamedTuple):
+    """Some points in their order, as far as they were run, and the seconds that they took."""
+
+    outcomes: list[Outcome]
+    seconds: float
+
+
+class Watch(NamedTuple):
+    """How a worker that shares memory with the sweep is stopped, and tells that a point is done."""
+
+    stopped: Callable[[], bool]
+    tell: Callable[[], None]
+
+
+_jobs: dict[str, Job] = {}
+
+
+def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) -> Batch:
+    """Measure the model at some points, one after the other."""
+    if watch is None:
+        job = _kept(job)
+    began, outcomes = time.perf_counter(), []
+    previous: Any = None
+    for settings in points:
+        if watch is not None and watch.stopped():
+            break
+        outcome, result = _run(job, settings, previous)
+        outcomes.append(outcome)
+        previous = result if job.chained else None
+        if watch is not None:
+            watch.tell()
+    return Batch(outcomes, time.perf_counter() - began)
+
+
+def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
+    try:
+        result = job.measure.run(job.at(settings), previous)
+        found = readings(job.measure.read(result))
+    except Exception as error:
+        return Outcome(_said(error), None), None
+    missing = not_numbers(found)
+    if missing:
+        return Outcome(f"not a number: {', '.join(missing)}", found), None
+    return Outcome(DONE, found), result
+
+
+def _said(error: Exception) -> str:
+    """An error in one line, its kind before it."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _kept(job: Job) -> Job:
+    """The job as it came the first time: what the engine knows of a model hangs on the object."""
+    known = _jobs.get(job.token)
+    if known is not None:
+        return known
+    while len(_jobs) >= _MOST:
+        _jobs.pop(next(iter(_jobs)), None)
+    _jobs[job.token] = job
+    return job

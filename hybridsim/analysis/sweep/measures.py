@@ -1,0 +1,39 @@
+"""Measures: a function of the user's, or what is named by a word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hybridsim.analysis.sweep.job import Measure
+from hybridsim.errors import UsageError
+from hybridsim.model import Model
+
+
+@dataclass(frozen=True)
+class Given:
+    """A function of the user's: of the model, and of the neighbour's result where the sweep is a chain."""
+
+    function: Callable[..., Any]
+    options: Mapping[str, Any]
+    chained: bool
+
+    def run(self, model: Model, previous: Any) -> Any:
+        """What the function returns."""
+        if self.chained:
+            return self.function(model, previous, **self.options)
+        return self.function(model, **self.options)
+
+    def read(self, result: Any) -> Any:
+        """All of it."""
+        return result
+
+
+def measure_of(measure: Any, chained: bool, options: Mapping[str, Any]) -> Measure:
+    """A measure by what `sweep` was given for it."""
+    if callable(measure):
+        return Given(measure, options, chained)
+    raise UsageError(
+        f"measure is {measure!r}", remedy="give a function of the model, or the name of a ready measure"
+    )

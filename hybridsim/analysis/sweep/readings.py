@@ -1,0 +1,61 @@
+"""What a measure returned, as readings: numbers, texts and arrays by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybridsim.arguments import is_row
+from hybridsim.errors import UsageError
+
+Reading = float | complex | str | np.ndarray
+VALUE = "value"  # the name of what has none
+
+
+def readings(found: Any) -> dict[str, Reading]:
+    """Readings by name out of a number, an array (k,), or a mapping of these and texts.
+
+    Errors
+    ------
+    UsageError for anything else.
+    """
+    if type(found) is float:
+        return {VALUE: found}
+    if isinstance(found, Mapping):
+        return {str(name): _reading(str(name), value) for name, value in found.items()}
+    return {VALUE: _reading(VALUE, found)}
+
+
+def not_numbers(found: Mapping[str, Reading]) -> list[str]:
+    """Names of the readings that are no numbers, or hold such."""
+    return [name for name, value in found.items() if _is_nan(value)]
+
+
+def _is_nan(value: Reading) -> bool:
+    if isinstance(value, float):
+        return math.isnan(value)
+    return not isinstance(value, str) and bool(np.isnan(value).any())
+
+
+def _reading(name: str, value: Any) -> Reading:
+    if isinstance(value, str):
+        return value
+    if is_row(value) or isinstance(value, np.ndarray | np.generic):
+        array = np.asarray(value)
+        if array.ndim <= 1 and array.dtype.kind in "fiubc":
+            kept = array.astype(complex if array.dtype.kind == "c" else float)
+            return kept if kept.ndim else kept.item()
+    elif isinstance(value, complex):
+        return value
+    else:
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise UsageError(
+        f"the measure gave {type(value).__name__} as {name}",
+        remedy="return a number, an array in one dimension, or a dict of such by name",
+    )

@@ -1,0 +1,175 @@
+"""The result of a sweep: labelled arrays, and a status for every point."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.analysis.provenance import provenance
+from hybridsim.analysis.sweep.axes import POINT
+from hybridsim.analysis.sweep.job import DONE, NOT_RUN
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import Model
+from hybridsim.tables import library
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_SHOWN = 5  # statuses that are shown of a sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What was measured, over the values of parameters.
+
+    Parameters
+    ----------
+    model : with all that is the same at every point.
+    mode : "grid" or "list".
+    axes : values (k,) of each parameter in order; texts where an expression depends on another axis.
+    values : readings by name; their shape is that of the grid, or (k,) for a list, and one more dimension where the
+        measure is an array. NaN where there is none.
+    status : of the same shape, "ok" or what went wrong.
+    units : units of axes and readings, as far as they are known.
+    measure : what was measured, in words.
+    interrupted : whether Ctrl-C ended it; the points that were not run say so.
+    wall_time, executor : seconds of all of it, and who did the work.
+    """
+
+    model: Model
+    mode: str
+    axes: Mapping[str, np.ndarray]
+    values: Mapping[str, np.ndarray]
+    status: np.ndarray
+    units: Mapping[str, str] = field(default_factory=dict)
+    measure: str = ""
+    interrupted: bool = False
+    wall_time: float = math.nan
+    executor: str = ""
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Name of each dimension of `status`."""
+        return tuple(self.axes) if self.mode == "grid" else (POINT,)
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Where there is no result, of the shape of `status`."""
+        return self.status != DONE
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A reading by its name."""
+        if name not in self.values:
+            raise UsageError(
+                f"the sweep has no {name!r}", remedy=nearest(str(name), self.values, kind="readings")
+            )
+        return self.values[name]
+
+    def __repr__(self) -> str:
+        shape = " x ".join(f"{len(values)} {name}" for name, values in self.axes.items())
+        lines = [f"Sweep of {self.model.name} over {shape}: {', '.join(self.values) or 'nothing'}"]
+        lines += [
+            f"  {count} of {self.status.size} points: {text}"
+            for text, count in Counter(self.status.ravel().tolist()).most_common(_SHOWN)
+        ]
+        return "\n".join(lines)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Axes, readings and status as columns, a row for each point; an array is ``name[0]``, ``name[1]``, ..."""
+        if self.mode == "grid":
+            grids = np.meshgrid(*self.axes.values(), indexing="ij")
+            found = {name: grid.ravel() for name, grid in zip(self.axes, grids, strict=True)}
+        else:
+            found = dict(self.axes)
+        for name, values in self.values.items():
+            if values.ndim == self.status.ndim:
+                found[name] = values.ravel()
+            else:
+                rows = values.reshape(self.status.size, -1)
+                found |= {f"{name}[{k}]": rows[:, k] for k in range(rows.shape[1])}
+        return found | {"status": self.status.ravel()}
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write one line a point, with all digits."""
+        columns = self.columns()
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            for k in range(self.status.size):
+                writer.writerow([_plain(column[k]) for column in columns.values()])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as plain values; None for what is no number."""
+        return {
+            "model": self.model.name,
+            "measure": self.measure,
+            "mode": self.mode,
+            "dimensions": list(self.dimensions),
+            "axes": {name: _nested(values) for name, values in self.axes.items()},
+            "values": {name: _nested(values) for name, values in self.values.items()},
+            "status": self.status.tolist(),
+            "units": dict(self.units),
+            "interrupted": self.interrupted,
+            "wall_time": self.wall_time if math.isfinite(self.wall_time) else None,
+            "executor": self.executor,
+            "provenance": provenance(self.model),
+        }
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        text = json.dumps(self.to_dict(), indent=2, default=str, allow_nan=False)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text
+
+    def to_xarray(self) -> xr.Dataset:
+        """A data set over the axes: a variable for each reading with its unit, and the status."""
+        xarray = library("xarray")
+        where = self.dimensions
+        variables = {
+            name: (self._dimensions_of(name), v, self._unit(name)) for name, v in self.values.items()
+        }
+        coordinates = {
+            name: (name if self.mode == "grid" else POINT, values, self._unit(name))
+            for name, values in self.axes.items()
+        }
+        about = {"model": self.model.name, "title": self.model.title, "measure": self.measure}
+        return xarray.Dataset(
+            variables | {"status": (where, self.status.astype(np.str_))}, coordinates, about
+        )
+
+    def _dimensions_of(self, name: str) -> tuple[str, ...]:
+        extra = () if self.values[name].ndim == self.status.ndim else (f"item of {name}",)
+        return (*self.dimensions, *extra)
+
+    def _unit(self, name: str) -> dict[str, str]:
+        return {"units": self.units[name]} if self.units.get(name) else {}
+
+    def problems(self) -> Iterator[tuple[str, int]]:
+        """What went wrong and at how many points, most frequent first."""
+        counted = Counter(text for text in self.status.ravel().tolist() if text not in (DONE, NOT_RUN))
+        yield from counted.most_common()
+
+
+def _plain(value: Any) -> Any:
+    """A number with all its digits, a text as it is."""
+    return value if isinstance(value, str) else repr(value.item() if hasattr(value, "item") else value)
+
+
+def _nested(values: np.ndarray) -> Any:
+    """Lists that JSON can hold: null for what is no number, real and imaginary part of what is complex."""
+    if np.iscomplexobj(values):
+        return {"real": _nested(values.real), "imaginary": _nested(values.imag)}
+    if values.dtype.kind != "f":
+        return values.tolist()
+    plain = values.astype(object)
+    plain[~np.isfinite(values)] = None
+    return plain.tolist()

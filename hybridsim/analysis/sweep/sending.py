@@ -1,0 +1,132 @@
+"""Sends pieces of a sweep to an executor, few at a time, and takes in what comes back."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import threading
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from typing import Any
+
+from hybridsim.analysis.sweep.axes import Points
+from hybridsim.analysis.sweep.collected import Collected
+from hybridsim.analysis.sweep.job import Batch, Job, Outcome, Watch, run_batch
+from hybridsim.analysis.sweep.pieces import Pieces
+from hybridsim.errors import UsageError
+
+# Pieces that are under way for each worker: one that it works at and one that waits for it. More would only take
+# memory.
+_AHEAD = 2
+_LOOK = 0.1  # seconds between looks at what threads have done, for whoever watches, and for Ctrl-C
+
+
+def worker_count(executor: Any, workers: int | None) -> int:
+    """How many work at once: as asked for, else as the executor says, else one for each processor."""
+    if workers is not None:
+        return workers
+    # the pools of the standard library have no public name for it; others are taken to be as wide as the machine
+    known = getattr(executor, "_max_workers", None)
+    return known if isinstance(known, int) and known > 0 else os.cpu_count() or 1
+
+
+class Sending:
+    """One sweep under way.
+
+    Parameters
+    ----------
+    job : what the workers do.
+    points, pieces : what is to be done, and how it is cut.
+    collected : where the results go.
+    tell : called with the number of points that are done; may raise KeyboardInterrupt.
+    """
+
+    def __init__(
+        self, job: Job, points: Points, pieces: Pieces, collected: Collected, tell: Callable[[int], None]
+    ) -> None:
+        self._job, self._points, self._pieces, self._collected = job, points, pieces, collected
+        self._tell = tell
+        self._stop = threading.Event()
+        self._shared_done = 0
+        self._lock = threading.Lock()
+        self._under_way: dict[Future[Batch], range] = {}
+
+    def run(self, executor: Executor, workers: int) -> bool:
+        """Do all of it; False where it was interrupted, with what was done until then.
+
+        Errors
+        ------
+        UsageError where the executor cannot take the work.
+        """
+        shares = isinstance(executor, ThreadPoolExecutor)
+        watch = Watch(self._stop.is_set, self._count) if shares else None
+        waiting = self._pieces.next()
+        try:
+            while waiting is not None or self._under_way:
+                # threads share what the first point compiles, so that it goes alone
+                width = 1 if shares and self._done == 0 else _AHEAD * workers
+                while waiting is not None and len(self._under_way) < width:
+                    settings = self._points.settings(waiting)
+                    try:
+                        future = executor.submit(run_batch, self._job, settings, watch)
+                    except (pickle.PicklingError, TypeError, AttributeError, RuntimeError) as error:
+                        self._refused(waiting, error)
+                    else:
+                        self._under_way[future] = waiting
+                    waiting = self._pieces.next()
+                done, _ = wait(self._under_way, timeout=_LOOK, return_when=FIRST_COMPLETED)
+                self._take(done)
+                self._tell(self._done)
+        except KeyboardInterrupt:
+            self._stop.set()
+            for future in self._under_way:
+                future.cancel()
+            # a thread stops after its point; what other processes have begun is lost
+            if shares:
+                wait(self._under_way)
+            self._take({f for f in self._under_way if f.done() and not f.cancelled() and not f.exception()})
+            return False
+        finally:
+            self._stop.set()
+        return True
+
+    @property
+    def _done(self) -> int:
+        return max(self._collected.done, self._shared_done)
+
+    def _count(self) -> None:
+        with self._lock:
+            self._shared_done += 1
+
+    def _take(self, done: set[Future[Batch]]) -> None:
+        for future in done:
+            numbers = self._under_way.pop(future)
+            if future.cancelled():
+                continue
+            error = future.exception()
+            if error is None:
+                batch = future.result()
+                self._collected.put(numbers, batch.outcomes)
+                self._pieces.learn(len(batch.outcomes), batch.seconds)
+            elif isinstance(error, KeyboardInterrupt):  # Ctrl-C reaches all processes of a terminal
+                raise error
+            else:
+                self._refused(numbers, error)
+
+    def _refused(self, numbers: range, error: BaseException) -> None:
+        """A worker catches what its points raise; what comes from an executor is about the sending."""
+        require_sendable(self._job, error)
+        lost = Outcome(f"lost by the executor: {type(error).__name__}: {error}", None)
+        self._collected.put(numbers, [lost] * len(numbers))
+
+
+def require_sendable(job: Job, cause: BaseException | None = None) -> None:
+    """Refuse a sweep that cannot be sent to another process, naming what cannot."""
+    for what, thing in (("measure", job.measure), ("model", job.model)):
+        try:
+            pickle.dumps(thing)
+        except Exception as error:
+            raise UsageError(
+                f"the {what} of the sweep cannot be sent to another process ({error})",
+                remedy="define its functions with def at the top of a module, or leave executor out: threads take any",
+            ) from (cause or error)

@@ -1,0 +1,159 @@
+"""Runs a measure over grids and lists of parameter values, on threads or any executor."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from os import PathLike
+from typing import Any
+
+from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.sweep.axes import Points, points_of
+from hybridsim.analysis.sweep.collected import Collected
+from hybridsim.analysis.sweep.job import Job
+from hybridsim.analysis.sweep.measures import measure_of
+from hybridsim.analysis.sweep.pieces import Pieces
+from hybridsim.analysis.sweep.result import Sweep
+from hybridsim.analysis.sweep.sending import Sending, require_sendable, worker_count
+from hybridsim.analysis.wanted import whole
+from hybridsim.arguments import callback, chosen_model
+from hybridsim.errors import UsageError
+from hybridsim.model import Model
+
+
+def sweep(
+    model: Model | str | PathLike[str],
+    values: Mapping[str, Sequence[Any]],
+    measure: str | Sequence[str] | Callable[..., Any],
+    *,
+    mode: str = "grid",
+    params: Mapping[str, Any] | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    warm_start: bool = False,
+    units: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Sweep:
+    """Measure a model at many values of its parameters.
+
+    A point that fails, or gives NaN, has a status that says so, and never ends the sweep. The result is the same bit
+    for bit whatever the executor, the number of workers and the order in which they finish.
+
+    Parameters
+    ----------
+    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    values : for each parameter, or state (its initial value), a row of numbers or expressions:
+        ``{"F0": [20, 30], "omega": ["0.5*sqrt(k/m)", 400]}``.
+    measure : a function of the model that returns a number, an array in one dimension, or a dict of these by name.
+    mode : "grid", all combinations; "list", the k-th values of all together.
+    params : parameter values that are the same at every point.
+    executor : any `concurrent.futures.Executor`; if not given threads, on which the compiled engine runs in parallel.
+        For dask, ``client.get_executor()``.
+    workers : how many points are worked at at the same time; one for each processor, or as many as the executor has,
+        if not given.
+    warm_start : each point along the first axis (of a list: all of it) gets the result of the one before: a
+        function is called ``measure(model, previous)``, with None at the first point and after one that failed. The
+        first axis is then worked through in order; the others are independent.
+    units : units of readings, for labels.
+    progress : called as progress(done, total, what is next).
+    options : passed on to the measure.
+
+    Returns
+    -------
+    Sweep. After Ctrl-C what there is by then: its ``interrupted`` is true, and points that were not run say so.
+
+    Errors
+    ------
+    UsageError for what cannot be swept over, a measure that does not exist, and work that an executor cannot take;
+    ModelError for a faulty model.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.sweep("dfcs", {"F0": [10, 15, 30]}, lambda m: float(len(hs.simulate(m, (0, 0.05)).events)))
+    >>> found["value"].tolist()[:2], found.failed.any()
+    ([0.0, 0.0], False)
+    """
+    model = chosen_model(model, params).validate()
+    points = points_of(model, values, mode)
+    tell = callback(progress)
+    count = None if workers is None else whole(workers, "workers")
+    job = Job(
+        uuid.uuid4().hex,
+        model,
+        tuple(axis.name for axis in points.axes),
+        frozenset(axis.name for axis in points.axes if axis.is_start),
+        measure_of(measure, warm_start, options),
+        bool(warm_start),
+    )
+    began = time.perf_counter()
+    collected, finished, who = _work(job, points, executor, count, tell)
+    known = {axis.name: axis.unit for axis in points.axes if axis.unit}
+    return Sweep(
+        model,
+        points.mode,
+        {axis.name: axis.values for axis in points.axes},
+        collected.values(points.shape),
+        collected.status.reshape(points.shape),
+        known | dict(units or {}),
+        measure if isinstance(measure, str) else getattr(measure, "__name__", "measure"),
+        not finished,
+        time.perf_counter() - began,
+        who,
+    )
+
+
+def _work(
+    job: Job, points: Points, executor: Any, workers: int | None, progress: Progress | None
+) -> tuple[Collected, bool, str]:
+    """All results, whether they are whole, and who worked."""
+    if executor is not None and not isinstance(executor, Executor):
+        raise UsageError(
+            f"executor is {executor!r}",
+            remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
+        )
+    if isinstance(executor, ProcessPoolExecutor):
+        require_sendable(job)
+    count = worker_count(executor, workers)
+    total = 1
+    for length in points.shape:
+        total *= length
+    chains = total // points.shape[0] if job.chained else None
+    collected = Collected(total)
+    sending = Sending(job, points, Pieces(total, chains, count), collected, _Told(total, progress))
+    if executor is not None:
+        return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
+    with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
+        return collected, sending.run(threads, count), f"threads ({count})"
+
+
+class _Told:
+    """Passes on how many points are done, with the time that the rest will take."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self._total, self._progress = total, progress
+        self._began: float | None = None
+        self._first = 0
+
+    def __call__(self, done: int) -> None:
+        if self._progress is None:
+            return
+        now = time.monotonic()
+        if done and self._began is None:  # the first point compiles, and says nothing about the others
+            self._began, self._first = now, done
+        words = f"{done} of {self._total} points"
+        if self._began is not None and self._first < done < self._total:
+            left = (now - self._began) / (done - self._first) * (self._total - done)
+            words += f", {_duration(left)} left"
+        self._progress(done, self._total, words)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
