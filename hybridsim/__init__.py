@@ -42,10 +42,14 @@ _HOME = {
     "to_ivp": "hybridsim.ivp",
     # asking
     "Comparison": "hybridsim.analysis",
+    "Sensitivities": "hybridsim.analysis",
+    "SteadyState": "hybridsim.analysis",
     "SuiteComparison": "hybridsim.analysis",
     "Sweep": "hybridsim.analysis",
     "compare": "hybridsim.analysis",
     "compare_suite": "hybridsim.analysis",
+    "sensitivities": "hybridsim.analysis",
+    "steady_state": "hybridsim.analysis",
     "sweep": "hybridsim.analysis",
     # failing
     "ExpressionError": "hybridsim.errors",

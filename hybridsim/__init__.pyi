@@ -1,10 +1,14 @@
 """What type checkers see of the package: the same names, imported at once."""
 
 from hybridsim.analysis import Comparison as Comparison
+from hybridsim.analysis import Sensitivities as Sensitivities
+from hybridsim.analysis import SteadyState as SteadyState
 from hybridsim.analysis import SuiteComparison as SuiteComparison
 from hybridsim.analysis import Sweep as Sweep
 from hybridsim.analysis import compare as compare
 from hybridsim.analysis import compare_suite as compare_suite
+from hybridsim.analysis import sensitivities as sensitivities
+from hybridsim.analysis import steady_state as steady_state
 from hybridsim.analysis import sweep as sweep
 from hybridsim.errors import ExpressionError as ExpressionError
 from hybridsim.errors import HybridsimError as HybridsimError

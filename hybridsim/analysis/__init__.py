@@ -1,9 +1,23 @@
-"""What is asked of a model beyond one run: comparisons of integrators, sweeps over parameters."""
+"""What is asked of a model beyond one run: comparisons, steady states, sensitivities, sweeps over parameters."""
 
 from hybridsim.analysis.compare import compare
 from hybridsim.analysis.comparison import Comparison
 from hybridsim.analysis.series import Series
+from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, sweep
+from hybridsim.analysis.variations import Sensitivities, sensitivities
 
-__all__ = ["Comparison", "Series", "SuiteComparison", "Sweep", "compare", "compare_suite", "sweep"]
+__all__ = [
+    "Comparison",
+    "Sensitivities",
+    "Series",
+    "SteadyState",
+    "SuiteComparison",
+    "Sweep",
+    "compare",
+    "compare_suite",
+    "sensitivities",
+    "steady_state",
+    "sweep",
+]

@@ -1,0 +1,38 @@
+"""The largest Lyapunov exponent of a motion with events: the growth of a small change, carried through them.
+
+Benettin's method (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9,
+doi:10.1007/BF02128236), with the saltation matrices of P. C. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671,
+doi:10.1016/0960-0779(94)00170-U.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.analysis.variations.carried import Carrier, Directions
+
+_STRETCHES = 60
+_PERIODS = 5  # in each
+_SMALLEST = 1e-280  # a change that stick has made nothing of
+
+
+def largest_exponent(motion: Motion, start: Point, period: float) -> float:
+    """Mean rate of growth of a change, per unit of time, over some hundred periods; -inf where it dies out."""
+    n, d = len(start.x), len(start.discrete)
+    change = np.ones(n + d) / math.sqrt(n + d)
+    parameters = np.zeros((len(motion.model.parameters), 1))
+    total, point = 0.0, start
+    for _ in range(_STRETCHES):
+        solution = motion.run(point, _PERIODS * period)
+        carried = Carrier(solution).carry(Directions(change[:n, None], change[n:, None], parameters))
+        change = np.concatenate([carried.x[:, 0], carried.discrete[:, 0]])
+        size = float(np.linalg.norm(change))
+        if size < _SMALLEST:
+            return -math.inf
+        total += math.log(size)
+        change /= size
+        point = point_at_end(solution)
+    return total / (_STRETCHES * _PERIODS * period)

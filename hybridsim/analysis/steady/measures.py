@@ -1,0 +1,194 @@
+"""What measures a periodic orbit: amplitudes, means, energies, harmonics, work of friction, time spent in stick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from hybridsim.analysis.steady.orbit import Orbit, orbit_of
+from hybridsim.errors import UsageError, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridsim.solution import Solution
+
+
+_ROUNDING = 1e-10  # of a guard's largest value: what an event leaves of it
+
+
+class Grazing(NamedTuple):
+    """The least value to which a guard comes down without an event, beside the greatest it has on the orbit."""
+
+    guard: str
+    t: float
+    value: float
+    relative: float
+
+
+class ByName(Mapping[str, float]):
+    """A measure of each quantity, worked out when it is asked for."""
+
+    def __init__(self, names: tuple[str, ...], measure: Callable[[str], float], kind: str) -> None:
+        self._names, self._measure, self._kind = names, measure, kind
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self._names:
+            raise UsageError(
+                f"the steady state has no {self._kind} {name!r}",
+                remedy=nearest(name, self._names, kind=self._kind),
+            )
+        return self._measure(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+class Measures:
+    """Measures of one period, the run over which is `solution`."""
+
+    solution: Solution
+
+    @cached_property
+    def _orbit(self) -> Orbit:
+        return orbit_of(self.solution)
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(n for n in self._orbit.names if not n.startswith(("guard ", "velocity of ")))
+
+    @cached_property
+    def _contacts(self) -> tuple[str, ...]:
+        system = self.solution._system
+        return tuple(system.automata[c].name for c in system.surface_of)
+
+    def _each(self, measure: Callable[[str], float]) -> ByName:
+        return ByName(self._names, measure, "quantity")
+
+    def _extreme(self, name: str, side: int) -> float:
+        return float(self._orbit.extremes[side][self._orbit.names.index(name)])
+
+    @property
+    def minimum(self) -> ByName:
+        """Least value of each quantity over the period."""
+        return self._each(lambda q: self._extreme(q, 0))
+
+    @property
+    def maximum(self) -> ByName:
+        """Greatest value of each quantity over the period."""
+        return self._each(lambda q: self._extreme(q, 1))
+
+    @property
+    def amplitude(self) -> ByName:
+        """(max - min)/2 of each quantity, from its dense output."""
+        return self._each(lambda q: 0.5 * (self._extreme(q, 1) - self._extreme(q, 0)))
+
+    @property
+    def peak(self) -> ByName:
+        """max |q| of each quantity, from its dense output."""
+        return self._each(lambda q: max(abs(self._extreme(q, 0)), abs(self._extreme(q, 1))))
+
+    @property
+    def mean(self) -> ByName:
+        """Mean of each quantity over the period."""
+        return self._each(lambda q: self._orbit.integral(self._orbit.of(q)) / self._orbit.duration)
+
+    @property
+    def energy(self) -> ByName:
+        """Integral of q^2 over the period (He et al. 2026, eq. 5)."""
+        return self._each(lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
+
+    def harmonic(self, name: str, k: int = 1) -> complex:
+        """The amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), t from the orbit's start.
+
+        Integrated over the segments: no sampling, no aliasing.
+        """
+        if name not in self._names:
+            raise UsageError(
+                f"the steady state has no quantity {name!r}",
+                remedy=nearest(name, self._names, kind="quantities"),
+            )
+        if k < 0:
+            raise UsageError(f"k is {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ...")
+        return self._orbit.harmonic(name, 2.0 * math.pi * k / self._orbit.duration)
+
+    @property
+    def dissipated(self) -> ByName:
+        """Work of friction over the period: the integral of the force times the relative velocity, by contact."""
+        return ByName(
+            self._contacts,
+            lambda c: self._orbit.integral(self._orbit.of(c) * self._orbit.of(f"velocity of {c}")),
+            "contact",
+        )
+
+    @property
+    def stick_fraction(self) -> ByName:
+        """Part of the period that each contact spends in stick."""
+        return ByName(self._contacts, self._stuck, "contact")
+
+    def _stuck(self, contact: str) -> float:
+        hold = self._hold(contact)
+        spent = sum(i.t1 - i.t0 for i in self.solution.modes[contact] if i.mode == hold)
+        return spent / (self.solution.t_end - self.solution.t_start)
+
+    def _hold(self, contact: str) -> str:
+        system = self.solution._system
+        automaton = next(a for a in system.automata if a.name == contact)
+        return str(automaton.modes[automaton.hold])
+
+    @property
+    def stops_per_period(self) -> ByName:
+        """How often a period each contact comes to stick."""
+        return ByName(self._contacts, self._stops, "contact")
+
+    def _stops(self, contact: str) -> float:
+        """Stretches of stick; one that goes on over the end of the period counts once, one without end not at all."""
+        hold, intervals = self._hold(contact), [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0]
+        count = sum(mode == hold for mode in intervals)
+        return float(count - (intervals[0] == hold == intervals[-1]))
+
+    @cached_property
+    def word(self) -> tuple[str, ...]:
+        """The modes in the order in which the period goes through them; components are separated by a comma."""
+        solution = self.solution
+        names = [a.modes for a in solution._system.declared]
+        found: list[str] = []
+        for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):
+            here = ",".join(modes[m] for modes, m in zip(names, z[: len(names)].tolist(), strict=True))
+            if last > first and (not found or found[-1] != here):
+                found.append(here)
+        if len(found) > 1 and found[0] == found[-1]:
+            found.pop()
+        return tuple(found)
+
+    @cached_property
+    def grazing(self) -> Grazing | None:
+        """The guard that comes closest to zero and turns back, if any guard turns; small means close to a grazing.
+
+        A guard that an event has made zero, or is about to, is left out there.
+        """
+        orbit, solution = self._orbit, self.solution
+        largest = {name: abs(orbit.of(name)).max() for name in orbit.names if name.startswith("guard ")}
+        found: list[Grazing] = []
+        for turn in orbit.turns:
+            name = orbit.names[turn.quantity]
+            if name not in largest or not turn.is_minimum:
+                continue
+            if turn.value <= _ROUNDING * largest[name]:
+                continue
+            z = solution._segments[int(orbit.segments[turn.piece])].z
+            guard = int(name.removeprefix("guard "))
+            if solution._system.active(z)[guard]:
+                title = solution._system.guard_title(guard, z)
+                found.append(
+                    Grazing(title, solution.t_start + turn.t, turn.value, turn.value / largest[name])
+                )
+        return min(found, key=lambda g: g.relative, default=None)

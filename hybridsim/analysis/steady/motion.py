@@ -1,0 +1,95 @@
+"""Where a motion is when a section is passed, and the run that leads from there to later passings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import SimulationError
+from hybridsim.simulate import simulate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.pieces import Segment
+    from hybridsim.model import Model
+    from hybridsim.solution import Solution
+
+
+@dataclass(frozen=True)
+class Point:
+    """All that a run starts from: states, discrete states, and modes of the components that no surface decides.
+
+    x (n,), discrete (d,). What happens at the very instant of the section has not happened yet.
+    """
+
+    x: np.ndarray
+    discrete: np.ndarray
+    z: dict[str, str]
+
+    @property
+    def values(self) -> np.ndarray:
+        """States and discrete states (n + d,)."""
+        return np.concatenate([self.x, self.discrete])
+
+    def moved(self, change: np.ndarray) -> Point:
+        """The same with states and discrete states changed by (n + d,)."""
+        n = len(self.x)
+        return Point(self.x + change[:n], self.discrete + change[n:], self.z)
+
+
+class Motion:
+    """Runs of one model with one method.
+
+    Parameters
+    ----------
+    model : with its parameters set.
+    options : of `simulate`: integrator, rtol and the like.
+    first : x0 and z0 of a run from the model's start.
+    """
+
+    def __init__(self, model: Model, options: dict[str, Any], first: dict[str, Any] | None = None) -> None:
+        self.model, self.options, self.first = model, options, first or {}
+        self.names = [s.name for s in model.states]
+        self.discrete = [d.name for d in model.discrete]
+
+    def run(self, start: Point | None, t_end: float, **options: Any) -> Solution:
+        """From time 0, which the forcing's phase is counted from; None starts where the model is declared to start."""
+        given: dict[str, Any] = dict(self.first) if start is None else {}
+        if start is not None:
+            given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
+            given["z0"] = start.z or None
+        solution = simulate(self.model, (0.0, t_end), **given, **(self.options | options))
+        if solution.status != "finished":
+            raise SimulationError(
+                f"the run towards the steady state ended early ({solution.status}): {solution.message}"
+            )
+        return solution
+
+
+def point_at_end(solution: Solution) -> Point:
+    """Where a run is just before its end."""
+    return _point(solution, solution._segments[_last_with_length(solution)], side=-1)
+
+
+def point_at(solution: Solution, t: float) -> Point:
+    """Where a run is just before time t."""
+    index, _ = solution._places(np.array([t]), "-")
+    segment = solution._segments[int(index[0])]
+    point = _point(solution, segment, side=-1)
+    return Point(solution(t, side="-"), point.discrete, point.z)
+
+
+def _last_with_length(solution: Solution) -> int:
+    spans = solution._segments.spans()
+    return int(np.flatnonzero(spans[:, 1] > spans[:, 0])[-1])
+
+
+def _point(solution: Solution, segment: Segment, side: int) -> Point:
+    system = solution._system
+    modes = {
+        a.name: a.modes[m]
+        for a, m in zip(system.declared, segment.z.tolist(), strict=False)
+        if not a.has_surface
+    }
+    return Point(np.array(segment.x[side]), np.array(system.discrete(segment.p)), modes)

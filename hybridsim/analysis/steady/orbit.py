@@ -1,0 +1,225 @@
+"""A stretch of a run as polynomials: each quantity on Gauss points of small pieces, none of which crosses an event.
+
+Integrals are then sums over the points, and extrema are zeros of polynomials: nothing is sampled on a grid of time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial import legendre
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+POINTS = 16  # of Gauss on a piece: a polynomial of degree 15
+_TAIL = 4  # last coefficients, which tell whether the polynomial holds
+_RESOLVED = 1e-13  # they are below that part of the largest value of the whole stretch
+_NOISE = 1e-9  # below that part, what halving a piece does not make smaller is rounding
+_SMALLER = 0.7
+_HALVINGS = 24
+_DENSE = 65  # points at which a slope is looked at for changes of sign
+_STEPS = 4  # of Newton's method, from the chord through two of these points
+
+NODES, WEIGHTS = legendre.leggauss(POINTS)
+_TO_COEFFICIENTS = np.linalg.inv(legendre.legvander(NODES, POINTS - 1))
+_DIFFERENTIATE = legendre.legder(np.eye(POINTS))  # coefficients to those of the slope
+_GRID = np.linspace(-1.0, 1.0, _DENSE)
+_SLOPES_ON_GRID = legendre.legvander(_GRID, POINTS - 2) @ _DIFFERENTIATE
+_VALUES_ON_GRID = legendre.legvander(_GRID, POINTS - 1)
+_AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), POINTS - 1)
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Quantities over a stretch of a run.
+
+    Parameters
+    ----------
+    names : of the Q quantities.
+    starts, lengths : (K,) of the pieces, in time counted from the beginning of the run.
+    segments : (K,) number of the run's segment that each piece lies in.
+    values : (K, POINTS, Q) at Gauss points.
+    """
+
+    names: tuple[str, ...]
+    starts: np.ndarray
+    lengths: np.ndarray
+    segments: np.ndarray
+    values: np.ndarray
+
+    @cached_property
+    def coefficients(self) -> np.ndarray:
+        """Legendre coefficients (K, POINTS, Q) on each piece."""
+        return np.einsum("ij,kjq->kiq", _TO_COEFFICIENTS, self.values)
+
+    @property
+    def duration(self) -> float:
+        """Length of the stretch."""
+        return float(self.lengths.sum())
+
+    def of(self, name: str) -> np.ndarray:
+        """Values (K, POINTS) of one quantity."""
+        return self.values[:, :, self.names.index(name)]
+
+    def integral(self, values: np.ndarray) -> float:
+        """Integral over the stretch of something at the Gauss points (K, POINTS)."""
+        return float((values @ WEIGHTS) @ (0.5 * self.lengths))
+
+    def harmonic(self, name: str, frequency: float) -> complex:
+        """2/T times the integral of q(t) exp(-i w t): the amplitude c of q = Re(c exp(i w t)); the mean for w = 0."""
+        total = 0.0 + 0.0j
+        parts = max(1, int(np.ceil(frequency * self.lengths.max() / POINTS * 2.0)))
+        coefficients = self.coefficients[:, :, self.names.index(name)]
+        for part in range(parts):  # shorter pieces, so that a fast wave is resolved on each
+            local = (2.0 * part + 1.0 + NODES) / parts - 1.0
+            values = coefficients @ legendre.legvander(local, POINTS - 1).T
+            times = self.starts[:, None] + 0.5 * self.lengths[:, None] * (1.0 + local)
+            wave = np.exp(-1j * frequency * (times - self.starts[0]))
+            total += ((values * wave) @ WEIGHTS) @ (0.5 * self.lengths) / parts
+        return (1.0 if frequency == 0.0 else 2.0) * total / self.duration
+
+    @cached_property
+    def extremes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest value (Q,) of each quantity, both sides of every jump included."""
+        ends = np.einsum("ij,kjq->kiq", _AT_ENDS, self.coefficients)
+        candidates = [ends.reshape(-1, len(self.names)), self.values.reshape(-1, len(self.names))]
+        low, high = (
+            np.min([c.min(axis=0) for c in candidates], axis=0),
+            np.max([c.max(axis=0) for c in candidates], axis=0),
+        )
+        for turn in self.turns:
+            low[turn.quantity], high[turn.quantity] = (
+                min(low[turn.quantity], turn.value),
+                max(high[turn.quantity], turn.value),
+            )
+        return low, high
+
+    @cached_property
+    def turns(self) -> list[Turn]:
+        """Where the slope of a quantity changes its sign inside a piece."""
+        slopes = np.einsum("gj,kjq->kgq", _SLOPES_ON_GRID, self.coefficients)
+        found = []
+        for k, g, q in np.argwhere(slopes[:, :-1] * slopes[:, 1:] < 0.0):
+            before, after = slopes[k, g, q], slopes[k, g + 1, q]
+            at = _GRID[g] + (_GRID[g + 1] - _GRID[g]) * before / (before - after)
+            series = self.coefficients[k, :, q]
+            first, second = legendre.legder(series), legendre.legder(series, 2)
+            for _ in range(_STEPS):
+                curvature = legendre.legval(at, second)
+                if curvature == 0.0:
+                    break
+                at = min(max(at - legendre.legval(at, first) / curvature, _GRID[g]), _GRID[g + 1])
+            t = self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at)
+            found.append(
+                Turn(int(q), int(k), float(t), float(legendre.legval(at, series)), bool(before < 0.0))
+            )
+        return found
+
+    def rises_through(self, name: str, level: float) -> np.ndarray:
+        """Times, from the beginning of the run, at which a quantity rises through a level."""
+        q = self.names.index(name)
+        series = self.coefficients[:, :, q].copy()
+        series[:, 0] -= level
+        values = series @ _VALUES_ON_GRID.T
+        found = []
+        for k, g in np.argwhere((values[:, :-1] < 0.0) & (values[:, 1:] >= 0.0)):
+            low, high = _GRID[g], _GRID[g + 1]
+            at = low + (high - low) * values[k, g] / (values[k, g] - values[k, g + 1])
+            slope = legendre.legder(series[k])
+            for _ in range(_STEPS):
+                steepness = legendre.legval(at, slope)
+                if steepness == 0.0:
+                    break
+                at = min(max(at - legendre.legval(at, series[k]) / steepness, low), high)
+            found.append(self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at))
+        ends = values[:-1, -1] < 0.0, values[1:, 0] >= 0.0
+        found += self.starts[1:][ends[0] & ends[1]].tolist()  # a jump, or rounding between two pieces
+        return np.sort(np.array(found))
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A local extremum inside a piece."""
+
+    quantity: int
+    piece: int
+    t: float
+    value: float
+    is_minimum: bool
+
+
+class Sampler:
+    """Values of states and other quantities inside the segments of a run.
+
+    guards: take the values of all guards too, under their numbers ("guard 3"), and of the surfaces of contacts
+    ("velocity of f").
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+        self.system = system = solution._system
+        self.segments = solution._segments
+        self.quantities = tuple(q for q in system.quantities if " in " not in q)
+        self.discrete = tuple(d.name for d in system.model.discrete)
+        contacts = [system.automata[c].name for c in system.surface_of]
+        self.names = (
+            *system.names,
+            *self.quantities,
+            *self.discrete,
+            *(f"velocity of {name}" for name in contacts),
+            *(f"guard {g}" for g in range(system.guard_count)),
+        )
+
+    def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Values (k, Q) in the segments of these numbers (k,), at local times (k,)."""
+        x = self.segments.states(index, s)
+        out = np.empty((len(s), len(self.names)))
+        out[:, : self.system.n] = x
+        for i in np.unique(index):
+            chosen = np.flatnonzero(index == i)
+            out[chosen, self.system.n :] = self._others(int(i), s[chosen], np.ascontiguousarray(x[chosen]))
+        return out
+
+    def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        system, segment = self.system, self.segments[i]
+        named = self.solution._quantities((*self.quantities, *self.discrete), segment, s, x)
+        surfaces = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
+        guards = system.rows("guards", system.guard_count, s, x, segment.p, segment.z)
+        guards[:, ~system.active(segment.z)] = np.inf
+        return np.concatenate([np.reshape(named, (-1, len(s))).T, surfaces, guards], axis=1)
+
+
+def orbit_of(solution: Solution) -> Orbit:
+    """A run, or what was kept of it, as polynomials; forward in time."""
+    sample = Sampler(solution)
+    index, s, _ = solution._segments.knots()
+    same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
+    segments, begins, ends = index[:-1][same], s[:-1][same], s[1:][same]
+    finished: list[tuple[np.ndarray, ...]] = []
+    scale = np.zeros(len(sample.names))
+    before = np.full((len(segments), len(sample.names)), np.inf)  # tails on the pieces that were halved
+    for halving in range(_HALVINGS):
+        points = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + NODES)
+        flat = sample(np.repeat(segments, POINTS), points.ravel())
+        values = flat.reshape(len(segments), POINTS, -1)
+        values[np.isinf(values)] = 0.0  # guards of other modes
+        scale = np.maximum(scale, np.abs(values).max(axis=(0, 1)))
+        tails = np.abs(np.einsum("ij,kjq->kiq", _TO_COEFFICIENTS[-_TAIL:], values)).max(axis=1)
+        is_rounding = (tails <= _NOISE * scale) & (tails >= _SMALLER * before)
+        good = ((tails <= _RESOLVED * scale) | is_rounding).all(axis=1) | (halving == _HALVINGS - 1)
+        finished.append((segments[good], begins[good], ends[good], values[good]))
+        if good.all():
+            break
+        segments, begins, ends, before = (part[~good] for part in (segments, begins, ends, tails))
+        middle = 0.5 * (begins + ends)
+        segments, before = np.concatenate([segments, segments]), np.concatenate([before, before])
+        begins, ends = np.concatenate([begins, middle]), np.concatenate([middle, ends])
+    segments, begins, ends, values = (np.concatenate(parts) for parts in zip(*finished, strict=True))
+    order = np.lexsort((begins, segments))
+    origins = solution._segments.origins()[segments[order]]
+    starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + begins[order])
+    return Orbit(sample.names, starts, (ends - begins)[order], segments[order], values[order])

@@ -1,0 +1,112 @@
+"""What `steady_state` gives back."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.steady.motion import Motion
+from hybridsim.analysis.steady.shooting import multipliers
+from hybridsim.analysis.variations import sensitivities
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.steady.orbit import Orbit as Stretch
+    from hybridsim.analysis.steady.shooting import Orbit
+    from hybridsim.solution import Solution
+
+_NEUTRAL = 1e-9
+
+
+class SteadyState(Measures):
+    """The motion that a model settles on.
+
+    Attributes
+    ----------
+    kind : "periodic", "equilibrium", "quasi-periodic", "chaotic" or "not settled".
+    success : whether it is one of the first two, and so has measures.
+    period, multiple : time after which the motion repeats; how many periods of the forcing (rises through the section,
+        without forcing) that is: n of a period-n motion.
+    residual : largest change of a state over the period, relative to its largest size.
+    newton_steps, periods : what it took: steps of Newton's method, periods that were followed.
+    lyapunov : largest Lyapunov exponent per unit of time, of a motion that does not repeat.
+    message : one sentence about how it was found.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        kind: str,
+        orbit: Orbit | None,
+        is_free: bool,
+        newton_steps: int,
+        periods: int,
+        message: str,
+    ) -> None:
+        self.kind, self.newton_steps, self.periods, self.message = kind, newton_steps, periods, message
+        self.lyapunov = math.nan
+        self._motion, self._closed, self._is_free = motion, orbit, is_free
+        self.period = orbit.period if orbit is not None and kind == "periodic" else math.nan
+        self.multiple = orbit.multiple if orbit is not None and kind == "periodic" else 0
+        self.residual = orbit.residual if orbit is not None else math.nan
+
+    @property
+    def success(self) -> bool:
+        """Whether the motion repeats, or rests."""
+        return self.kind in ("periodic", "equilibrium")
+
+    @property
+    def status(self) -> str:
+        """The kind of motion."""
+        return self.kind
+
+    @cached_property
+    def solution(self) -> Solution:  # type: ignore[override]
+        """One period from the section on; of a motion without one a stretch of it."""
+        if self._closed is None:
+            raise UsageError(f"there is no stretch of this motion: {self.message}")
+        return self._motion.run(self._closed.start, self._closed.period)
+
+    @cached_property
+    def _orbit(self) -> Stretch:
+        from hybridsim.analysis.steady.orbit import orbit_of
+
+        if not self.success:
+            raise UsageError(
+                f"the motion is {self.kind}: no period stands for it ({self.message})",
+                remedy="run hs.simulate, or sample it with a section",
+            )
+        return orbit_of(self.solution)
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out.
+
+        Each contact that sticks on the way takes a rank away, and makes one of them exactly zero.
+        """
+        if not self.success:
+            raise UsageError(f"the motion is {self.kind}: it has no multipliers", remedy="see lyapunov")
+        return multipliers(sensitivities(self.solution, ()).by_start, self._is_free)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers are inside the unit circle, or on it to rounding."""
+        return bool((np.abs(self.multipliers) <= 1.0 + _NEUTRAL).all())
+
+    def __repr__(self) -> str:
+        lines = [f"Steady state of {self._motion.model.name}: {self.message}"]
+        if self.success:
+            names = self._motion.names
+            lines.append("  amplitudes " + ", ".join(f"{n} {self.amplitude[n]:.9g}" for n in names))
+            lines += [
+                f"  {c}: {100.0 * self.stick_fraction[c]:.4g} % of the period in stick, "
+                f"{self.stops_per_period[c]:g} stops"
+                for c in self._contacts
+            ]
+        if self.kind == "periodic":
+            lines.insert(1, f"  period {self.period:.15g}, modes {' '.join(self.word)}")
+        return "\n".join(lines)

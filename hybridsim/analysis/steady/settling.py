@@ -1,0 +1,123 @@
+"""Following a motion until it repeats: from period to period of the forcing, or from one rise to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
+from hybridsim.analysis.steady.orbit import orbit_of
+from hybridsim.analysis.variations.sizes import sizes
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+_CLOSER = 1e-2  # times the tolerance: what is below that and no longer shrinks has arrived
+LONGEST_WORD = 12  # periods after which a motion may repeat
+
+
+@dataclass(frozen=True)
+class Passings:
+    """A motion at consecutive passings of a section.
+
+    Parameters
+    ----------
+    times : (K,), from the beginning of the run.
+    values : (K, n + d), states and discrete states just before each passing.
+    scale : (n + d,), largest size of each along the run.
+    last : the motion at the last one.
+    rests : whether nothing moves any more.
+    state : the state that keeps its value from passing to passing, without forcing.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    scale: np.ndarray
+    last: Point
+    rests: bool = False
+    state: int = 0
+
+    def residual(self, multiple: int) -> float:
+        """The largest change of a state over so many passings up to the last, relative to its scale."""
+        if len(self.values) <= multiple:
+            return float("inf")
+        return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
+
+    def repeats_after(self, tolerance: float) -> int | None:
+        """The least number of passings after which the motion repeats, and is as close to where it goes."""
+        found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
+        return next((m for m in found if self._error(m, _CLOSER * tolerance) <= tolerance), None)
+
+    def _error(self, multiple: int, rounding: float) -> float:
+        """How far off the limit the last passing is: the change, over what is left of it each time."""
+        residual = self.residual(multiple)
+        back = (len(self.values) - 1) // (2 * multiple)
+        if back == 0:
+            return float("inf")
+        earlier = relative(
+            self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
+        )
+        if not residual < earlier:
+            return residual if residual <= rounding else float("inf")
+        return float(residual / (1.0 - (residual / earlier) ** (1.0 / back)))
+
+    def nearest(self) -> int:
+        """After how many passings the motion comes closest to repeating: the fewest that are about as good."""
+        most = min(LONGEST_WORD, (len(self.values) - 1) // 2)
+        residuals = [self.residual(m) for m in range(1, max(most, 1) + 1)]
+        return 1 + next(i for i, r in enumerate(residuals) if r <= _ABOUT * min(residuals))
+
+
+_ABOUT = 10.0
+
+
+def relative(change: np.ndarray, scale: np.ndarray) -> float:
+    """The largest entry of a change by the scale of each; what has none does not count."""
+    parts = np.abs(change)[scale > 0.0] / scale[scale > 0.0]
+    return float(parts.max(initial=0.0))
+
+
+def scale_of(solution: Solution) -> np.ndarray:
+    """Largest size of each state and discrete state along a run, or what was kept of it (n + d,)."""
+    values = sizes(solution)
+    if not solution._system.layout.discrete:
+        return values
+    discrete = [np.abs(g.p[solution._system.layout.discrete_slice]) for g in solution._segments]
+    return np.concatenate([values, np.max(discrete, axis=0)])
+
+
+def forced_passings(motion: Motion, start: Point | None, period: float, count: int) -> Passings:
+    """At so many consecutive periods of the forcing."""
+    solution = motion.run(start, count * period)
+    times = period * np.arange(1, count + 1)
+    times[-1] = solution.t_end
+    values = solution(times, side="-").T
+    system = solution._system
+    if system.layout.discrete:
+        index, _ = solution._places(times, "-")
+        discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
+        values = np.concatenate([values, discrete], axis=1)
+    return Passings(times, values, scale_of(solution), point_at_end(solution))
+
+
+def free_passings(motion: Motion, start: Point | None, duration: float) -> Passings:
+    """At every rise of the state that moves most through the middle of its range, in the later half of a run."""
+    solution = motion.run(start, duration)
+    n, scale = len(motion.names), scale_of(solution)
+    late = motion.run(point_at(solution, 0.5 * duration), 0.5 * duration)
+    orbit = orbit_of(late)
+    low, high = (side[:n] for side in orbit.extremes)
+    moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
+    end = point_at_end(late)
+    if moves.max(initial=0.0) <= _RESTS:
+        return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
+    j = int(np.argmax(moves))
+    times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
+    points = [point_at(late, t) for t in times]
+    values = np.array([p.values for p in points]).reshape(len(points), len(scale))
+    return Passings(times, values, scale_of(late), points[-1] if points else end, state=j)
+
+
+_RESTS = 1e-12  # no state moves by more, relative to its largest size

@@ -1,0 +1,111 @@
+"""Newton's method on the period map: a periodic orbit as the zero of x(T) - x(0)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.analysis.steady.settling import relative
+from hybridsim.analysis.variations import sensitivities
+from hybridsim.errors import HybridsimError
+
+_STEPS = 12
+_LESS = 0.5  # a step that leaves more of the residual than that is none
+_ROUNDING = 1e-14  # of the states' scale: no step makes the residual smaller
+_ATTRACTS = (
+    1.0 - 1e-6
+)  # what has a multiplier beyond that is not come to by waiting: it repels, or lies among others
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic orbit, or what may become one.
+
+    Parameters
+    ----------
+    start : where it is at time 0.
+    period : time after which it repeats; multiple: of the forcing's periods, or passings of the section.
+    residual : largest change of a state over the period, relative to its scale.
+    steps : of Newton's method that were taken.
+    attracts : all multipliers are inside the unit circle.
+    """
+
+    start: Point
+    period: float
+    multiple: int
+    residual: float
+    steps: int = 0
+    converged: bool = True
+    attracts: bool = True
+
+
+def shoot(
+    motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, tol: float, steps: int = _STEPS
+) -> Orbit:
+    """Close an orbit by Newton's method.
+
+    Parameters
+    ----------
+    scale : (n + d,) size of each state and discrete state.
+    section : None where the period is known; else the state that keeps its value, while the period is found.
+    """
+    best = replace(start, residual=np.inf, converged=False)
+    orbit = start
+    for count in range(steps + 1):
+        try:
+            solution = motion.run(orbit.start, orbit.period)
+            end = point_at_end(solution)
+            if end.z != orbit.start.z:
+                break
+            change = end.values - orbit.start.values
+            residual = relative(change, scale)
+            if not residual <= (_LESS * best.residual if count else np.inf) and residual > _ROUNDING:
+                break
+            matrix = sensitivities(solution, ()).by_start
+        except HybridsimError:
+            break
+        rates = None
+        if section is not None:
+            last = solution._segments[-1]
+            rates = solution._system.flow(float(last.s[-1]), last.x[-1], last.p, last.z)
+        move, longer = _newton(matrix, change, scale, section, rates)
+        best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
+        # what is left of the error is the step itself
+        if residual <= tol and relative(move, scale) <= tol and abs(longer) <= tol * orbit.period:
+            return replace(best, converged=True)
+        orbit = replace(orbit, start=orbit.start.moved(move), period=orbit.period + longer)
+        if not orbit.period > 0.0:
+            break
+    return replace(best, converged=False)
+
+
+def _newton(
+    matrix: np.ndarray, change: np.ndarray, scale: np.ndarray, section: int | None, rates: np.ndarray | None
+) -> tuple[np.ndarray, float]:
+    """The step of start and period that makes the linearised change vanish."""
+    count = len(change)
+    unit = np.where(scale > 0.0, scale, 1.0)
+    A = np.eye(count) - matrix * unit[None, :] / unit[:, None]
+    b = change / unit
+    if section is None or rates is None:
+        return unit * np.linalg.lstsq(A, b, rcond=None)[0], 0.0
+    grown = np.zeros((count + 1, count + 1))
+    grown[:count, :count] = A
+    grown[: len(rates), count] = -rates / unit[: len(rates)]
+    grown[count, section] = 1.0
+    found = np.linalg.lstsq(grown, np.append(b, 0.0), rcond=None)[0]
+    return unit * found[:count], float(found[count])
+
+
+def _attracts(matrix: np.ndarray, rates: np.ndarray | None) -> bool:
+    return bool((np.abs(multipliers(matrix, rates is not None)) <= _ATTRACTS).all())
+
+
+def multipliers(matrix: np.ndarray, is_free: bool) -> np.ndarray:
+    """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out."""
+    found = np.linalg.eigvals(matrix)
+    if is_free:
+        found = np.delete(found, np.argmin(np.abs(found - 1.0)))
+    return found[np.argsort(-np.abs(found), kind="stable")]

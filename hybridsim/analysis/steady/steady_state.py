@@ -1,0 +1,244 @@
+"""`steady_state`: the motion that a model settles on, found and measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from hybridsim import arguments
+from hybridsim.analysis.steady.lyapunov import largest_exponent
+from hybridsim.analysis.steady.motion import Motion
+from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.analysis.steady.settling import Passings, forced_passings, free_passings
+from hybridsim.analysis.steady.shooting import Orbit, shoot
+from hybridsim.errors import UsageError
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+    from hybridsim.model import Model
+
+_SETTLE = 32  # periods at first
+_MOST_AT_ONCE = 512
+_MAX_PERIODS = 4096
+_DURATION = 100.0  # of a first run without forcing, where the model has none of its own
+_FEWEST = 4  # passings that say something
+_TIGHTER = 1e-2  # the runs' tolerance, in units of that of the steady state
+_NEUTRAL = 1e-3  # an exponent below that, per period, is nought
+PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
+    "periodic",
+    "equilibrium",
+    "quasi-periodic",
+    "chaotic",
+    "not settled",
+)
+
+
+def steady_state(
+    model: Model | str | PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, float] | Sequence[float] | None = None,
+    z0: Mapping[str, str] | None = None,
+    period: float | None = None,
+    integrator: str = "auto",
+    rtol: float | None = None,
+    tol: float = 1e-10,
+    settle: int = _SETTLE,
+    max_periods: int = _MAX_PERIODS,
+    progress: Callable[[float], None] | None = None,
+    **options: Any,
+) -> SteadyState:
+    """The motion that a model settles on from its start, over one period, with its measures.
+
+    A run is followed until it repeats; Newton's method on the period map (single shooting) then takes the place of
+    waiting, its matrix from the variational flow carried through the events (`hs.sensitivities`). Where an orbit's
+    sequence of events differs from that of the step before, or Newton's method does not close in, the run goes on
+    instead. Only what attracts is returned: a motion that repels is not what a model settles on.
+
+    Parameters
+    ----------
+    model, params, x0, z0 : as in `simulate`.
+    period : of the forcing; found from the model where it has one. Without forcing the period is an unknown of the
+        motion, found as well.
+    integrator, rtol, options : as in `simulate`; rtol is tol/100 unless given.
+    tol : how closely the states repeat, relative to the largest size of each along the motion; so good is the motion
+        as well, since what the repetition leaves over is divided by how fast it contracts.
+    settle : periods (passings of a section, without forcing) before the first look.
+    max_periods : periods after which the motion is judged as it is: chaotic where its largest Lyapunov exponent is
+        positive, quasi-periodic where it is nought, else not settled.
+
+    Returns
+    -------
+    SteadyState: ``kind`` says what the motion is; period, amplitude, energy, stick fraction, multipliers and so on are
+    those of a periodic one, and are refused for others.
+
+    Errors
+    ------
+    UsageError for arguments that do not fit, and a forcing that never repeats (a table, a chirp); SimulationError where
+    a run ends early.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> steady = hs.steady_state("dfcs")
+    >>> steady.kind, steady.word, steady.stops_per_period["f"]
+    ('periodic', ('stick', 'slip+', 'stick', 'slip-'), 2.0)
+    """
+    model = arguments.chosen_model(model, params)
+    from hybridsim.engine.period import system_period
+    from hybridsim.engine.recent import system_of
+
+    tol = arguments.number(tol, "tol")
+    if not 0.0 < tol < 1.0:
+        raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance between 0 and 1, such as 1e-10")
+    system = system_of(model)
+    if period is None:
+        period = system_period(system) or _clock_period(system)
+    elif not (arguments.number(period, "period") > 0.0 and math.isfinite(period)):
+        raise UsageError(f"period is {period!r}", remedy="give a time above zero")
+    _refuse_records(model)
+    method = {
+        "integrator": integrator,
+        "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
+    }
+    motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
+    if period is None and _is_driven(system):
+        return _found(motion, QUASI, None, message="the frequencies of the forcing have no common period")
+    search = _Search(motion, period, tol, settle, max_periods, arguments.callback(progress))
+    return search.run()
+
+
+class _Search:
+    """Follows a motion until it is known what it settles on."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        period: float | None,
+        tol: float,
+        settle: int,
+        max_periods: int,
+        progress: Callable[[float], None] | None,
+    ) -> None:
+        self.motion, self.period, self.tol = motion, period, tol
+        self.settle, self.max_periods = max(int(settle), _FEWEST), int(max_periods)
+        self.progress = progress
+        self.newton_steps, self.periods = 0, 0
+        self.duration = motion.model.duration_value() or _DURATION
+
+    def run(self) -> SteadyState:
+        passings = self._follow(None)
+        while True:
+            if passings.rests:
+                return _found(self.motion, EQUILIBRIUM, self._orbit(passings, 1), periods=self.periods)
+            orbit = self._closed(passings)
+            if orbit is not None:
+                return self._periodic(orbit)
+            if self.periods >= self.max_periods:
+                return self._other(passings)
+            passings = self._follow(passings)
+
+    def _follow(self, last: Passings | None) -> Passings:
+        """The motion from where it is on, for as long again as it has been followed."""
+        if self.progress is not None:
+            self.progress(min(self.periods / self.max_periods, 1.0))
+        start = None if last is None else last.last
+        if self.period is not None:
+            count = min(max(self.settle, self.periods), _MOST_AT_ONCE, max(self.max_periods, self.settle))
+            self.periods += count
+            return forced_passings(self.motion, start, self.period, count)
+        for _ in range(_LONGER):
+            passings = free_passings(self.motion, start, self.duration)
+            if passings.rests or len(passings.times) >= _FEWEST:
+                break
+            self.duration *= 4.0
+        self.periods += len(passings.times)
+        if passings.rests or len(passings.times) >= self.settle:
+            return passings
+        self.duration *= 2.0
+        return passings
+
+    def _closed(self, passings: Passings) -> Orbit | None:
+        """The periodic orbit that the motion is on, or comes to by Newton's method."""
+        multiple = passings.repeats_after(self.tol)
+        if multiple is not None:
+            return self._orbit(passings, multiple)
+        if len(passings.values) < 2:
+            return None
+        return self._shot(passings, passings.nearest())
+
+    def _shot(self, passings: Passings, multiple: int) -> Orbit | None:
+        start = self._orbit(passings, multiple)
+        section = None if self.period is not None else passings.state
+        found = shoot(self.motion, start, passings.scale, section, self.tol)
+        self.newton_steps += found.steps
+        return found if found.converged and found.attracts else None
+
+    def _orbit(self, passings: Passings, multiple: int) -> Orbit:
+        if self.period is not None:
+            period = multiple * self.period
+        elif passings.rests:
+            period = self.duration
+        else:
+            period = float(passings.times[-1] - passings.times[-1 - min(multiple, len(passings.times) - 1)])
+        return Orbit(passings.last, period, multiple, passings.residual(multiple))
+
+    def _periodic(self, orbit: Orbit) -> SteadyState:
+        multiple = orbit.multiple
+        what = "" if multiple == 1 else f" of {multiple} periods of the forcing" if self.period else ""
+        message = f"periodic motion{what}; residual {orbit.residual:.1e}"
+        return _found(
+            self.motion, PERIODIC, orbit, self.period is None, self.newton_steps, self.periods, message
+        )
+
+    def _other(self, passings: Passings) -> SteadyState:
+        """A motion that does not repeat: told apart by its largest Lyapunov exponent."""
+        base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
+        exponent = largest_exponent(self.motion, passings.last, base)
+        per_period = exponent * base
+        kind = CHAOTIC if per_period > _NEUTRAL else QUASI if per_period > -_NEUTRAL else UNSETTLED
+        message = (
+            f"{kind} after {self.periods} periods: largest Lyapunov exponent {exponent:.3g} per unit of time"
+        )
+        found = _found(self.motion, kind, replace(self._orbit(passings, 1), residual=passings.residual(1)))
+        found.lyapunov, found.message, found.periods = exponent, message, self.periods
+        return found
+
+
+_LONGER = 8
+
+
+def _found(
+    motion: Motion,
+    kind: str,
+    orbit: Orbit | None,
+    is_free: bool = False,
+    newton_steps: int = 0,
+    periods: int = 0,
+    message: str = "",
+) -> SteadyState:
+    return SteadyState(motion, kind, orbit, is_free, newton_steps, periods, message or kind)
+
+
+def _is_driven(system: System) -> bool:
+    """Whether the equations depend on time."""
+    return any(rate != 0.0 for rate in system.rates) or bool(system.model.inputs)
+
+
+def _clock_period(system: System) -> float | None:
+    """The longest period of the model's clocks, which a run has to begin in step with."""
+    declared = [c.period for c in system.model.schedules if c.period is not None]
+    return max((evaluate(period, system.values) for period in declared), default=None)
+
+
+def _refuse_records(model: Model) -> None:
+    for declared in model.inputs:
+        if declared.kind != "wave":
+            raise UsageError(
+                f"model {model.name} is driven by {declared.name}, a {declared.kind}: there is no steady state",
+                remedy="give a periodic input",
+            )

@@ -1,0 +1,300 @@
+"""Derivatives carried along a run: over its segments by the variational flow, through its events by saltation.
+
+At an event the time of which moves by dt, a change dx of the state before it becomes
+
+    dx+ = R_x (dx- + f- dt) + R_t dt + R_p - f+ dt,    dt = -(g_x dx- + g_p)/(g_t + g_x f-),
+
+with the reset R, the guard g and the rates f-, f+ on both sides (M. A. Aizerman and F. R. Gantmacher, Quart. J. Mech.
+Appl. Math. 11 (1958) 52; M. di Bernardo et al., Piecewise-smooth Dynamical Systems, Springer 2008, section 2.5). Where
+a mode holds a state on a constraint, its derivative is that of the constraint: what stick takes away is exactly zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.analysis.variations.parameters import expression_slope
+from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.variations.smooth import transition
+from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.tangents import TangentTape
+from hybridsim.errors import UsageError
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.system import System
+    from hybridsim.solution import Solution
+
+_TANGENTIAL = (
+    1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
+)
+
+
+@dataclass(frozen=True)
+class Directions:
+    """What is changed: M directions in the states, the discrete states and the parameters.
+
+    x (n, M), discrete (d, M), parameters (P, M): the derivatives at the start of the run.
+    """
+
+    x: np.ndarray
+    discrete: np.ndarray
+    parameters: np.ndarray
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Derivatives at the end of a run, and of the time of each event on the way.
+
+    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,).
+    """
+
+    x: np.ndarray
+    discrete: np.ndarray
+    times: list[tuple[float, np.ndarray]]
+
+
+class Carrier:
+    """Carries derivatives along one run."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+        self.system: System = solution._system
+        if not self.system.has_tape:
+            raise UsageError(
+                f"model {solution.model.name} is made of Python functions, of which derivatives are not known",
+                remedy="write it in expressions",
+            )
+        module: Any = self.system.code.module
+        self._reset, self._project, self._rates = (
+            differentiated(f) for f in (module.reset, module.project, module.rates)
+        )
+        largest = sizes(solution)
+        self._scale = np.where(largest > 0.0, largest, 1.0)
+
+    def carry(self, directions: Directions) -> Carried:
+        """From the first segment to the end of the last."""
+        self._refuse_inputs(directions.parameters)
+        Y, Yd = directions.x.copy(), directions.discrete.copy()
+        times: list[tuple[float, np.ndarray]] = []
+        stretches = list(self._stretches())
+        Y = self._projected(stretches[0][0], Y, Yd, directions.parameters)
+        for (segment, happened), (following, _) in zip(stretches, [*stretches[1:], (None, ())], strict=True):
+            Y = self._over(segment, Y, Yd, directions.parameters)
+            if following is None:
+                break
+            Y, Yd, shift = self._through(segment, happened, following, Y, Yd, directions.parameters)
+            if happened:
+                times.append((float(following.start), shift))
+        return Carried(Y, Yd, times)
+
+    def _stretches(self) -> Iterator[tuple[Segment, tuple[Occurrence, ...]]]:
+        """Segments, each with what happened at its end and changed modes or states."""
+        segments = list(self.solution._segments)
+        waiting = [o for o in self.solution._trajectory.occurrences if o.kind != "near-grazing"]
+        at = 0
+        for segment in segments:
+            end, happened = segment.end, []
+            while at < len(waiting) and waiting[at].instant.minus(end) < 0.0:
+                at += 1
+            while at < len(waiting) and waiting[at].instant.minus(end) == 0.0:
+                happened.append(waiting[at])
+                at += 1
+            yield segment, tuple(happened)
+
+    def _refuse_inputs(self, G: np.ndarray) -> None:
+        """Derivatives of an input's shape by its parameters are not known."""
+        moving = {p.name for p, row in zip(self.system.model.parameters, G, strict=True) if row.any()}
+        for declared in self.system.model.inputs:
+            used = sorted(moving & {n for e in declared.expressions.values() for n in e.names})
+            if used:
+                raise UsageError(
+                    f"input {declared.name} depends on {used[0]}, and its derivative by that is not known",
+                    remedy=f"leave {used[0]} out, or write the input as an expression of t",
+                )
+
+    # -- between events -------------------------------------------------------------------------------------
+
+    def _over(self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> np.ndarray:
+        if segment.s[-1] <= segment.s[0] or not self.system.n:
+            return Y
+        tape, seeds = TangentTape(self.system, segment.z), self._seeds(segment)
+        n = self.system.n
+        constant = np.concatenate([Yd, G])
+        moving = [k for k in range(len(constant)) if constant[k].any()]
+        chosen = [*range(n), *(n + 1 + k for k in moving)]
+
+        def slopes(s: np.ndarray) -> np.ndarray:
+            return tape(s, segment.dense(s), segment.p, seeds[:, chosen]).slopes
+
+        total = transition(slopes, segment.s, self._scale)
+        Y = total[:, :n] @ Y + total[:, n:] @ constant[moving]
+        return self._projected(segment, Y, Yd, G, at_end=True)
+
+    def _seeds(self, segment: Segment) -> np.ndarray:
+        """Directions of the states, local time, discrete states and parameters in all that the tape reads."""
+        system = self.system
+        layout, n = system.layout, system.n
+        P, d = layout.parameters, layout.discrete
+        seeds = np.zeros((n + 1 + layout.size, n + 1 + d + P))
+        seeds[: n + 1, : n + 1] = np.eye(n + 1)
+        seeds[n + 1 + layout.discrete_at : n + 1 + layout.discrete_at + d, n + 1 : n + 1 + d] = np.eye(d)
+        seeds[n + 1 : n + 1 + P, n + 1 + d :] = np.eye(P)
+        for k, row in enumerate(self._rate_slopes()):  # an angle rate*origin
+            seeds[n + 1 + layout.phases_at + k, n + 1 + d :] = float(segment.origin) * row
+        return seeds
+
+    def _rate_slopes(self) -> np.ndarray:
+        layout = self.system.layout
+        P = layout.parameters
+        p: list[Any] = list(self.system.vector(self.solution._segments[0].origin, np.zeros(layout.discrete)))
+        p[:P] = with_slopes(p[:P], np.eye(P))
+        out: list[Any] = [0.0] * layout.phases
+        self._rates(0.0, [], p, [], out)
+        return values_and_slopes(out, P)[1]
+
+    # -- at events ------------------------------------------------------------------------------------------
+
+    def _through(
+        self,
+        segment: Segment,
+        happened: tuple[Occurrence, ...],
+        following: Segment,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        system, s = self.system, float(segment.s[-1])
+        x = segment.x[-1]
+        shift = self._shift(segment, happened, s, x, Y, Yd, G)
+        before = system.flow(s, x, segment.p, segment.z)
+        Y = Y + np.outer(before, shift)
+        for one in happened:
+            Y, Yd = self._after_reset(segment, one, s, Y, Yd, G, shift)
+        after = system.flow(float(following.s[0]), following.x[0], following.p, following.z)
+        Y = Y - np.outer(after, shift)
+        return self._projected(following, Y, Yd, G), Yd, shift
+
+    def _shift(
+        self,
+        segment: Segment,
+        happened: tuple[Occurrence, ...],
+        s: float,
+        x: np.ndarray,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+    ) -> np.ndarray:
+        """Derivatives of the time of what happened (M,)."""
+        system, n = self.system, self.system.n
+        scheduled = [o for o in happened if o.kind == "scheduled"]
+        if scheduled or not happened:
+            return self._scheduled_shift(scheduled, G)
+        number, is_monitor = self._function(happened[0], segment.z)
+        tape = TangentTape(system, segment.z, *(((), (number,)) if is_monitor else ((number,), ())))
+        found = tape(np.array([s]), x[None, :], segment.p, self._seeds(segment))
+        row = found.slopes[0, n]
+        terms = np.append(row[:n] * found.values[0, :n], row[n])
+        rate = terms.sum()
+        if not abs(rate) > _TANGENTIAL * np.abs(terms).sum():
+            raise UsageError(
+                f"{happened[0].component} has an event at t = {float(happened[0].instant):.9g} at which its guard does "
+                "not fall: the time of such an event has no derivatives",
+                remedy="take other parameters, or a run that ends before",
+            )
+        change = row[:n] @ Y + row[n + 1 :] @ np.concatenate([Yd, G])
+        return -change / rate
+
+    def _function(self, occurrence: Occurrence, z: np.ndarray) -> tuple[int, bool]:
+        """Number of the guard or monitor that made something happen."""
+        system = self.system
+        if occurrence.kind == "monitor":
+            return system.monitor_names.index(occurrence.component), True
+        automaton = next(a for a in system.automata if a.name == occurrence.component)
+        mode = automaton.modes.index(occurrence.source)
+        return automaton.guards[mode][automaton.guard_names[mode].index(occurrence.guard)], False
+
+    def _scheduled_shift(self, scheduled: list[Occurrence], G: np.ndarray) -> np.ndarray:
+        model, shift = self.system.model, np.zeros(G.shape[1])
+        if not scheduled:
+            return shift
+        slopes = {p.name: row for p, row in zip(model.parameters, G, strict=True)}
+        declared = next((c for c in model.schedules if c.name == scheduled[0].component), None)
+        if declared is None:
+            return shift
+        values, t = self.system.values, float(scheduled[0].instant)
+        if declared.start is None or declared.period is None:
+            single = min(declared.times, key=lambda e: abs(evaluate(e, values) - t))
+            return expression_slope(single, values, slopes)
+        k = round((t - evaluate(declared.start, values)) / evaluate(declared.period, values))
+        by_start = expression_slope(declared.start, values, slopes)
+        return by_start + k * expression_slope(declared.period, values, slopes)
+
+    def _after_reset(
+        self,
+        segment: Segment,
+        one: Occurrence,
+        s: float,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+        shift: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives behind one reset; everything is taken at x-."""
+        system = self.system
+        key = self._key(segment, one, s)
+        if key not in system.resets:
+            return Y, Yd
+        x, p = self._lifted(segment, one.x_minus, Y, Yd, G)
+        out = [*x, *p[system.layout.discrete_slice]]
+        self._reset(Dual(s, shift), x, p, np.array([*segment.z, system.resets[key][0]]), out)
+        slopes = values_and_slopes(out, Y.shape[1])[1]
+        return slopes[: system.n], slopes[system.n :]
+
+    def _key(self, segment: Segment, one: Occurrence, s: float) -> tuple[Any, ...]:
+        system, model = self.system, self.system.model
+        if one.kind == "monitor":
+            return "monitor", system.monitor_names.index(one.component)
+        if one.kind == "scheduled":
+            return "schedule", next((k for k, c in enumerate(model.schedules) if c.name == one.component), -1)
+        if not one.guard:
+            return ("none",)
+        names = [a.name for a in system.automata]
+        c = names.index(one.component)
+        automaton = system.automata[c]
+        m = automaton.modes.index(one.source)
+        g = automaton.guard_names[m].index(one.guard)
+        if automaton.has_surface:
+            return ("none",)
+        return "choice", c, m, g, system.choose(c, m, g, s, one.x_minus, segment.p, segment.z)
+
+    def _lifted(
+        self, segment: Segment, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray
+    ) -> tuple[list[Dual], list[Any]]:
+        """States and run-time vector as numbers with their derivatives in the M directions."""
+        layout = self.system.layout
+        p: list[Any] = list(segment.p)
+        P = layout.parameters
+        p[:P] = with_slopes(segment.p[:P], G)
+        p[layout.discrete_slice] = with_slopes(self.system.discrete(segment.p), Yd)
+        rates = self._rate_slopes() @ G * float(segment.origin)
+        at = layout.phases_at
+        p[at : at + layout.phases] = with_slopes(segment.p[at : at + layout.phases], rates)
+        return with_slopes(x, Y), p
+
+    def _projected(
+        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, at_end: bool = False
+    ) -> np.ndarray:
+        """Derivatives of the states with the held ones on their constraints."""
+        system, k = self.system, -1 if at_end else 0
+        if not any(segment.z[c] == system.automata[c].hold for c in system.pins):
+            return Y
+        x, p = self._lifted(segment, segment.x[k], Y, Yd, G)
+        out: list[Any] = [0.0] * system.n
+        self._project(float(segment.s[k]), x, p, segment.z, out)
+        return values_and_slopes(out, Y.shape[1])[1]

@@ -1,0 +1,56 @@
+"""Derivatives of all parameter values and initial values by some parameters, expressions of others included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.expr import Expression, evaluate
+from hybridsim.expr.slope import slope
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+
+def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
+    """d(value of each parameter)/d(each chosen one), (P, C): what `model.with_` would change along with it."""
+    names = [p.name for p in model.parameters]
+    slopes = {name: np.zeros(len(chosen)) for name in names}
+    values = model.parameter_values()
+    declared = {p.name: p.value for p in model.parameters}
+    done: set[str] = set()
+
+    def visit(name: str) -> None:
+        if name in done:
+            return
+        done.add(name)
+        for other in sorted(declared[name].names):
+            visit(other)
+        slopes[name] = expression_slope(declared[name], values, slopes)
+        if name in chosen:
+            slopes[name] = slopes[name] + np.eye(len(chosen))[list(chosen).index(name)]
+
+    for name in names:
+        visit(name)
+    return np.array([slopes[name] for name in names]).reshape(len(names), len(chosen))
+
+
+def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: np.ndarray) -> np.ndarray:
+    """d(initial values)/d(chosen parameters), (len(expressions), C)."""
+    slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
+    values = model.parameter_values()
+    rows = [expression_slope(e, values, slopes) for e in expressions]
+    return np.array(rows).reshape(len(rows), by_parameter.shape[1])
+
+
+def expression_slope(
+    expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """d(expression of parameters)/d(chosen parameters), by the chain rule."""
+    total = np.zeros(len(next(iter(slopes.values()))) if slopes else 0)
+    for name in sorted(expression.names):
+        if slopes[name].any():
+            total = total + evaluate(slope(expression, name), values) * slopes[name]
+    return total

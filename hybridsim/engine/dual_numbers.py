@@ -1,0 +1,151 @@
+"""Numbers with derivatives, for the functions of a model that run as plain Python: resets, projections, rates.
+
+Each carries a row of derivatives; a generated function is run on them by giving it mathematics that knows them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+
+class Dual:
+    """A value and its derivatives (D,)."""
+
+    __slots__ = ("slope", "value")
+
+    def __init__(self, value: float, slope: Any) -> None:
+        self.value, self.slope = value, slope
+
+    def __add__(self, other: Any) -> Dual:
+        v, d = _parts(other)
+        return Dual(self.value + v, self.slope + d)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Dual:
+        v, d = _parts(other)
+        return Dual(self.value - v, self.slope - d)
+
+    def __rsub__(self, other: Any) -> Dual:
+        return Dual(other - self.value, -self.slope)
+
+    def __mul__(self, other: Any) -> Dual:
+        v, d = _parts(other)
+        return Dual(self.value * v, self.slope * v + self.value * d)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Dual:
+        v, d = _parts(other)
+        y = self.value / v
+        return Dual(y, (self.slope - y * d) / v)
+
+    def __rtruediv__(self, other: Any) -> Dual:
+        y = other / self.value
+        return Dual(y, -y * self.slope / self.value)
+
+    def __pow__(self, n: Any) -> Dual:
+        if isinstance(n, Dual):
+            return _pow(self, n)
+        return Dual(self.value**n, n * self.value ** (n - 1.0) * self.slope)
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, -self.slope)
+
+    def __abs__(self) -> Dual:
+        return Dual(abs(self.value), self.slope if self.value >= 0.0 else -self.slope)
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def __lt__(self, other: Any) -> bool:
+        return bool(self.value < _parts(other)[0])
+
+    def __le__(self, other: Any) -> bool:
+        return bool(self.value <= _parts(other)[0])
+
+    def __gt__(self, other: Any) -> bool:
+        return bool(self.value > _parts(other)[0])
+
+    def __ge__(self, other: Any) -> bool:
+        return bool(self.value >= _parts(other)[0])
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self.value == _parts(other)[0])
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _parts(other: Any) -> tuple[float, Any]:
+    return (other.value, other.slope) if isinstance(other, Dual) else (other, 0.0)
+
+
+def _smooth(
+    function: Callable[[float], float], slope: Callable[[float, float], float]
+) -> Callable[[Any], Any]:
+    """A function of one number; slope takes the argument and the value."""
+
+    def lifted(u: Any) -> Any:
+        if not isinstance(u, Dual):
+            return function(u)
+        y = function(u.value)
+        return Dual(y, slope(u.value, y) * u.slope)
+
+    return lifted
+
+
+def _atan2(y: Any, x: Any) -> Any:
+    (a, da), (b, db) = _parts(y), _parts(x)
+    return Dual(math.atan2(a, b), (b * da - a * db) / (a * a + b * b))
+
+
+def _pow(base: Any, exponent: Any) -> Any:
+    (u, du), (n, dn) = _parts(base), _parts(exponent)
+    y = math.pow(u, n)
+    by_exponent = y * math.log(u) * dn if isinstance(exponent, Dual) and np.any(dn) else 0.0
+    return Dual(y, n * math.pow(u, n - 1.0) * du + by_exponent)
+
+
+def _copysign(size: Any, sign: Any) -> Any:
+    return math.copysign(size, float(sign))  # generated code takes the sign of something alone
+
+
+_FUNCTIONS: dict[str, Any] = {
+    "sqrt": _smooth(math.sqrt, lambda u, y: 0.5 / y),
+    "exp": _smooth(math.exp, lambda u, y: y),
+    "log": _smooth(math.log, lambda u, y: 1.0 / u),
+    "sin": _smooth(math.sin, lambda u, y: math.cos(u)),
+    "cos": _smooth(math.cos, lambda u, y: -math.sin(u)),
+    "tan": _smooth(math.tan, lambda u, y: 1.0 + y * y),
+    "asin": _smooth(math.asin, lambda u, y: 1.0 / math.sqrt(1.0 - u * u)),
+    "acos": _smooth(math.acos, lambda u, y: -1.0 / math.sqrt(1.0 - u * u)),
+    "atan": _smooth(math.atan, lambda u, y: 1.0 / (1.0 + u * u)),
+    "sinh": _smooth(math.sinh, lambda u, y: math.cosh(u)),
+    "cosh": _smooth(math.cosh, lambda u, y: math.sinh(u)),
+    "tanh": _smooth(math.tanh, lambda u, y: 1.0 - y * y),
+    "atan2": _atan2,
+    "pow": _pow,
+    "copysign": _copysign,
+}
+
+
+def with_slopes(values: Any, slopes: np.ndarray) -> list[Dual]:
+    """Numbers (n,) with derivatives (n, D)."""
+    return [Dual(float(v), d) for v, d in zip(values, slopes, strict=True)]
+
+
+def differentiated(function: FunctionType) -> Callable[..., Any]:
+    """A generated function of a model that takes numbers with derivatives."""
+    return FunctionType(function.__code__, function.__globals__ | _FUNCTIONS, function.__name__)
+
+
+def values_and_slopes(numbers: list[Any], directions: int) -> tuple[np.ndarray, np.ndarray]:
+    """Values (n,) and derivatives (n, D) of numbers, of which some may be plain."""
+    values = np.array([float(n) for n in numbers])
+    slopes = [n.slope if isinstance(n, Dual) else np.zeros(directions) for n in numbers]
+    return values, np.array(slopes).reshape(len(numbers), directions)
