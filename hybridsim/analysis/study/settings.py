@@ -1,0 +1,147 @@
+"""The system and the settings of He et al. 2026, and how large the study of them is made."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+SOURCE = "He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057"
+
+# Table 1 of the paper
+MASS, DAMPING, STIFFNESS, MU = 0.2, 5.65, 1e5, 0.5
+NATURAL_FREQUENCY = math.sqrt(STIFFNESS / MASS)
+DAMPING_RATIO = DAMPING / (2.0 * math.sqrt(STIFFNESS * MASS))
+
+NORMAL = 40.0  # N: the normal load wherever the paper names F0/N alone; the scale of all runs
+STEPS_PER_PERIOD, EPS_V = 1200, 8e-4  # what the paper settles on
+EPS_V_SMALL = 1e-6  # what it takes while it varies the step
+
+
+@dataclass(frozen=True)
+class Point:
+    """A forcing: frequency ratio r, F0/N, and N in newtons."""
+
+    r: float
+    ratio: float
+    normal: float = NORMAL
+
+    @property
+    def omega(self) -> float:
+        """Circular frequency of the forcing in rad/s."""
+        return self.r * NATURAL_FREQUENCY
+
+    @property
+    def period(self) -> float:
+        """Its period in seconds."""
+        return 2.0 * math.pi / self.omega
+
+    @property
+    def force(self) -> float:
+        """Its amplitude F0 in newtons."""
+        return self.ratio * self.normal
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Values of the parameters of the model `dfcs`."""
+        return {"F0": self.force, "N": self.normal, "omega": self.omega}
+
+    @property
+    def friction(self) -> float:
+        """Friction force over force amplitude, mu N / F0: the f of Den Hartog's formulas."""
+        return MU / self.ratio
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to read the published method where the paper leaves it open."""
+
+    name: str
+    integrator: str
+    options: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def _dichotomy(velocity: str, release: str, friction: str, after: str) -> Variant:
+    options = {"stick_velocity": velocity, "release": release, "friction": friction, "after_event": after}
+    name = f"v {velocity}, release {release}, force by {friction}, {after}"
+    return Variant(name, "rk4-dichotomy", tuple(options.items()))
+
+
+# every reading; the first is Eq. 4 to the letter
+DICHOTOMIES = tuple(
+    _dichotomy(velocity, release, friction, after)
+    for velocity in ("kept", "zero")
+    for friction in ("step", "stage")
+    for release in ("step", "located")
+    for after in ("full-step", "rest-of-step")
+)
+# those that differ by more than their spread: in the velocity of a sticking body, and when the force is chosen
+MATTERING = tuple(v for v in DICHOTOMIES if "release step" in v.name and "full-step" in v.name)
+LITERAL = DICHOTOMIES[0]
+ZEROED = next(v for v in MATTERING if v.name.startswith("v zero"))
+SIGNS = tuple(
+    Variant(f"sign by {friction}", "rk4-sign", (("friction", friction),)) for friction in ("step", "stage")
+)
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is computed.
+
+    Parameters
+    ----------
+    periods, last : periods of a run of a fixed-step method, and over how many at its end A and E are taken.
+    ratios, r : grid of Figures 10 and 11.
+    map_count : points along each side of the maps of what is true.
+    race_count, race_sample : points along each side of the map that is timed, and how many of them the published
+        method is timed on.
+    ladder_count : points along each side of the maps of the setting that is needed.
+    repeats : timed runs of which the mean is taken; the paper takes five.
+    """
+
+    name: str
+    periods: int
+    last: int
+    ratios: tuple[float, ...]
+    r: tuple[float, ...]
+    map_count: int
+    race_count: int
+    race_sample: int
+    ladder_count: int
+    steps: tuple[int, ...]
+    eps: tuple[float, ...]
+    repeats: int = 5
+
+
+def _range(first: float, last: float, step: float) -> tuple[float, ...]:
+    return tuple(round(first + k * step, 10) for k in range(round((last - first) / step) + 1))
+
+
+FULL = Size(
+    name="full",
+    periods=150,
+    last=50,
+    ratios=_range(0.51, 0.66, 0.01) + _range(0.70, 1.0, 0.05),
+    r=_range(0.5, 1.5, 0.02),
+    map_count=121,
+    race_count=101,
+    race_sample=400,
+    ladder_count=15,
+    steps=_range(100, 2400, 100),  # type: ignore[arg-type]
+    eps=tuple(10.0**k for k in _range(-1.5, -6.0, -0.25)),
+)
+QUICK = Size(
+    name="quick",
+    periods=100,
+    last=30,
+    ratios=_range(0.52, 0.64, 0.02) + (0.7, 0.8),
+    r=_range(0.5, 1.0, 0.05) + _range(1.1, 1.5, 0.1),
+    map_count=31,
+    race_count=31,
+    race_sample=60,
+    ladder_count=5,
+    steps=(100, 200, 400, 600, 800, 1000, 1200, 1400, 2000, 2400),
+    eps=tuple(10.0**k for k in _range(-2.0, -6.0, -0.5)),
+)

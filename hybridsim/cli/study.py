@@ -1,0 +1,77 @@
+"""`hybridsim study NAME`: a published study done again, with a verdict on every claim, its pictures and a page."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.cli.output import print_json, require_folder
+from hybridsim.cli.progress import Progress
+from hybridsim.cli.session import Session
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.study import Study
+
+STUDIES = ("he2026",)
+_WIDTH = 100
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "study",
+        help="do a published study again: its figures, and a verdict on each of its claims",
+        description="Do a published study again with the published method, hold every figure against the exact motion, "
+        "and judge every claim.",
+        epilog="The folder gets NAME.json (the verdicts), NAME.md (the page) and NAME-*.png (the pictures).",
+    )
+    parser.add_argument("name", metavar="NAME", choices=STUDIES, help="which study: " + ", ".join(STUDIES))
+    parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: some minutes")
+    parser.add_argument(
+        "--out", metavar="FOLDER", type=Path, help="folder of the results (default: study-NAME, here)"
+    )
+    parser.add_argument(
+        "--images", metavar="FOLDER", type=Path, help="folder of the pictures (default: that of the results)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the verdicts as JSON instead of the table")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, session: Session) -> int:
+    """Run the study, print the verdicts and fill the folder."""
+    folder: Path = args.out or Path(f"study-{args.name}")
+    images: Path = args.images or folder
+    require_folder(folder, "--out")
+    require_folder(images, "--images")
+
+    from hybridsim.analysis.study import he2026
+
+    with Progress(session) as progress:
+        study = he2026(quick=args.quick, progress=progress)
+    _write(study, args.name, folder, images, session)
+    if args.json:
+        print_json(study.to_plain())
+    else:
+        _print(study)
+    return 0
+
+
+def _print(study: Study) -> None:
+    for name, verdict, why in study.rows():
+        print(f"{name}: {verdict}")
+        print(textwrap.fill(why, _WIDTH, initial_indent="  ", subsequent_indent="  "))
+
+
+def _write(study: Study, name: str, folder: Path, images: Path, session: Session) -> None:
+    from hybridsim.plot import save
+    from hybridsim.plot.study import pictures
+
+    folder.mkdir(parents=True, exist_ok=True)
+    images.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.json").write_text(study.to_json(), encoding="utf-8")
+    session.wrote(folder / f"{name}.json")
+    for title, draw in pictures(study).items():
+        save(draw(), images / f"{name}-{title}.png")
+        session.wrote(images / f"{name}-{title}.png")
