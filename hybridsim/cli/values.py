@@ -109,7 +109,7 @@ def changed_model(args: argparse.Namespace) -> Model:
     import hybridsim
 
     model: Model = hybridsim.load(args.model)
-    with _blaming_the_command_line():
+    with blaming_the_command_line():
         if args.param:
             model = model.with_(**_expressions(args.param, "-p"))
         if args.x0:
@@ -118,7 +118,7 @@ def changed_model(args: argparse.Namespace) -> Model:
 
 
 @contextmanager
-def _blaming_the_command_line() -> Iterator[None]:
+def blaming_the_command_line() -> Iterator[None]:
     """Turn a bad expression into bad usage: the model was sound before the command line changed it."""
     try:
         yield
@@ -180,7 +180,7 @@ def _record_end(model: Model) -> float:
 def _time(model: Model, text: str) -> float:
     from hybridsim.expr import evaluate, parse, require_names
 
-    with _blaming_the_command_line():
+    with blaming_the_command_line():
         values = model.parameter_values()
         expression = parse(text, Place(file="--t-end", text=text))
         require_names(expression, values)

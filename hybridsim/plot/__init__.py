@@ -5,6 +5,9 @@ from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
 from hybridsim.plot.style import save
 from hybridsim.plot.suite_page import suite_page
+from hybridsim.plot.sweep_lines import sweep_lines
+from hybridsim.plot.sweep_map import sweep_map
+from hybridsim.plot.sweep_picture import sweep
 from hybridsim.plot.time_history import TimeHistoryAxes, time_history
 from hybridsim.plot.work_precision import work_precision
 
@@ -15,6 +18,9 @@ __all__ = [
     "regularisation",
     "save",
     "suite_page",
+    "sweep",
+    "sweep_lines",
+    "sweep_map",
     "time_history",
     "work_precision",
 ]

@@ -146,6 +146,14 @@ def test_lists_and_expressions() -> None:
     assert through["F0"][:, 0] == pytest.approx([0.6 * math.sqrt(1e5 / 0.2), 0.6 * math.sqrt(1e5 / 0.8)])
 
 
+def test_an_expression_without_a_value_is_the_fault_of_its_point() -> None:
+    found = hs.sweep("dfcs", {"m": ["0.2", "0*k", "1/(k - k)"], "F0": [1.0]}, _load)
+    assert found.status[0, 0] == "ok" and found.axes["m"][0] == 0.2 and math.isnan(found.axes["m"][2])
+    assert all(text.startswith("ExpressionError") for text in found.status[1:, 0])
+    with pytest.raises(hs.ExpressionError, match="did you mean 'mu'"):
+        hs.sweep("dfcs", {"m": ["mv"]}, _load)
+
+
 def test_initial_values_and_options() -> None:
     def start(model: hs.Model, factor: float) -> dict[str, complex]:
         return {"x": factor * model.start_values()["x"], "z": 1j * model.parameter_values()["N"]}

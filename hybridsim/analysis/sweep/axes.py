@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim.arguments import is_row, number
-from hybridsim.errors import UsageError, nearest
-from hybridsim.expr import Expression, parse
+from hybridsim.errors import ExpressionError, UsageError, nearest
+from hybridsim.expr import Expression, parse, require_names, resolve
 from hybridsim.model import Model
 
 MODES = ("grid", "list")
@@ -27,7 +27,8 @@ class Axis:
     ----------
     name, unit : as declared.
     settings : what the model is given, numbers or expressions.
-    values : their numbers (k,); the texts where an expression depends on another axis and has no one number.
+    values : their numbers (k,), NaN for an expression that has none; the texts where an expression depends on
+        another axis, so that its number is not the same everywhere.
     is_start : whether it is the initial value of a state.
     """
 
@@ -113,7 +114,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
             name,
             units.get(name, starts.get(name, "")),
             row,
-            _values(model, name, row, name in starts, frozenset(settings)),
+            _values(model, name, row, frozenset(settings)),
             name in starts,
         )
         for name, row in settings.items()
@@ -141,32 +142,33 @@ def _setting(name: str, value: Any) -> float | Expression:
     return found
 
 
-def _values(
-    model: Model, name: str, row: Sequence[float | Expression], is_start: bool, swept: frozenset[str]
-) -> np.ndarray:
+def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
     """The numbers of the settings, or their texts where a number would depend on another axis."""
-    others = swept - {name}
-    expressions = [setting for setting in row if isinstance(setting, Expression)]
-    if any(_depends(model, expression, others) for expression in expressions):
+    declared = {p.name: p.value for p in model.parameters}
+    needed = {}
+    for setting in row:
+        if isinstance(setting, Expression):
+            require_names(setting, declared)
+            needed[setting] = _needed({**declared, name: setting}, name)
+    if any(parameters.keys() & (swept - {name}) for parameters in needed.values()):
         return np.array([s.text if isinstance(s, Expression) else f"{s!r}" for s in row], dtype=np.str_)
-    return np.array([_number(model, name, setting, is_start) for setting in row], dtype=float)
+    return np.array([_number(name, needed[s]) if isinstance(s, Expression) else s for s in row], dtype=float)
 
 
-def _depends(model: Model, expression: Expression, names: frozenset[str]) -> bool:
-    """Whether the value of an expression depends on some parameters, directly or through others."""
-    declared = {p.name: p.value.names for p in model.parameters}
-    seen: set[str] = set()
-    waiting = set(expression.names)
+def _needed(declared: Mapping[str, Expression], name: str) -> dict[str, Expression]:
+    """A parameter and all that its value depends on, directly or through others."""
+    found: dict[str, Expression] = {}
+    waiting = {name}
     while waiting:
-        seen |= waiting
-        waiting = {name for known in waiting for name in declared.get(known, frozenset())} - seen
-    return bool(seen & names)
+        found |= {known: declared[known] for known in waiting}
+        waiting = {other for known in waiting for other in declared[known].names} - found.keys()
+        waiting &= declared.keys()
+    return found
 
 
-def _number(model: Model, name: str, setting: float | Expression, is_start: bool) -> float:
-    if not isinstance(setting, Expression):
-        return setting
-    if is_start:
-        changed = model.with_start(**{name: setting})
-        return {**changed.start_values(), **changed.discrete_values()}[name]
-    return model.with_(**{name: setting}).parameter_values()[name]
+def _number(name: str, needed: Mapping[str, Expression]) -> float:
+    """Its value; NaN where it has none, which is then the fault of that point alone."""
+    try:
+        return resolve(needed)[name]
+    except ExpressionError:
+        return math.nan

@@ -8,11 +8,21 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from hybridsim.analysis.sweep.readings import Reading, not_numbers, readings
+from hybridsim.errors import SimulationError
 from hybridsim.expr import Expression
 from hybridsim.model import Model
 
 DONE, NOT_RUN = "ok", "not run"
 _MOST = 4  # sweeps whose model a worker of another process keeps
+
+
+class Incomplete(SimulationError):
+    """A measurement that could not be made, and what there is of it all the same."""
+
+    def __init__(self, message: str, found: dict[str, Reading]) -> None:
+        super().__init__(message)
+        self.found = found
+
 
 Settings = tuple[float | Expression, ...]
 
@@ -102,6 +112,8 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
     try:
         result = job.measure.run(job.at(settings), previous)
         found = readings(job.measure.read(result))
+    except Incomplete as error:
+        return Outcome(error.message, error.found), None
     except Exception as error:
         return Outcome(_said(error), None), None
     missing = not_numbers(found)

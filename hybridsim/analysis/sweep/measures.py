@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybridsim.analysis.sweep.job import Measure
+from hybridsim.analysis.sweep.ready import ready_measure
+from hybridsim.arguments import is_row
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
@@ -30,10 +32,14 @@ class Given:
         return result
 
 
-def measure_of(measure: Any, chained: bool, options: Mapping[str, Any]) -> Measure:
+def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, Any]) -> Measure:
     """A measure by what `sweep` was given for it."""
     if callable(measure):
         return Given(measure, options, chained)
+    if isinstance(measure, str):
+        return ready_measure(measure, model, options)
+    if is_row(measure) and len(measure) and all(isinstance(word, str) for word in measure):
+        return ready_measure(tuple(measure), model, options)
     raise UsageError(
         f"measure is {measure!r}", remedy="give a function of the model, or the name of a ready measure"
     )

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +17,13 @@ import numpy as np
 from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep.axes import POINT
 from hybridsim.analysis.sweep.job import DONE, NOT_RUN
+from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.tables import library
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_SHOWN = 5  # statuses that are shown of a sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +74,11 @@ class Sweep:
         return self.values[name]
 
     def __repr__(self) -> str:
-        shape = " x ".join(f"{len(values)} {name}" for name, values in self.axes.items())
-        lines = [f"Sweep of {self.model.name} over {shape}: {', '.join(self.values) or 'nothing'}"]
-        lines += [
-            f"  {count} of {self.status.size} points: {text}"
-            for text, count in Counter(self.status.ravel().tolist()).most_common(_SHOWN)
-        ]
-        return "\n".join(lines)
+        return "\n".join([heading(self), *statuses(self)])
+
+    def table(self) -> str:
+        """Least and greatest value of each reading, and where they are; how many points have which status."""
+        return table(self)
 
     def columns(self) -> dict[str, np.ndarray]:
         """Axes, readings and status as columns, a row for each point; an array is ``name[0]``, ``name[1]``, ..."""
@@ -145,6 +143,14 @@ class Sweep:
         return xarray.Dataset(
             variables | {"status": (where, self.status.astype(np.str_))}, coordinates, about
         )
+
+    def plot(self, *names: str, over: str | None = None) -> Any:
+        """Draw readings: lines over one parameter, maps over two; see `hybridsim.plot.sweep`.
+
+        Returns the axes that were drawn in; ``hybridsim.plot.save`` writes them to a file.
+        """
+        # pictures are a floor above: looked up when they are asked for, so that nothing down here depends on them
+        return import_module("hybridsim.plot").sweep(self, *names, over=over)
 
     def _dimensions_of(self, name: str) -> tuple[str, ...]:
         extra = () if self.values[name].ndim == self.status.ndim else (f"item of {name}",)

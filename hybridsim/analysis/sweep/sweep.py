@@ -15,6 +15,7 @@ from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.job import Job
 from hybridsim.analysis.sweep.measures import measure_of
 from hybridsim.analysis.sweep.pieces import Pieces
+from hybridsim.analysis.sweep.ready import units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sending import Sending, require_sendable, worker_count
 from hybridsim.analysis.wanted import whole
@@ -47,7 +48,9 @@ def sweep(
     model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
     values : for each parameter, or state (its initial value), a row of numbers or expressions:
         ``{"F0": [20, 30], "omega": ["0.5*sqrt(k/m)", 400]}``.
-    measure : a function of the model that returns a number, an array in one dimension, or a dict of these by name.
+    measure : a function of the model that returns a number, an array in one dimension, or a dict of these by name; or
+        "steady", what `steady_state` gives, "final", the states at the end of a run over ``t_span``; or names of
+        readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3", "kind"]``, ``"final.x"``.
     mode : "grid", all combinations; "list", the k-th values of all together.
     params : parameter values that are the same at every point.
     executor : any `concurrent.futures.Executor`; if not given threads, on which the compiled engine runs in parallel.
@@ -55,11 +58,12 @@ def sweep(
     workers : how many points are worked at at the same time; one for each processor, or as many as the executor has,
         if not given.
     warm_start : each point along the first axis (of a list: all of it) gets the result of the one before: a
-        function is called ``measure(model, previous)``, with None at the first point and after one that failed. The
-        first axis is then worked through in order; the others are independent.
+        function is called ``measure(model, previous)``, with None at the first point and after one that failed; a
+        ready measure starts from the state of the neighbour. The first axis is then worked through in order; the
+        others are independent.
     units : units of readings, for labels.
     progress : called as progress(done, total, what is next).
-    options : passed on to the measure.
+    options : passed on to the measure: to the function, to `steady_state`, or to `simulate`.
 
     Returns
     -------
@@ -86,20 +90,23 @@ def sweep(
         model,
         tuple(axis.name for axis in points.axes),
         frozenset(axis.name for axis in points.axes if axis.is_start),
-        measure_of(measure, warm_start, options),
+        measure_of(measure, model, warm_start, options),
         bool(warm_start),
     )
     began = time.perf_counter()
     collected, finished, who = _work(job, points, executor, count, tell)
+    found = collected.values(points.shape)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
+    if not callable(measure):
+        known |= units_of_readings(found, model)
     return Sweep(
         model,
         points.mode,
         {axis.name: axis.values for axis in points.axes},
-        collected.values(points.shape),
+        found,
         collected.status.reshape(points.shape),
         known | dict(units or {}),
-        measure if isinstance(measure, str) else getattr(measure, "__name__", "measure"),
+        _named(measure),
         not finished,
         time.perf_counter() - began,
         who,
@@ -128,6 +135,12 @@ def _work(
         return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
     with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
         return collected, sending.run(threads, count), f"threads ({count})"
+
+
+def _named(measure: Any) -> str:
+    if callable(measure):
+        return str(getattr(measure, "__name__", "measure"))
+    return measure if isinstance(measure, str) else ", ".join(measure)
 
 
 class _Told:

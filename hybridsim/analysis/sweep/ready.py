@@ -1,0 +1,159 @@
+"""Measures with a name: what the steady state of a model is like, and where a run of it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.analysis.sweep.job import Incomplete
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.model import Model
+from hybridsim.model.units import time_unit, units_of
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.steady import SteadyState
+
+STEADY, FINAL = "steady", "final"
+# Measures of a steady state by what they are of: a state or an output, a contact, the motion as a whole.
+_OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
+_OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
+_OF_MOTION = ("period", "multiple", "residual", "newton_steps", "periods", "kind", "word", "stable")
+_SQUARED = "energy"
+_PLAIN = ("amplitude", "energy")  # of each quantity, where nothing in particular is asked for
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Readings of `steady_state`: ``amplitude.x``, ``harmonic.x.3``, ``stick_fraction.f``, ``period``, ``kind``, ...
+
+    A motion that does not repeat has no such measures: its status names its kind.
+    """
+
+    words: tuple[str, ...]
+    options: Mapping[str, Any]
+
+    def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
+        """The steady state, looked for from that of the neighbour where there is one."""
+        from hybridsim.analysis.steady import steady_state
+
+        start = {} if previous is None else _start_of(previous)
+        return steady_state(model, **{**self.options, **start})
+
+    def read(self, result: SteadyState) -> dict[str, Any]:
+        """The readings in the order of the words."""
+        if not result.success:
+            known = {name: getattr(result, name) for name in self.words if name in ("kind", "residual")}
+            raise Incomplete(f"{result.kind}: {result.message}", known)
+        return {word: _reading(result, word) for word in self.words}
+
+
+@dataclass(frozen=True)
+class Final:
+    """States at the end of a run of `simulate`."""
+
+    names: tuple[str, ...]
+    options: Mapping[str, Any]
+
+    def run(self, model: Model, previous: Any) -> dict[str, float]:
+        """The states by name, from the neighbour's where there is one."""
+        from hybridsim.simulate import simulate
+
+        given = {"save": "nothing", **self.options}
+        if previous is not None:
+            given["x0"] = previous
+        solution = simulate(model, **given)
+        if not solution.success:
+            raise SimulationError(f"{solution.status}: {solution.message}")
+        return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
+
+    def read(self, result: dict[str, float]) -> dict[str, float]:
+        """Those that are asked for."""
+        return {f"{FINAL}.{name}": result[name] for name in self.names}
+
+
+def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str, Any]) -> Steady | Final:
+    """A measure by its name, "steady" or "final", or by the names of its readings.
+
+    Errors
+    ------
+    UsageError for names that do not exist, and readings of both together.
+    """
+    asked = (words,) if isinstance(words, str) else tuple(words)
+    states = [state.name for state in model.states]
+    heads = {word.partition(".")[0] for word in asked}
+    if heads == {FINAL}:
+        if "t_span" not in options:
+            raise UsageError(f"measure is {words!r} without t_span", remedy="give t_span=(0, ...)")
+        names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
+        return Final(tuple(names), options)
+    if FINAL in heads:
+        raise UsageError(
+            f"measure is {words!r}",
+            remedy="steady states and ends of runs are two sweeps; ask for one of them",
+        )
+    known = _known(model)
+    if asked == (STEADY,):
+        asked = tuple(
+            word for word in known if word in ("period", "kind") or word.startswith((*_PLAIN, *_OF_CONTACT))
+        )
+    for word in asked:
+        stem, _, last = word.rpartition(".")
+        is_harmonic = word.startswith("harmonic.") and last.isdecimal()
+        if (f"{stem}.1" if is_harmonic else word) not in known:
+            raise UsageError(
+                f"there is no measure {word!r}",
+                remedy=nearest(word, [STEADY, FINAL, *known], kind="measures"),
+            )
+    return Steady(asked, options)
+
+
+def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
+    """Units of readings with a name, as far as the model declares them."""
+    known, time = units_of(model), time_unit(model)
+    units = {}
+    for word in words:
+        head, _, rest = word.partition(".")
+        if head == "period":
+            units[word] = time
+        elif head in (*_OF_QUANTITY, FINAL):
+            unit = known.get(rest.rpartition(".")[0] if head == "harmonic" else rest, "")
+            squared = f"({unit})² {time}" if " " in unit or "/" in unit else f"{unit}² {time}"
+            units[word] = (squared.strip() if head == _SQUARED else unit) if unit else ""
+    return {word: unit for word, unit in units.items() if unit}
+
+
+def _known(model: Model) -> list[str]:
+    """Every reading of a steady state; of the harmonics the first."""
+    discrete = {d.name for d in model.discrete}
+    quantities = [name for name in units_of(model) if name not in discrete]
+    contacts = [contact.name for contact in model.contacts]
+    numbered = {"harmonic": ".1"}
+    found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
+    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *_OF_MOTION]
+
+
+def _of(word: str, names: Sequence[str], kind: str) -> str:
+    name = word.partition(".")[2]
+    if name not in names:
+        raise UsageError(f"there is no measure {word!r}", remedy=nearest(name, names, kind=kind))
+    return name
+
+
+def _reading(steady: SteadyState, word: str) -> Any:
+    head, _, rest = word.partition(".")
+    if head == "harmonic":
+        name, _, number = rest.rpartition(".")
+        return steady.harmonic(name, int(number))
+    found = getattr(steady, head)
+    if head == "word":
+        return " ".join(found)
+    return found[rest] if rest else found
+
+
+def _start_of(steady: SteadyState) -> dict[str, Any]:
+    """State and modes from which a steady motion starts."""
+    run = steady.solution
+    x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
+    x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}
+    return {"x0": x0, "z0": {name: pieces[0].mode for name, pieces in run.modes.items() if pieces}}

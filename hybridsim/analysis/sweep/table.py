@@ -1,0 +1,63 @@
+"""A sweep in a few lines of text: its readings from least to greatest, and what became of its points."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.sweep.result import Sweep
+
+_SHOWN = 5  # kinds of status that are shown
+
+
+def heading(sweep: Sweep) -> str:
+    """Model, axes and readings in one line."""
+    shape = " x ".join(f"{len(values)} {name}" for name, values in sweep.axes.items())
+    return f"Sweep of {sweep.model.name} over {shape}: {', '.join(sweep.values) or 'nothing'}"
+
+
+def statuses(sweep: Sweep) -> list[str]:
+    """How many points have which status, a line each."""
+    counted = Counter(sweep.status.ravel().tolist()).most_common()
+    lines = [f"  {count} of {sweep.status.size} points: {text}" for text, count in counted[:_SHOWN]]
+    return lines + ([f"  ... and {len(counted) - _SHOWN} other statuses"] if len(counted) > _SHOWN else [])
+
+
+def table(sweep: Sweep) -> str:
+    """Least and greatest value of each reading with the point that has it; of texts how often each occurs."""
+    rows: list[tuple[str, ...]] = []
+    for name, values in sweep.values.items():
+        unit = sweep.units.get(name, "")
+        if values.dtype.hasobject:
+            counted = Counter(text for text in values.ravel().tolist() if text != "").most_common(_SHOWN)
+            rows.append((name, ", ".join(f"{text} {count}" for text, count in counted), "", unit))
+            continue
+        numbers = np.abs(values) if np.iscomplexobj(values) else values
+        if np.isfinite(numbers).any():
+            low, high = (int(find(numbers)) for find in (np.nanargmin, np.nanargmax))
+            ends = [f"{numbers.ravel()[k]:.6g} at {_where(sweep, k, values.shape)}" for k in (low, high)]
+            shown = f"|{name}|" if np.iscomplexobj(values) else name
+            rows.append((shown, *ends, unit))
+    header = ("reading", "least", "greatest", "unit")
+    widths = [max(len(row[i]) for row in [header, *rows]) for i in range(4)]
+    lines = [
+        "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in [header, *rows]
+    ]
+    return "\n".join(
+        [heading(sweep), *statuses(sweep), "", *lines] if rows else [heading(sweep), *statuses(sweep)]
+    )
+
+
+def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
+    """The parameters of the point that holds the k-th number of a reading."""
+    place = np.unravel_index(k, shape)
+    if sweep.mode == "list":
+        return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())
+    return ", ".join(_set(name, settings[i]) for (name, settings), i in zip(sweep.axes.items(), place))
+
+
+def _set(name: str, value: object) -> str:
+    return f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}"

@@ -1,0 +1,127 @@
+"""Readings of a sweep as lines over one parameter, one line for each value of the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.plot import style
+from hybridsim.plot.scale import label_axis
+from hybridsim.plot.sweep_readings import (
+    NO_RESULT,
+    chosen_names,
+    label_of,
+    label_parameter,
+    numbers_of,
+    positions,
+    range_of,
+    setting,
+    title_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis import Sweep
+
+_FEW = 30  # points of a line that are marked each
+_CROWD = 12  # lines that a legend names each; of more, some
+_WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of what stands above and below
+
+
+def sweep_lines(
+    result: Sweep, *names: str, over: str | None = None, axes: tuple[Axes, ...] | None = None
+) -> tuple[Axes, ...]:
+    """Draw readings over one parameter, a panel each; of an array at each point, every item as a dot.
+
+    Parameters
+    ----------
+    names : readings; the first six that are numbers if none is given.
+    over : the parameter that runs across; the longest axis if not given.
+    axes : as many axes as readings, to draw in; a new figure if not given.
+    """
+    dimensions = list(result.axes) if result.mode == "grid" else [next(iter(result.axes))]
+    if len(dimensions) > 2:
+        raise UsageError(
+            f"the sweep has {len(dimensions)} parameters",
+            remedy="two can be drawn; take a part of it with to_xarray().sel(...)",
+        )
+    lengths = dict(zip(dimensions, result.status.shape, strict=True))
+    across = max(dimensions, key=lengths.__getitem__) if over is None else over
+    if across not in dimensions:
+        raise UsageError(f"over is {over!r}", remedy=nearest(str(over), dimensions, kind="parameters"))
+    found = chosen_names(result, names, arrays=True)
+    if axes is None:
+        figure = style.figure(_WIDTH, _HEIGHT * len(found) + _MORE)
+        axes = tuple(figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0])
+        style.head(axes[0], title_of(result))
+    if len(axes) != len(found):
+        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give one for each")
+    others = [name for name in dimensions if name != across]
+    for panel, name in zip(axes, found, strict=True):
+        _draw(panel, result, name, across, others[0] if others else None, dimensions)
+    label_parameter(axes[-1].xaxis, result, across)
+    if others:
+        _legend(axes[0], lengths[others[0]])
+    return axes
+
+
+def _draw(
+    panel: Axes, result: Sweep, name: str, across: str, other: str | None, dimensions: list[str]
+) -> None:
+    values = numbers_of(result, name)
+    if dimensions[0] != across:
+        values = values.swapaxes(0, 1)
+    x = positions(result.axes[across])
+    order = np.argsort(x, kind="stable")
+    lines = [""] if other is None else [setting(result, other, value) for value in result.axes[other]]
+    colours = _colours(len(lines))
+    has_items = values.ndim > len(dimensions)
+    for k, (label, colour) in enumerate(zip(lines, colours, strict=True)):
+        y = values if other is None else values[:, k]
+        if has_items:
+            dots = np.broadcast_to(x[:, None], y.shape)
+            panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=2.5, label=label)
+        else:
+            marker = "o" if len(x) <= _FEW else ""
+            panel.plot(
+                x[order], y[order], color=colour, marker=marker, markersize=3, linewidth=1.3, label=label
+            )
+    style.dress(panel)
+    there = np.isfinite(values).any(axis=-1) if has_items else np.isfinite(values)
+    lost = x[~there.reshape(len(x), -1).all(axis=1)]
+    if lost.size:
+        panel.plot(
+            lost, np.full(lost.size, 0.02), "x", color=style.PALETTE[1], markersize=4, label=NO_RESULT,
+            transform=panel.get_xaxis_transform(), clip_on=False,
+        )  # fmt: skip
+        if other is None:
+            panel.legend(handles=panel.lines[-1:], fontsize=8, frameon=False)
+    label_axis(panel.yaxis, label_of(result, name), result.units.get(name, ""), *range_of(values))
+
+
+def _colours(count: int) -> list[str]:
+    """Apart for few lines; from dark to light in their order for many."""
+    if count <= len(style.PALETTE):
+        return list(style.PALETTE[:count])
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, count))
+    return [matplotlib.colors.to_hex(shade) for shade in shades]
+
+
+def _legend(panel: Axes, count: int) -> None:
+    handles, labels = panel.get_legend_handles_labels()
+    if count > _CROWD:
+        shown = sorted({*range(0, count, -(-count // _CROWD)), *range(count - 1, len(handles))})
+        handles, labels = [handles[k] for k in shown], [labels[k] for k in shown]
+    panel.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        fontsize=8,
+        frameon=False,
+        labelspacing=0.3,
+    )

@@ -1,0 +1,92 @@
+"""Readings of a sweep over two parameters as maps."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.patches import Patch
+
+from hybridsim.errors import UsageError
+from hybridsim.plot import style
+from hybridsim.plot.scale import label_axis
+from hybridsim.plot.sweep_readings import (
+    NO_RESULT,
+    chosen_names,
+    label_of,
+    label_parameter,
+    numbers_of,
+    positions,
+    range_of,
+    title_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis import Sweep
+
+_COLUMNS = 3
+_WIDTH, _HEIGHT, _MORE = 4.6, 3.4, 0.5  # inches of a map with its scale, and of the title
+_BETWEEN = 0.12  # inches on each side, so that the label of a scale is not taken for that of the next map
+_NOTHING = "#d8d8d8"  # no colour of the scale
+
+
+def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) -> tuple[Axes, ...]:
+    """Draw readings over two parameters, a map each: the first parameter up, the second across.
+
+    Points without a result are grey.
+
+    Parameters
+    ----------
+    names : readings; the first six that are numbers if none is given.
+    axes : as many axes as readings, to draw in; a new figure if not given.
+    """
+    if len(result.axes) != 2 or result.mode != "grid":
+        raise UsageError(
+            f"a map needs a grid of two parameters, and this is a {result.mode} of {len(result.axes)}",
+            remedy="draw lines, or take a part of it with to_xarray().sel(...)",
+        )
+    found = chosen_names(result, names, arrays=False)
+    if axes is None:
+        columns = min(_COLUMNS, math.ceil(math.sqrt(len(found))))
+        rows = math.ceil(len(found) / columns)
+        figure = style.figure(_WIDTH * columns, _HEIGHT * rows + _MORE)
+        figure.set_layout_engine("constrained", w_pad=_BETWEEN)
+        figure.suptitle(style.literal(title_of(result)), fontsize=10, x=0.01, ha="left")
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for empty in panels[len(found) :]:
+            empty.remove()
+        axes = tuple(panels[: len(found)])
+    if len(axes) != len(found):
+        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give one for each")
+    for panel, name in zip(axes, found, strict=True):
+        _draw(panel, result, name)
+    return axes
+
+
+def _draw(panel: Axes, result: Sweep, name: str) -> None:
+    values = numbers_of(result, name)
+    up, across = result.axes
+    places = []
+    for dimension, parameter in enumerate((up, across)):
+        numbers = positions(result.axes[parameter])
+        order = np.argsort(numbers, kind="stable")
+        values = np.take(values, order, axis=dimension)
+        places.append(numbers[order])
+    shades = matplotlib.colormaps["viridis"].with_extremes(bad=_NOTHING)
+    mesh = panel.pcolormesh(
+        places[1], places[0], np.ma.masked_invalid(values), cmap=shades, shading="nearest", rasterized=True
+    )
+    label_parameter(panel.yaxis, result, up)
+    label_parameter(panel.xaxis, result, across)
+    panel.tick_params(color=style.FAINT, labelsize=9)
+    panel.spines[:].set_color(style.FAINT)
+    bar = panel.figure.colorbar(mesh, ax=panel, pad=0.02)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(color=style.FAINT, labelsize=9)
+    label_axis(bar.ax.yaxis, label_of(result, name), result.units.get(name, ""), *range_of(values))
+    if not np.isfinite(values).all():
+        panel.legend(handles=[Patch(color=_NOTHING, label=NO_RESULT)], fontsize=8, loc="upper right")

@@ -1,0 +1,26 @@
+"""A sweep as a picture: lines over one parameter, maps over two."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridsim.plot.sweep_lines import sweep_lines
+from hybridsim.plot.sweep_map import sweep_map
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis import Sweep
+
+
+def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ...]:
+    """Draw readings of a sweep; all that are numbers, if none is named, up to six.
+
+    Parameters
+    ----------
+    over : the parameter that runs across. With it, or with one parameter only, there are lines, one for each value
+        of the other parameter; without it two parameters make a map.
+    """
+    if over is None and len(result.axes) == 2 and result.mode == "grid":
+        return sweep_map(result, *names)
+    return sweep_lines(result, *names, over=over)

@@ -1,0 +1,79 @@
+"""`hybridsim sweep`: values from the command line, data and picture in the folder, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import hybridsim as hs
+
+FINAL = ("--measure", "final.x", "--t-end", "2T")
+
+
+def test_a_grid_fills_its_folder(hybridsim: Callable, tmp_path: Path) -> None:
+    code, out, err = hybridsim("sweep", "dfcs", "F0=22:30:3", "N=30,40", *FINAL, "--out", "o", "--workers", 2)
+    assert code == 0, err
+    assert "6 of 6 points: ok" in out and "final.x" in out
+    with (tmp_path / "o" / "sweep.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["F0"], row["N"]) for row in rows[1:3]] == [("22.0", "40.0"), ("26.0", "30.0")]
+    t_end = 2 * 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
+    run = hs.simulate("dfcs", (0, t_end), params={"F0": 26, "N": 30})
+    assert float(rows[2]["final.x"]) == run.y[0, -1]
+    assert (tmp_path / "o" / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((tmp_path / "o" / "sweep.json").read_text(encoding="utf-8"))["values"]
+
+
+def test_json_lists_expressions_and_ratios(hybridsim: Callable) -> None:
+    argv = (
+        "sweep",
+        "dfcs",
+        "m=0.1:0.4:3:log",
+        "omega=0.5*sqrt(k/m),300,(1+2)*100",
+        "--list",
+        "--json",
+        *FINAL,
+    )
+    code, out, err = hybridsim(*argv)
+    assert code == 0, err
+    found = json.loads(out)
+    assert found["axes"]["m"] == pytest.approx([0.1, 0.2, 0.4], rel=1e-15)
+    assert found["axes"]["omega"] == ["0.5*sqrt(k/m)", "300", "(1+2)*100"]
+    assert found["mode"] == "list" and len(found["values"]["final.x"]) == 3
+
+
+def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("sweep", "dfcs", "m=0.2,0", *FINAL, "--json")
+    assert code == 0 and "1 of 2 points: " in err
+    assert json.loads(out)["status"][0] == "ok"
+    code, out, err = hybridsim("sweep", "dfcs", "m=0,-0*1", *FINAL)
+    assert code == 1 and "of 2 points" in err
+
+
+@pytest.mark.parametrize(
+    "argv, message",
+    [
+        (["F0"], "NAME=VALUE"),
+        (["F=1,2"], "did you mean 'F0'"),
+        (["F0=1:2"], "FROM:TO:COUNT"),
+        (["F0=1:2:0"], "FROM:TO:COUNT"),
+        (["F0=0:2:3:log"], "above zero"),
+        (["F0=1:q:3"], "q"),
+        (["F0=1,,2"], "F0"),
+        (["F0=1", "F0=2"], "twice"),
+        (["F0=1", "--over", "N"], "--over N"),
+        (["F0=1", "--t-end", "3"], "--t-end is for --measure final"),
+        (["F0=1", "--measure", "amplitude.y"], "amplitude.x"),
+        (["F0=1,2", "N=1", "--list", *FINAL], "different lengths"),
+        (["F0=1", "--workers", "0"], "--workers"),
+    ],
+)
+def test_bad_usage(hybridsim: Callable, argv: list[str], message: str) -> None:
+    code, out, err = hybridsim("sweep", "dfcs", *argv)
+    assert (code, out) == (2, ""), err
+    assert message in err

@@ -1,0 +1,96 @@
+"""Pictures of sweeps draw what the sweep holds, with units, and say where there is nothing."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.plot import save, sweep_lines, sweep_map
+
+OMEGA, N = [300.0, 500.0, 400.0, 600.0], [20.0, 40.0]
+
+
+def measured(model: hs.Model) -> dict[str, object]:
+    values = model.parameter_values()
+    a = 1e-4 * values["omega"] / values["N"]
+    return {
+        "a": math.nan if values["omega"] == 600 and values["N"] == 20 else a,
+        "z": 1j * a,
+        "all": [a, 2 * a],
+        "s": "s",
+    }
+
+
+def swept(**values: list[object]) -> hs.Sweep:
+    return hs.sweep("dfcs", values, measured, units={"a": "m"})
+
+
+def test_lines_over_one_parameter() -> None:
+    found = swept(omega=OMEGA)
+    panels = found.plot()
+    assert [axes.get_ylabel() for axes in panels] == ["a [mm]", "|z|", "all"]
+    assert panels[-1].get_xlabel() == "omega [rad/s]"
+    x, y = panels[0].lines[0].get_data()
+    assert list(x) == sorted(OMEGA) and y[1] == found["a"][2]
+    dots = panels[2].lines[0].get_xydata()
+    assert sorted(map(tuple, dots)) == sorted((w, v) for w, row in zip(OMEGA, found["all"]) for v in row)
+
+
+def test_lines_of_two_parameters_say_where_there_is_nothing() -> None:
+    (panel,) = swept(omega=OMEGA, N=N).plot("a", over="omega")
+    legend = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert legend == ["N = 20 N", "N = 40 N", "no result"]
+    assert list(panel.lines[2].get_xdata()) == [600.0]
+    assert list(panel.lines[1].get_ydata()) == [1e-4 * w / 40 for w in sorted(OMEGA)]
+
+
+def test_many_lines_are_named_in_part() -> None:
+    (panel,) = sweep_lines(swept(omega=OMEGA, N=np.linspace(30, 60, 40).tolist()), "a", over="omega")
+    names = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert len(names) <= 14 and names[0] == "N = 30 N" and names[-1] == "N = 60 N"
+    assert len({line.get_color() for line in panel.lines}) == 40
+
+
+def test_a_map(tmp_path: Path) -> None:
+    found = swept(N=N, omega=OMEGA)
+    panels = found.plot()
+    assert [axes.get_xlabel() for axes in panels] == ["omega [rad/s]"] * 2
+    (mesh,) = panels[0].collections
+    drawn = mesh.get_array()
+    assert drawn.mask.sum() == 1 and drawn.mask[0, 3]
+    assert drawn[1].tolist() == [1e-4 * w / 40 for w in sorted(OMEGA)]
+    assert panels[0].get_legend().get_texts()[0].get_text() == "no result"
+    assert panels[1].get_legend() is None
+    scales = [axes for axes in panels[0].figure.axes if axes not in panels]
+    assert scales[0].get_ylabel() == "a [mm]"
+    assert save(panels, tmp_path / "map.png").stat().st_size > 1000
+
+
+def test_texts_as_values_of_a_parameter() -> None:
+    found = swept(k=[1e5, 2e5], omega=["sqrt(k/m)", 400])
+    (panel,) = sweep_lines(found, "a", over="omega")
+    assert [tick.get_text() for tick in panel.get_xticklabels()] == ["sqrt(k/m)", "400.0"]
+    (panel,) = sweep_map(found, "a")
+    assert panel.get_xlabel() == "omega"
+
+
+@pytest.mark.parametrize(
+    "draw, message",
+    [
+        (lambda: swept(omega=OMEGA).plot("s"), "s is texts"),
+        (lambda: swept(omega=OMEGA).plot("b"), "no 'b'"),
+        (lambda: swept(omega=OMEGA, N=N).plot("all"), "all is an array"),
+        (lambda: swept(omega=OMEGA).plot(over="N"), "over is 'N'"),
+        (lambda: swept(omega=OMEGA, N=N, F0=[1]).plot(), "3 parameters"),
+        (lambda: sweep_map(swept(omega=OMEGA)), "a grid of two"),
+        (lambda: hs.sweep("dfcs", {"N": [1]}, lambda m: "s").plot(), "nothing that can be drawn"),
+        (lambda: sweep_lines(swept(omega=OMEGA), "a", axes=()), "0 axes for 1"),
+    ],
+)
+def test_what_cannot_be_drawn(draw, message: str) -> None:
+    with pytest.raises(hs.UsageError, match=message):
+        draw()
