@@ -1,12 +1,18 @@
 """What type checkers see of the package: the same names, imported at once."""
 
 from hybridsim.analysis import Comparison as Comparison
+from hybridsim.analysis import Equilibrium as Equilibrium
+from hybridsim.analysis import Linearization as Linearization
 from hybridsim.analysis import Sensitivities as Sensitivities
 from hybridsim.analysis import SteadyState as SteadyState
 from hybridsim.analysis import SuiteComparison as SuiteComparison
 from hybridsim.analysis import Sweep as Sweep
+from hybridsim.analysis import bifurcation as bifurcation
 from hybridsim.analysis import compare as compare
 from hybridsim.analysis import compare_suite as compare_suite
+from hybridsim.analysis import equilibria as equilibria
+from hybridsim.analysis import frequency_response as frequency_response
+from hybridsim.analysis import linearize as linearize
 from hybridsim.analysis import sensitivities as sensitivities
 from hybridsim.analysis import steady_state as steady_state
 from hybridsim.analysis import sweep as sweep

@@ -2,21 +2,28 @@
 
 from hybridsim.analysis.compare import compare
 from hybridsim.analysis.comparison import Comparison
+from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
 from hybridsim.analysis.series import Series
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
-from hybridsim.analysis.sweep import Sweep, sweep
+from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep
 from hybridsim.analysis.variations import Sensitivities, sensitivities
 
 __all__ = [
     "Comparison",
+    "Equilibrium",
+    "Linearization",
     "Sensitivities",
     "Series",
     "SteadyState",
     "SuiteComparison",
     "Sweep",
+    "bifurcation",
     "compare",
     "compare_suite",
+    "frequency_response",
+    "equilibria",
+    "linearize",
     "sensitivities",
     "steady_state",
     "sweep",

@@ -123,3 +123,49 @@ def test_unknown_names_are_told() -> None:
         found.amplitude["y"]
     with pytest.raises(UsageError, match="contact"):
         found.stick_fraction["x"]
+
+
+def feeny_moon(frequency: float) -> hs.Model:
+    """Friction that grows with the position (B. Feeny, F. C. Moon, J. Sound Vib. 170 (1994) 303)."""
+    return hs.Model(
+        "feeny-moon",
+        parameters={"w": frequency},
+        states=[
+            hs.State("x", start=0.5, der="v"),
+            hs.State("v", start=0, der="-0.03*v - x + 1.9*cos(w*t) - f"),
+        ],
+        contacts=[
+            hs.Contact("f", velocity="v", normal="max(1 + 1.5*x, 0)", law="coulomb", arguments={"mu": 1})
+        ],
+    )
+
+
+def test_chaos_is_named() -> None:
+    found = hs.steady_state(feeny_moon(1.25), max_periods=64, tol=1e-8)
+    assert found.kind == "chaotic" and not found.success
+    assert found.lyapunov > 0.05
+    with pytest.raises(UsageError, match="chaotic"):
+        found.amplitude["x"]
+
+
+def test_period_two_is_named() -> None:
+    found = hs.steady_state(feeny_moon(1.7), tol=1e-9)
+    assert (found.kind, found.multiple) == ("periodic", 2)
+    assert found.period == pytest.approx(2.0 * 2.0 * math.pi / 1.7, rel=1e-14)
+    assert found.residual < 1e-9
+
+
+def test_a_torus_is_named() -> None:
+    """A self-excited block, shaken a little at a frequency of its own."""
+    shaken = hs.Model(
+        "shaken",
+        parameters={"w": 0.7},
+        states=[
+            hs.State("x", start=2, der="v", nominal=1),
+            hs.State("v", start=0, der="-x - f + 0.05*sin(w*t) + 0.5*(1 - x*x)*v", nominal=1),
+        ],
+        contacts=[hs.Contact("f", velocity="v", normal="0.01", law="coulomb", arguments={"mu": 1})],
+    )
+    found = hs.steady_state(shaken, max_periods=128, tol=1e-8)
+    assert found.kind == "quasi-periodic"
+    assert abs(found.lyapunov) < 1e-3

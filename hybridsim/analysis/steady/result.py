@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from hybridsim.errors import UsageError
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit as Stretch
     from hybridsim.analysis.steady.shooting import Orbit
+    from hybridsim.model import Model
     from hybridsim.solution import Solution
 
 _NEUTRAL = 1e-9
@@ -53,6 +54,11 @@ class SteadyState(Measures):
         self.period = orbit.period if orbit is not None and kind == "periodic" else math.nan
         self.multiple = orbit.multiple if orbit is not None and kind == "periodic" else 0
         self.residual = orbit.residual if orbit is not None else math.nan
+
+    @property
+    def model(self) -> Model:
+        """What it is the steady state of."""
+        return self._motion.model
 
     @property
     def success(self) -> bool:
@@ -97,8 +103,40 @@ class SteadyState(Measures):
         """Whether all multipliers are inside the unit circle, or on it to rounding."""
         return bool((np.abs(self.multipliers) <= 1.0 + _NEUTRAL).all())
 
+    def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
+        """All that it says as plain values; harmonics up to that number, with their phases in radians."""
+        record: dict[str, Any] = {
+            "model": self.model.name,
+            "parameters": self.model.parameter_values(),
+            "kind": self.kind,
+            "message": self.message,
+            "period": self.period,
+            "multiple": self.multiple,
+            "residual": self.residual,
+            "newton_steps": self.newton_steps,
+            "periods": self.periods,
+            "lyapunov": self.lyapunov,
+        }
+        if not self.success:
+            return record
+        of_quantities = ("amplitude", "peak", "minimum", "maximum", "mean", "energy")
+        of_contacts = ("dissipated", "stick_fraction", "stops_per_period")
+        record |= {key: dict(getattr(self, key)) for key in (*of_quantities, *of_contacts)}
+        record["harmonics"] = {
+            name: [
+                {"amplitude": abs(c), "phase": float(np.angle(c))}
+                for c in (self.harmonic(name, k) for k in range(harmonics + 1))
+            ]
+            for name in self._names
+        }
+        record["word"] = list(self.word)
+        record["multipliers"] = [[float(m.real), float(m.imag)] for m in self.multipliers]
+        record["stable"] = self.stable
+        record["grazing"] = None if self.grazing is None else self.grazing._asdict()
+        return record
+
     def __repr__(self) -> str:
-        lines = [f"Steady state of {self._motion.model.name}: {self.message}"]
+        lines = [f"Steady state of {self.model.name}: {self.message}"]
         if self.success:
             names = self._motion.names
             lines.append("  amplitudes " + ", ".join(f"{n} {self.amplitude[n]:.9g}" for n in names))

@@ -1,0 +1,6 @@
+"""Rest and steady sliding of a model, and its linearisation there."""
+
+from hybridsim.analysis.equilibria.equilibria import Equilibrium, equilibria
+from hybridsim.analysis.equilibria.linearize import Linearization, linearize
+
+__all__ = ["Equilibrium", "Linearization", "equilibria", "linearize"]

@@ -1,0 +1,197 @@
+"""`equilibria`: all rest and steady sliding of a model, with the intervals over which bodies can stick."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.analysis.equilibria.field import Field, is_driven
+from hybridsim.analysis.equilibria.linearize import equilibrium_near
+from hybridsim.errors import SimulationError, UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+_MOST = 4096  # vectors of modes that are looked at
+_ROUNDS = 30
+_SETTLED = 1e-14
+_INSIDE = 1e-12  # of a guard's terms: rounding
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Where nothing moves in one vector of modes: a point, or a set of them where bodies stick.
+
+    Parameters
+    ----------
+    modes : of each component.
+    x : (n,) states at the point, or in the middle of the set.
+    low, high : (n,) least and greatest value of each state over the set; infinite where nothing bounds it.
+    growth : largest real part of the eigenvalues of the free states' motion; 0 along a set.
+    """
+
+    modes: dict[str, str]
+    x: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    growth: float
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it is a single point."""
+        return bool((self.low == self.high).all())
+
+
+def equilibria(
+    model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
+) -> tuple[Equilibrium, ...]:
+    """Rest and steady sliding of a model that is not driven in time, in every vector of modes that lasts there.
+
+    In each vector of modes Newton's method finds where all rates vanish; points that violate a guard are left out. Where
+    contacts stick the points form a set: the least and greatest value of each state over it come from linear programs,
+    repeated about their solutions where the model is not linear. For a nonlinear flow it is the equilibrium that is
+    found from the model's start, and there may be others.
+
+    Errors
+    ------
+    UsageError for a model that is driven in time, or has too many combinations of modes.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> (stuck,) = hs.equilibria("free-decay")
+    >>> stuck.modes
+    {'f': 'stick'}
+    """
+    model = arguments.chosen_model(model, params)
+    from hybridsim.engine.recent import system_of
+
+    system = system_of(model)
+    if is_driven(system):
+        raise UsageError(
+            f"model {model.name} is driven in time: nothing rests",
+            remedy="see hs.steady_state, or hs.linearize",
+        )
+    count = int(np.prod([len(a.modes) for a in system.automata]))
+    if count > _MOST:
+        raise UsageError(
+            f"model {model.name} has {count} combinations of modes; at most {_MOST} are looked at",
+            remedy="find one with hs.linearize(model, mode)",
+        )
+    found = []
+    for numbers in product(*(range(len(a.modes)) for a in system.automata)):
+        field = Field(system, np.array(numbers, dtype=np.int64))
+        equilibrium = _in_modes(field)
+        if equilibrium is not None:
+            found.append(equilibrium)
+    return tuple(found)
+
+
+def _in_modes(field: Field) -> Equilibrium | None:
+    system, free = field.system, field.free
+    try:
+        x = equilibrium_near(field, system.start_state({}))
+    except SimulationError:
+        return None
+    _, A, _, _ = field(x)
+    rank = np.linalg.matrix_rank(_scaled(A[:, free])) if free else 0
+    if rank < len(free):
+        bounds = _extent(field, x)
+        if bounds is None:
+            return None
+        low, high = bounds
+        middle = np.where(np.isfinite(low + high), 0.5 * (low + high), x)
+        x = _nearest_inside(field, middle, x)
+    else:
+        low = high = x
+    _, A, g, G = field(x)
+    rounding = _INSIDE * (np.abs(G) @ field.sizes(x))
+    # slip without a velocity is the end of a stick
+    slips = np.array([a.has_surface and z != a.hold for a, z in zip(system.automata, field.z, strict=True)])
+    if (g <= np.where(slips[system.owner[field.guards]], rounding, -rounding)).any():
+        return None
+    growth = float(np.linalg.eigvals(A[np.ix_(free, free)]).real.max(initial=-np.inf))
+    names = system.mode_names(field.z)
+    declared = {a.name: names[a.name] for a in system.declared}
+    return Equilibrium(declared, x, low, high, growth)
+
+
+def _scaled(A: np.ndarray) -> np.ndarray:
+    """Rows and columns of about unit size, so that a rank means something."""
+    rows = np.abs(A).max(axis=1, initial=0.0)
+    A = A / np.where(rows > 0.0, rows, 1.0)[:, None]
+    columns = np.abs(A).max(axis=0, initial=0.0)
+    return A / np.where(columns > 0.0, columns, 1.0)
+
+
+def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Least and greatest value of each state over the equilibria around x; None where no guard allows any."""
+    n = len(x)
+    low, high = np.empty(n), np.empty(n)
+    for i in range(n):
+        for side, bound in ((1.0, low), (-1.0, high)):
+            at = _farthest(field, x, i, side)
+            if at is None:
+                return None
+            bound[i] = at
+    return low, high
+
+
+def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
+    """The least (side 1) or greatest (side -1) value of state i: linear programs about their own solutions."""
+    at = x
+    for _ in range(_ROUNDS):
+        solved = _program(field, at, i, side)
+        if solved is None:
+            return None
+        status, found = solved
+        if status == "unbounded":
+            return -side * np.inf
+        if np.abs(found - at).max() <= _SETTLED * max(np.abs(found).max(), np.finfo(float).tiny):
+            return float(found[i])
+        at = found
+    return float(at[i])
+
+
+def _program(field: Field, at: np.ndarray, i: int, side: float) -> tuple[str, np.ndarray] | None:
+    """min side*x_i with f + f_x (x - at) = 0 and g + g_x (x - at) >= 0."""
+    from scipy.optimize import linprog
+
+    f, A, g, G = field(at)
+    n = len(at)
+    held = field.projected(at)
+    rows, right = [A], [A @ at - f]
+    if field.held:  # where a constraint puts a state
+        slopes = np.array([(field.projected(at + d) - held) for d in np.eye(n)]).T
+        rows.append((np.eye(n) - slopes)[field.held])
+        right.append((held - slopes @ at)[field.held])
+    equal, value = np.concatenate(rows), np.concatenate(right)
+    used = np.abs(equal).max(axis=1) > 0.0
+    cost = np.zeros(n)
+    cost[i] = side
+    found = linprog(
+        cost,
+        A_ub=-G if len(g) else None,
+        b_ub=g - G @ at if len(g) else None,
+        A_eq=equal[used] if used.any() else None,
+        b_eq=value[used] if used.any() else None,
+        bounds=(None, None),
+        method="highs",
+    )
+    if found.status == 3:
+        return "unbounded", at
+    return ("found", field.projected(found.x)) if found.success else None
+
+
+def _nearest_inside(field: Field, middle: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """An equilibrium near the middle of the set."""
+    try:
+        return equilibrium_near(field, middle)
+    except SimulationError:
+        return x

@@ -1,0 +1,165 @@
+"""`linearize`: a mode of a model as a linear system about a point, and its complex eigenvalues."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
+from hybridsim.errors import SimulationError
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+_STEPS = 50
+_CLOSED = 1e-13  # of the terms of a rate: what it is to rounding
+_HALVINGS = 20
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """d' = A d for small changes d of the free states about x, in one vector of modes.
+
+    Parameters
+    ----------
+    states : names of the m free states; those that the modes hold on a constraint have no motion of their own.
+    A : (m, m), the Jacobian.
+    x : (n,) all states of the model at the point.
+    is_equilibrium : whether nothing moves there.
+    admissible : whether the modes last there: all their guards are >= 0.
+    """
+
+    states: tuple[str, ...]
+    A: np.ndarray
+    x: np.ndarray
+    is_equilibrium: bool
+    admissible: bool
+
+    @cached_property
+    def _modes(self) -> tuple[np.ndarray, np.ndarray]:
+        values, vectors = np.linalg.eig(self.A)
+        order = np.lexsort((-values.imag, -values.real))
+        return values[order].astype(complex), vectors[:, order].astype(complex)
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """Complex eigenvalues (m,), the fastest growing first."""
+        return self._modes[0]
+
+    @property
+    def eigenvectors(self) -> np.ndarray:
+        """Right eigenvectors in columns (m, m), in the order of the eigenvalues."""
+        return self._modes[1]
+
+    @property
+    def growth(self) -> float:
+        """Largest real part: above zero small motions grow, as in squeal."""
+        return float(self.eigenvalues.real.max(initial=-np.inf))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all small motions die out."""
+        return self.growth < 0.0
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Angular frequencies of the oscillating pairs, in the order of the eigenvalues."""
+        return self.eigenvalues.imag[self.eigenvalues.imag > 0.0]
+
+    @property
+    def damping_ratios(self) -> np.ndarray:
+        """-Re/|lambda| of these pairs; below zero they grow."""
+        pairs = self.eigenvalues[self.eigenvalues.imag > 0.0]
+        return -pairs.real / np.abs(pairs)
+
+
+def linearize(
+    model: Model | str | PathLike[str],
+    mode: Mapping[str, str] | str | None = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+    at: Mapping[str, float] | Sequence[float] | None = None,
+    t: float = 0.0,
+) -> Linearization:
+    """One vector of modes as a linear system about a point: its Jacobian and complex eigenvalues.
+
+    The Jacobian is differentiated from the declaration, to rounding. With `hs.sweep` over a parameter it finds the
+    onset of a friction-induced instability: where the growth of steady sliding passes zero.
+
+    Parameters
+    ----------
+    model, params : as in `simulate`.
+    mode : of each component by name, such as {"f": "slip+"}; a text where there is one component.
+    at : the states, as x0 of `simulate`; None takes the equilibrium of the modes that Newton's method finds from the
+        model's start, and the start itself where the model is driven in time.
+    t : the instant at which a driven model is frozen.
+
+    Errors
+    ------
+    UsageError for modes or states that the model does not have; SimulationError where no equilibrium is found.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sliding = hs.linearize("belt", "slip-")
+    >>> sliding.stable, float(round(sliding.eigenvalues[0].real, 3))  # friction falls with speed
+    (False, 0.586)
+    """
+    model = arguments.chosen_model(model, params)
+    from hybridsim.engine.recent import system_of
+
+    system = system_of(model)
+    start, _ = arguments.start_values(model, at)
+    x = system.start_state(start)
+    field = Field(system, modes_of(system, mode), arguments.number(t, "t"))
+    if at is None and not is_driven(system):
+        x = equilibrium_near(field, x)
+    x = field.projected(x)
+    f, A, g, _ = field(x)
+    free = field.free
+    return Linearization(
+        tuple(system.names[i] for i in free),
+        A[np.ix_(free, free)],
+        x,
+        bool((np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all()),
+        bool((g >= 0.0).all()),
+    )
+
+
+def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
+    """A point at which nothing moves, by Newton's method; of a continuum of them the one next to where it goes."""
+    x = field.projected(x)
+    f, A, *_ = field(x)
+    for _ in range(_STEPS):
+        columns = A[:, field.free]
+        scale = np.abs(columns).max(axis=1, initial=0.0)
+        scale[scale == 0.0] = 1.0
+        move = np.zeros(len(x))
+        move[field.free] = np.linalg.lstsq(columns / scale[:, None], -f / scale, rcond=None)[0]
+        for _ in range(_HALVINGS):
+            trial = field.projected(x + move)
+            found = field(trial)
+            if np.abs(found[0] / scale).sum() < np.abs(f / scale).sum():
+                break
+            move *= 0.5
+        else:
+            break  # as close as rounding lets it come, or nowhere near
+        x, f, A = trial, found[0], found[1]
+    if (np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all():
+        return x
+    raise SimulationError(
+        f"no equilibrium of model {field.system.model.name} was found in the modes "
+        f"{', '.join(f'{c}: {m}' for c, m in field.system.mode_names(field.z).items())}",
+        remedy="give another start with at=, or a point to linearise about",
+    )
+
+
+def _terms(A: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Size of the terms that a rate is made of."""
+    return np.abs(A) @ sizes + np.finfo(float).tiny

@@ -1,0 +1,137 @@
+"""`hybridsim steady MODEL`: the motion that a model settles on, measured over one period."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.cli import values
+from hybridsim.cli.output import print_json, require_writable
+from hybridsim.cli.progress import Progress
+from hybridsim.cli.run import PICTURES
+from hybridsim.cli.session import Session
+from hybridsim.errors import SimulationError
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import SteadyState
+
+_EXAMPLES = """\
+examples:
+  hybridsim steady dfcs
+  hybridsim steady dfcs -p F0=22 -p 'omega=0.64*sqrt(k/m)' --harmonics 9 --plot orbit.png
+  hybridsim steady belt --json
+"""
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "steady",
+        help="find the motion that a model settles on, and measure it",
+        description="Find the motion that a model settles on (a forced vibration, a limit cycle, rest) and print its "
+        "period, amplitudes, energies, time in stick and Floquet multipliers.",
+        epilog=_EXAMPLES,
+    )
+    values.add_model_arguments(parser)
+    parser.add_argument(
+        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
+    )
+    parser.add_argument(
+        "--tol",
+        metavar="TOL",
+        type=values.positive,
+        default=1e-10,
+        help="how closely the motion repeats, relative to the size of each state (default: 1e-10)",
+    )
+    parser.add_argument(
+        "--period", metavar="TIME", type=values.positive, help="of the forcing, where the model does not say"
+    )
+    parser.add_argument(
+        "--max-periods",
+        metavar="N",
+        type=values.count,
+        default=4096,
+        help="periods after which the motion is judged as it is (default: 4096)",
+    )
+    parser.add_argument(
+        "--harmonics", metavar="N", type=values.count, default=5, help="how many to print (default: 5)"
+    )
+    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw one period ({', '.join(PICTURES)})")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of the table")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, session: Session) -> int:
+    """Find the motion and print what it is; 1 where it neither repeats nor rests."""
+    if args.plot:
+        require_writable(args.plot, "--plot", PICTURES)
+    model = values.changed_model(args)
+
+    import hybridsim
+
+    with Progress(session) as progress:
+        found = hybridsim.steady_state(
+            model,
+            integrator=args.integrator,
+            tol=args.tol,
+            period=args.period,
+            max_periods=args.max_periods,
+            progress=progress,
+        )
+    record = found.to_dict(args.harmonics)
+    if args.json:
+        print_json(record)
+    else:
+        print("\n".join(_summary(found, record)))
+    if args.plot:
+        from hybridsim.plot import save, time_history
+
+        save(time_history(found.solution), args.plot)
+        session.wrote(args.plot)
+    return 0 if found.success else SimulationError.exit_code
+
+
+def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
+    model = found.model
+    lines = [f"{model.name}: {model.title}" if model.title else model.name, f"  {found.message}"]
+    if not found.success:
+        return lines
+    if found.kind == "periodic":
+        lines.append(
+            f"  period       {found.period:.12g}" + (f" (x {found.multiple})" if found.multiple > 1 else "")
+        )
+    lines.append(f"  modes        {' '.join(found.word)}")
+    for contact, share in record["stick_fraction"].items():
+        lines.append(
+            f"  {contact:<12} {100.0 * share:.4g} % of the period in stick, "
+            f"{record['stops_per_period'][contact]:g} stops, work {record['dissipated'][contact]:.6g}"
+        )
+    sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
+    lines.append(
+        f"  multipliers  |{sizes}|" if sizes else "  multipliers  none beside the one along the motion"
+    )
+    if found.grazing is not None:
+        near = found.grazing
+        lines.append(f"  nearest      {near.guard} turns back at {near.relative:.3g} of its largest value")
+    header: tuple[str, ...] = ("quantity", "amplitude", "min", "max", "mean", "energy")
+    rows = [
+        (name, *(f"{record[key][name]:.6g}" for key in ("amplitude", "minimum", "maximum", "mean", "energy")))
+        for name in record["amplitude"]
+    ]
+    lines += ["", *_columns([header, *rows])]
+    count = len(next(iter(record["harmonics"].values()), [])) - 1
+    if count > 0 and found.kind == "periodic":
+        header = ("harmonic", *(str(k) for k in range(1, count + 1)))
+        rows = [
+            (name, *(f"{h['amplitude']:.4g}" for h in row[1:])) for name, row in record["harmonics"].items()
+        ]
+        lines += ["", *_columns([header, *rows])]
+    return lines
+
+
+def _columns(rows: list[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return [
+        "  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
