@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
 
 _FEW = 30  # points of a line that are marked each
+_DOT = 5.0  # size of the items of an array, the first line's
 _CROWD = 12  # lines that a legend names each; of more, some
 _WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of what stands above and below
 
@@ -84,7 +85,8 @@ def _draw(
         y = values if other is None else values[:, k]
         if has_items:
             dots = np.broadcast_to(x[:, None], y.shape)
-            panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=2.5, label=label)
+            size = _DOT * 0.6**k  # what lies under other dots still shows around them
+            panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=max(size, 1.5), label=label)
         else:
             marker = "o" if len(x) <= _FEW else ""
             panel.plot(

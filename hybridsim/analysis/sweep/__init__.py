@@ -1,6 +1,8 @@
 """Sweeps: one measure of a model over grids and lists of parameter values, on threads or any executor."""
 
+from hybridsim.analysis.sweep.bifurcation import bifurcation
+from hybridsim.analysis.sweep.frequency_response import frequency_response
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
 
-__all__ = ["Sweep", "sweep"]
+__all__ = ["Sweep", "bifurcation", "frequency_response", "sweep"]

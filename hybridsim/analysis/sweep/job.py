@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
@@ -86,6 +87,11 @@ class Watch(NamedTuple):
 
     stopped: Callable[[], bool]
     tell: Callable[[], None]
+
+
+def new_token() -> str:
+    """What no other sweep has."""
+    return uuid.uuid4().hex
 
 
 _jobs: dict[str, Job] = {}

@@ -7,11 +7,10 @@ import pickle
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from typing import Any
+from typing import Any, Protocol
 
-from hybridsim.analysis.sweep.axes import Points
 from hybridsim.analysis.sweep.collected import Collected
-from hybridsim.analysis.sweep.job import Batch, Job, Outcome, Watch, run_batch
+from hybridsim.analysis.sweep.job import Batch, Job, Outcome, Settings, Watch, run_batch
 from hybridsim.analysis.sweep.pieces import Pieces
 from hybridsim.errors import UsageError
 
@@ -19,6 +18,17 @@ from hybridsim.errors import UsageError
 # memory.
 _AHEAD = 2
 _LOOK = 0.1  # seconds between looks at what threads have done, for whoever watches, and for Ctrl-C
+
+
+class Points(Protocol):
+    """The points of a sweep, numbered in C order of a shape."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the arrays of results; chains run along the first axis."""
+
+    def settings(self, numbers: range) -> list[Settings]:
+        """What is set at some points."""
 
 
 def worker_count(executor: Any, workers: int | None) -> int:

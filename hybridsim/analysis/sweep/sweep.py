@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import time
-import uuid
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from os import PathLike
 from typing import Any
 
 from hybridsim.analysis.progress import Progress
-from hybridsim.analysis.sweep.axes import Points, points_of
-from hybridsim.analysis.sweep.collected import Collected
-from hybridsim.analysis.sweep.job import Job
+from hybridsim.analysis.sweep.axes import points_of
+from hybridsim.analysis.sweep.job import Job, new_token
 from hybridsim.analysis.sweep.measures import measure_of
-from hybridsim.analysis.sweep.pieces import Pieces
 from hybridsim.analysis.sweep.ready import units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
-from hybridsim.analysis.sweep.sending import Sending, require_sendable, worker_count
+from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import whole
 from hybridsim.arguments import callback, chosen_model
-from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 
@@ -86,7 +82,7 @@ def sweep(
     tell = callback(progress)
     count = None if workers is None else whole(workers, "workers")
     job = Job(
-        uuid.uuid4().hex,
+        new_token(),
         model,
         tuple(axis.name for axis in points.axes),
         frozenset(axis.name for axis in points.axes if axis.is_start),
@@ -94,7 +90,7 @@ def sweep(
         bool(warm_start),
     )
     began = time.perf_counter()
-    collected, finished, who = _work(job, points, executor, count, tell)
+    collected, finished, who = work(job, points, executor, count, tell)
     found = collected.values(points.shape)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
     if not callable(measure):
@@ -113,60 +109,7 @@ def sweep(
     )
 
 
-def _work(
-    job: Job, points: Points, executor: Any, workers: int | None, progress: Progress | None
-) -> tuple[Collected, bool, str]:
-    """All results, whether they are whole, and who worked."""
-    if executor is not None and not isinstance(executor, Executor):
-        raise UsageError(
-            f"executor is {executor!r}",
-            remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
-        )
-    if isinstance(executor, ProcessPoolExecutor):
-        require_sendable(job)
-    count = worker_count(executor, workers)
-    total = 1
-    for length in points.shape:
-        total *= length
-    chains = total // points.shape[0] if job.chained else None
-    collected = Collected(total)
-    sending = Sending(job, points, Pieces(total, chains, count), collected, _Told(total, progress))
-    if executor is not None:
-        return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
-    with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
-        return collected, sending.run(threads, count), f"threads ({count})"
-
-
 def _named(measure: Any) -> str:
     if callable(measure):
         return str(getattr(measure, "__name__", "measure"))
     return measure if isinstance(measure, str) else ", ".join(measure)
-
-
-class _Told:
-    """Passes on how many points are done, with the time that the rest will take."""
-
-    def __init__(self, total: int, progress: Progress | None) -> None:
-        self._total, self._progress = total, progress
-        self._began: float | None = None
-        self._first = 0
-
-    def __call__(self, done: int) -> None:
-        if self._progress is None:
-            return
-        now = time.monotonic()
-        if done and self._began is None:  # the first point compiles, and says nothing about the others
-            self._began, self._first = now, done
-        words = f"{done} of {self._total} points"
-        if self._began is not None and self._first < done < self._total:
-            left = (now - self._began) / (done - self._first) * (self._total - done)
-            words += f", {_duration(left)} left"
-        self._progress(done, self._total, words)
-
-
-def _duration(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -1,0 +1,132 @@
+"""Bifurcation diagrams by brute force: settled samples over a parameter, followed upward and downward."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.sweep.axes import Points, points_of
+from hybridsim.analysis.sweep.job import Job, Settings, new_token
+from hybridsim.analysis.sweep.result import Sweep
+from hybridsim.analysis.sweep.section import Section, with_section
+from hybridsim.analysis.sweep.work import work
+from hybridsim.analysis.wanted import positive, whole
+from hybridsim.arguments import callback, chosen_model
+from hybridsim.errors import UsageError
+from hybridsim.model import Model
+from hybridsim.model.units import units_of
+
+UP, DOWN = "up", "down"
+DIRECTION = "direction"
+
+
+class _Branches:
+    """The values of one parameter in rising and in falling order, side by side: two chains."""
+
+    def __init__(self, points: Points, count: int) -> None:
+        rows = points.settings(range(count))
+        order = np.argsort(points.axes[0].values, kind="stable").tolist()
+        self._rising = [rows[k] for k in order]
+        self.values = points.axes[0].values[order]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Steps along a branch, branches."""
+        return len(self._rising), 2
+
+    def settings(self, numbers: range) -> list[Settings]:
+        """Even numbers go up, odd ones down."""
+        return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
+
+
+def bifurcation(
+    model: Model | str | PathLike[str],
+    parameter: str,
+    values: Sequence[Any],
+    *,
+    section: str | None = None,
+    settle: int = 200,
+    samples: int = 60,
+    tol: float = 1e-6,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, Any] | Sequence[float] | None = None,
+    z0: Mapping[str, str] | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Sweep:
+    """Samples of the settled motion at a section, over a parameter, followed upward and downward.
+
+    Each value starts from where its neighbour ended, so that of two motions that attract the one is found from below
+    and the other from above: where the branches differ there is hysteresis. Motions that repel are not found.
+
+    Parameters
+    ----------
+    model, params, x0, z0 : as in `simulate`; x0 and z0 start both branches.
+    parameter, values : what is varied; any order.
+    section : None samples once a period of the forcing; an expression where it passes zero upward, or the name of a
+        monitor of the model, each time that happens.
+    settle, samples : passings of the section that are waited for, and that are kept.
+    tol : samples are the same within this share of the largest size of each state.
+    executor, workers, progress : as in `sweep`; there are two chains to share.
+    options : of `simulate`.
+
+    Returns
+    -------
+    Sweep over the direction ("up", "down") and the parameter: the samples of each state in order of time, and
+    ``repeats_after``, the n of a motion that repeats after n passings, 0 where it does not within the samples.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.bifurcation("dfcs", "F0", [22, 30], settle=20, samples=4)
+    >>> found["x"].shape, found["repeats_after"].tolist()
+    ((2, 2, 4), [[1.0, 1.0], [1.0, 1.0]])
+    """
+    base = chosen_model(model, params).validate()
+    points = points_of(base, {parameter: values}, "list")
+    if points.axes[0].is_start:
+        raise UsageError(
+            f"{parameter} is a state", remedy="vary a parameter; initial values are swept with hs.sweep"
+        )
+    watched, level = with_section(base, section)
+    measure = Section(
+        level,
+        whole(settle, "settle"),
+        whole(samples, "samples"),
+        positive(tol, "tol"),
+        {"x0": x0, "z0": z0},
+        options,
+    )
+    branches = _Branches(points, len(points.axes[0].values))
+    job = Job(new_token(), watched, (parameter,), frozenset(), measure, True)
+    count = None if workers is None else whole(workers, "workers")
+    began = time.perf_counter()
+    collected, finished, who = work(job, branches, executor, count, callback(progress))
+    names = {f"state {k}": state.name for k, state in enumerate(base.states)}
+    found = collected.values(branches.shape)
+    units = units_of(base)
+    return Sweep(
+        base,
+        "grid",
+        {DIRECTION: np.array([UP, DOWN]), parameter: branches.values},
+        {names.get(name, name): _turned(array) for name, array in found.items()},
+        _turned(collected.status.reshape(branches.shape)),
+        {name: units[name] for name in names.values()} | {parameter: points.axes[0].unit},
+        f"section {section}" if section else "once a period",
+        not finished,
+        time.perf_counter() - began,
+        who,
+    )
+
+
+def _turned(array: np.ndarray) -> np.ndarray:
+    """From (step, branch, ...) to (branch, value, ...), both branches in rising order."""
+    return np.stack([array[:, 0], array[::-1, 1]])

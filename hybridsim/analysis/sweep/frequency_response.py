@@ -1,0 +1,59 @@
+"""Frequency response: amplitude, share of stick and stops over the frequency of the forcing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+from hybridsim.analysis.sweep.result import Sweep
+from hybridsim.analysis.sweep.sweep import sweep
+from hybridsim.analysis.wanted import mapping
+from hybridsim.arguments import chosen_model
+from hybridsim.errors import UsageError
+from hybridsim.model import Model
+
+
+def frequency_response(
+    model: Model | str | PathLike[str],
+    frequencies: Sequence[Any],
+    levels: Mapping[str, Sequence[Any]] | None = None,
+    *,
+    frequency: str = "omega",
+    quantity: str | None = None,
+    params: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Sweep:
+    """Steady amplitude, and of each contact its share of stick and its stops, over the frequency of the forcing.
+
+    Parameters
+    ----------
+    frequencies : values of the parameter ``frequency``, numbers or expressions.
+    levels : one other parameter and its values, such as ``{"N": [20, 30, 40]}``: a line each.
+    quantity : state or output whose amplitude is taken; the first state if not given.
+    options : of `sweep` and `steady_state`.
+
+    Returns
+    -------
+    Sweep over levels and frequency; ``.plot(over=frequency)`` draws it.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.frequency_response("dfcs", ["0.5*sqrt(k/m)", "0.9*sqrt(k/m)"], {"N": [30, 40]})
+    >>> found.dimensions, list(found.values)
+    (('N', 'omega'), ['amplitude.x', 'stick_fraction.f', 'stops_per_period.f'])
+    """
+    model = chosen_model(model, params)
+    others = mapping(levels, "levels")
+    if len(others) > 1 or frequency in others:
+        raise UsageError(f"levels is {levels!r}", remedy="give one parameter other than the frequency")
+    if not model.states:
+        raise UsageError(f"model {model.name} has no states", remedy="there is nothing that responds")
+    words = [f"amplitude.{model.states[0].name if quantity is None else quantity}"]
+    for contact in model.contacts:
+        words += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
+    # with warm starts the frequency is the chain, which is the first axis
+    if options.get("warm_start"):
+        return sweep(model, {frequency: frequencies, **others}, words, **options)
+    return sweep(model, {**others, frequency: frequencies}, words, **options)

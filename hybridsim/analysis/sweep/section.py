@@ -1,0 +1,121 @@
+"""Poincare sections: the states of a settled motion each time a period of the forcing is over, or a level is passed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.engine.period import system_period
+from hybridsim.engine.recent import system_of
+from hybridsim.errors import SimulationError, UsageError
+from hybridsim.expr import parse
+from hybridsim.model import Model, Monitor
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+LEVEL = "section"  # the monitor of a level
+REPEATS = "repeats_after"
+_DURATION = 10.0  # the first stretch of a model without a duration: a few swings of a mechanism of about 1 Hz
+_STRETCHES = 12  # each twice as long as the one before: the last two thousand times the first
+
+
+class Passings(NamedTuple):
+    """States (k, n) at the section, the largest size (n,) of each along the motion, and where the run ended."""
+
+    states: np.ndarray
+    sizes: np.ndarray
+    end: Point
+
+
+@dataclass(frozen=True)
+class Section:
+    """Samples of a motion at a section, after it has settled.
+
+    Parameters
+    ----------
+    level : the name of a monitor of the model, or "" for the period of the forcing.
+    settle, samples : passings before the first sample, and samples.
+    tol : how closely a sample repeats another, relative to the largest size of a state along the motion.
+    first : x0 and z0 of the first run; a chain goes on from where its neighbour ended.
+    options : of `simulate`.
+    """
+
+    level: str
+    settle: int
+    samples: int
+    tol: float
+    first: Mapping[str, Any]
+    options: Mapping[str, Any]
+
+    def run(self, model: Model, previous: Passings | None) -> Passings:
+        """The samples at a point, from where the neighbour ended."""
+        motion = Motion(model, dict(self.options), dict(self.first))
+        start = None if previous is None else previous.end
+        return self._passed(motion, start) if self.level else self._strobed(motion, start)
+
+    def read(self, result: Passings) -> dict[str, Any]:
+        """Each state's samples in order of time, and after how many they repeat (0: not within the samples)."""
+        columns = {f"state {k}": column for k, column in enumerate(result.states.T)}
+        return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
+
+    def _strobed(self, motion: Motion, start: Point | None) -> Passings:
+        period = system_period(system_of(motion.model))
+        if period is None:
+            raise UsageError(
+                f"model {motion.model.name} has no forcing of one period",
+                remedy="give section an expression that passes zero upward, such as section='v'",
+            )
+        times = period * np.arange(self.settle + 1, self.settle + self.samples + 1)
+        run = motion.run(start, float(times[-1]), save=self.samples * period)
+        return Passings(run(times, side="-").T, _sizes(run), point_at_end(run))
+
+    def _passed(self, motion: Motion, start: Point | None) -> Passings:
+        wanted = self.settle + self.samples
+        length = motion.model.duration_value() or _DURATION
+        for _ in range(_STRETCHES):
+            # from the beginning each time: what is driven, or has a clock, cannot be cut anywhere
+            run = motion.run(start, length)
+            found = [e.x_minus for e in run.events if e.component == self.level and e.kind == "monitor"]
+            if len(found) >= wanted:
+                return Passings(np.array(found[self.settle : wanted]), _sizes(run), point_at_end(run))
+            length *= 2.0
+        raise SimulationError(f"the section was passed {len(found)} times, and {wanted} were wanted")
+
+
+def with_section(model: Model, section: str | None) -> tuple[Model, str]:
+    """The model with a monitor at a section, and the monitor's name; "" for the period of the forcing.
+
+    Errors
+    ------
+    UsageError for what is no text; ExpressionError for one that is no expression of the model.
+    """
+    if section is None:
+        return model, ""
+    if not isinstance(section, str):
+        raise UsageError(f"section is {section!r}", remedy="give an expression, or the name of a monitor")
+    if section in {monitor.name for monitor in model.monitors}:
+        return model, section
+    name = LEVEL
+    taken = {monitor.name for monitor in model.monitors} | {c.name for c in model.all_components()}
+    while name in taken:
+        name += "_"
+    monitor = Monitor(name, parse(section), direction="up")
+    return replace(model, monitors=(*model.monitors, monitor)).validate(), name
+
+
+def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
+    """The least number of samples (k, n) after which all repeat, each state within its own tol; 0 where none does."""
+    for n in range(1, len(states) // 2 + 1):
+        if (np.abs(states[n:] - states[:-n]) <= tols).all():
+            return n
+    return 0
+
+
+def _sizes(run: Solution) -> np.ndarray:
+    """Largest size of each state, from the steps of a run: a section may be where one of them is nought."""
+    return np.abs(run.y).max(axis=1)

@@ -1,0 +1,71 @@
+"""Has the points of a sweep measured by an executor, threads if none is given, and says how far it has come."""
+
+from __future__ import annotations
+
+import math
+import time
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from typing import Any
+
+from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.sweep.collected import Collected
+from hybridsim.analysis.sweep.job import Job
+from hybridsim.analysis.sweep.pieces import Pieces
+from hybridsim.analysis.sweep.sending import Points, Sending, require_sendable, worker_count
+from hybridsim.errors import UsageError
+
+
+def work(
+    job: Job, points: Points, executor: Any, workers: int | None, progress: Progress | None
+) -> tuple[Collected, bool, str]:
+    """All results, whether they are whole, and who worked.
+
+    Errors
+    ------
+    UsageError for what is no executor, and where it cannot take the work.
+    """
+    if executor is not None and not isinstance(executor, Executor):
+        raise UsageError(
+            f"executor is {executor!r}",
+            remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
+        )
+    if isinstance(executor, ProcessPoolExecutor):
+        require_sendable(job)
+    count = worker_count(executor, workers)
+    total = math.prod(points.shape)
+    chains = total // points.shape[0] if job.chained else None
+    collected = Collected(total)
+    sending = Sending(job, points, Pieces(total, chains, count), collected, _Told(total, progress))
+    if executor is not None:
+        return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
+    with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
+        return collected, sending.run(threads, count), f"threads ({count})"
+
+
+class _Told:
+    """Passes on how many points are done, with the time that the rest will take."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self._total, self._progress = total, progress
+        self._began: float | None = None
+        self._first = 0
+
+    def __call__(self, done: int) -> None:
+        if self._progress is None:
+            return
+        now = time.monotonic()
+        if done and self._began is None:  # the first point compiles, and says nothing about the others
+            self._began, self._first = now, done
+        words = f"{done} of {self._total} points"
+        if self._began is not None and self._first < done < self._total:
+            left = (now - self._began) / (done - self._first) * (self._total - done)
+            words += f", {_duration(left)} left"
+        self._progress(done, self._total, words)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
