@@ -41,6 +41,7 @@ _HOME = {
     "simulate": "hybridsim.simulate",
     "to_ivp": "hybridsim.ivp",
     # asking
+    "Branch": "hybridsim.analysis",
     "Comparison": "hybridsim.analysis",
     "Equilibrium": "hybridsim.analysis",
     "Linearization": "hybridsim.analysis",
@@ -51,6 +52,7 @@ _HOME = {
     "bifurcation": "hybridsim.analysis",
     "compare": "hybridsim.analysis",
     "compare_suite": "hybridsim.analysis",
+    "continuation": "hybridsim.analysis",
     "equilibria": "hybridsim.analysis",
     "frequency_response": "hybridsim.analysis",
     "linearize": "hybridsim.analysis",

@@ -1,5 +1,6 @@
 """What type checkers see of the package: the same names, imported at once."""
 
+from hybridsim.analysis import Branch as Branch
 from hybridsim.analysis import Comparison as Comparison
 from hybridsim.analysis import Equilibrium as Equilibrium
 from hybridsim.analysis import Linearization as Linearization
@@ -10,6 +11,7 @@ from hybridsim.analysis import Sweep as Sweep
 from hybridsim.analysis import bifurcation as bifurcation
 from hybridsim.analysis import compare as compare
 from hybridsim.analysis import compare_suite as compare_suite
+from hybridsim.analysis import continuation as continuation
 from hybridsim.analysis import equilibria as equilibria
 from hybridsim.analysis import frequency_response as frequency_response
 from hybridsim.analysis import linearize as linearize

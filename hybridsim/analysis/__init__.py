@@ -2,6 +2,7 @@
 
 from hybridsim.analysis.compare import compare
 from hybridsim.analysis.comparison import Comparison
+from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
 from hybridsim.analysis.series import Series
 from hybridsim.analysis.steady import SteadyState, steady_state
@@ -10,6 +11,7 @@ from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, swe
 from hybridsim.analysis.variations import Sensitivities, sensitivities
 
 __all__ = [
+    "Branch",
     "Comparison",
     "Equilibrium",
     "Linearization",
@@ -22,6 +24,7 @@ __all__ = [
     "compare",
     "compare_suite",
     "frequency_response",
+    "continuation",
     "equilibria",
     "linearize",
     "sensitivities",

@@ -1,5 +1,6 @@
 """Pictures of solutions and comparisons: functions return the axes they drew in and change nothing global."""
 
+from hybridsim.plot.branch import branch
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
@@ -13,6 +14,7 @@ from hybridsim.plot.work_precision import work_precision
 
 __all__ = [
     "TimeHistoryAxes",
+    "branch",
     "friction_loop",
     "phase_portrait",
     "regularisation",

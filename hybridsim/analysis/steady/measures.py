@@ -158,16 +158,7 @@ class Measures:
     @cached_property
     def word(self) -> tuple[str, ...]:
         """The modes in the order in which the period goes through them; components are separated by a comma."""
-        solution = self.solution
-        names = [a.modes for a in solution._system.declared]
-        found: list[str] = []
-        for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):
-            here = ",".join(modes[m] for modes, m in zip(names, z[: len(names)].tolist(), strict=True))
-            if last > first and (not found or found[-1] != here):
-                found.append(here)
-        if len(found) > 1 and found[0] == found[-1]:
-            found.pop()
-        return tuple(found)
+        return word_of(self.solution)
 
     @cached_property
     def grazing(self) -> Grazing | None:
@@ -192,3 +183,16 @@ class Measures:
                     Grazing(title, solution.t_start + turn.t, turn.value, turn.value / largest[name])
                 )
         return min(found, key=lambda g: g.relative, default=None)
+
+
+def word_of(solution: Solution) -> tuple[str, ...]:
+    """The modes of a run in order, the first and the last taken together where they are the same."""
+    names = [a.modes for a in solution._system.declared]
+    found: list[str] = []
+    for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):
+        here = ",".join(modes[m] for modes, m in zip(names, z[: len(names)].tolist(), strict=True))
+        if last > first and (not found or found[-1] != here):
+            found.append(here)
+    if len(found) > 1 and found[0] == found[-1]:
+        found.pop()
+    return tuple(found)

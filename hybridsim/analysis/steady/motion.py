@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.recent import system_of
+from hybridsim.engine.timepair import Instant
 from hybridsim.errors import SimulationError
 from hybridsim.simulate import simulate
 
@@ -20,12 +22,14 @@ if TYPE_CHECKING:
 class Point:
     """All that a run starts from: states, discrete states, and modes of the components that no surface decides.
 
-    x (n,), discrete (d,). What happens at the very instant of the section has not happened yet.
+    x (n,), discrete (d,); numbers: of the modes of all components, by which held states are known. What happens at the
+    very instant of the section has not happened yet.
     """
 
     x: np.ndarray
     discrete: np.ndarray
     z: dict[str, str]
+    numbers: np.ndarray
 
     @property
     def values(self) -> np.ndarray:
@@ -35,7 +39,7 @@ class Point:
     def moved(self, change: np.ndarray) -> Point:
         """The same with states and discrete states changed by (n + d,)."""
         n = len(self.x)
-        return Point(self.x + change[:n], self.discrete + change[n:], self.z)
+        return replace(self, x=self.x + change[:n], discrete=self.discrete + change[n:])
 
 
 class Motion:
@@ -52,6 +56,12 @@ class Motion:
         self.model, self.options, self.first = model, options, first or {}
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
+
+    def on_constraints(self, point: Point) -> Point:
+        """The point with the states that its modes hold where the model's parameters put them."""
+        system = system_of(self.model)
+        x = system.project(0.0, point.x, system.vector(Instant(0.0), point.discrete), point.numbers)
+        return replace(point, x=x)
 
     def run(self, start: Point | None, t_end: float, **options: Any) -> Solution:
         """From time 0, which the forcing's phase is counted from; None starts where the model is declared to start."""
@@ -77,7 +87,7 @@ def point_at(solution: Solution, t: float) -> Point:
     index, _ = solution._places(np.array([t]), "-")
     segment = solution._segments[int(index[0])]
     point = _point(solution, segment, side=-1)
-    return Point(solution(t, side="-"), point.discrete, point.z)
+    return replace(point, x=solution(t, side="-"))
 
 
 def _last_with_length(solution: Solution) -> int:
@@ -92,4 +102,4 @@ def _point(solution: Solution, segment: Segment, side: int) -> Point:
         for a, m in zip(system.declared, segment.z.tolist(), strict=False)
         if not a.has_surface
     }
-    return Point(np.array(segment.x[side]), np.array(system.discrete(segment.p)), modes)
+    return Point(np.array(segment.x[side]), np.array(system.discrete(segment.p)), modes, segment.z)

@@ -39,7 +39,9 @@ class Sensitivities:
     times_by_parameter: np.ndarray
 
 
-def sensitivities(solution: Solution, parameters: Sequence[str] | None = None) -> Sensitivities:
+def sensitivities(
+    solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
+) -> Sensitivities:
     """Derivatives of the end and of the event times of a run by its start and by parameters, through all events.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
@@ -50,6 +52,7 @@ def sensitivities(solution: Solution, parameters: Sequence[str] | None = None) -
     ----------
     solution : of `simulate`, forward in time, with save="all"; as accurate as it is are the derivatives.
     parameters : names; None takes all.
+    starts_follow : whether starts that are declared over parameters change with them, where the run began at them.
 
     Errors
     ------
@@ -80,6 +83,8 @@ def sensitivities(solution: Solution, parameters: Sequence[str] | None = None) -
     declared = system.start_state({})
     starts[first != declared] = 0.0
     at_start = start_slopes([s.start for s in model.discrete], model, by_parameter)
+    if not starts_follow:
+        starts[:], at_start[:] = 0.0, 0.0
     directions = Directions(
         np.concatenate([np.eye(n), np.zeros((n, d)), starts], axis=1),
         np.concatenate([np.zeros((d, n)), np.eye(d), at_start], axis=1),

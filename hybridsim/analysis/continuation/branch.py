@@ -1,0 +1,154 @@
+"""A branch of periodic orbits: one point for each orbit, and where something happens along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.analysis.steady.result import SteadyState
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.steady.motion import Motion
+    from hybridsim.analysis.steady.shooting import Orbit
+
+_ON_THE_CIRCLE = 1e-9
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """One orbit of a branch.
+
+    Parameters
+    ----------
+    parameter : its value.
+    orbit, motion : the orbit, and the model at that value.
+    multipliers : Floquet multipliers, largest first; without forcing the one along the motion is left out.
+    word : the modes it goes through.
+    is_free : whether its period is its own.
+    """
+
+    parameter: float
+    orbit: Orbit
+    motion: Motion
+    multipliers: np.ndarray
+    word: tuple[str, ...]
+    is_free: bool
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers are inside the unit circle."""
+        return bool((np.abs(self.multipliers) <= 1.0 + _ON_THE_CIRCLE).all())
+
+    @cached_property
+    def steady(self) -> SteadyState:
+        """Its measures: amplitude, energy, stick fraction and so on, as `steady_state` gives them."""
+        message = f"orbit of a branch; residual {self.orbit.residual:.1e}"
+        return SteadyState(self.motion, "periodic", self.orbit, self.is_free, 0, 0, message)
+
+
+@dataclass(frozen=True)
+class Special:
+    """Where a branch changes its kind, between two of its points.
+
+    kind : "fold" (the branch turns back in the parameter), "period doubling" (a multiplier passes -1), "torus" (a pair
+        passes the unit circle), "sequence" (the modes it goes through change: a graze, or a stop that appears).
+    parameter : its value there, interpolated.
+    index : number of the point before it.
+    """
+
+    kind: str
+    parameter: float
+    index: int
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Periodic orbits along a curve.
+
+    Parameters
+    ----------
+    name : of the parameter.
+    points : in order along the branch; the parameter need not be monotone.
+    special : folds, period doublings, tori, changes of the sequence of modes.
+    message : why it ended, at both ends.
+    """
+
+    name: str
+    points: tuple[BranchPoint, ...]
+    special: tuple[Special, ...]
+    message: str
+
+    @property
+    def parameter(self) -> np.ndarray:
+        """Values of the parameter (K,)."""
+        return np.array([p.parameter for p in self.points])
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Whether each orbit attracts (K,)."""
+        return np.array([p.stable for p in self.points])
+
+    @property
+    def period(self) -> np.ndarray:
+        """Periods (K,)."""
+        return np.array([p.orbit.period for p in self.points])
+
+    def amplitude(self, name: str) -> np.ndarray:
+        """(max - min)/2 of a quantity on each orbit (K,)."""
+        return np.array([p.steady.amplitude[name] for p in self.points])
+
+    def __repr__(self) -> str:
+        values = self.parameter
+        lines = [
+            f"Branch of {len(self.points)} orbits over {self.name} from {values.min():.6g} to {values.max():.6g}, "
+            f"{int((~self.stable).sum())} of them unstable: {self.message}"
+        ]
+        return "\n".join([*lines, *(f"  {s.kind} at {self.name} = {s.parameter:.9g}" for s in self.special)])
+
+
+def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
+    """What happens between consecutive points."""
+    found: list[Special] = []
+    for i, (a, b) in enumerate(pairwise(points)):
+        if a.word != b.word:
+            found.append(Special("sequence", 0.5 * (a.parameter + b.parameter), i))
+        found += _crossings(a, b, i)
+        if i > 0 and (a.parameter - points[i - 1].parameter) * (b.parameter - a.parameter) < 0.0:
+            found.append(Special("fold", _turn(points[i - 1], a, b), i))
+    return tuple(found)
+
+
+def _crossings(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:
+    """Multipliers that pass -1, or as a pair the unit circle."""
+    if a.word != b.word or len(a.multipliers) != len(b.multipliers):
+        return []
+    found = []
+    least = [min(m.real for m in p.multipliers if m.imag == 0.0) if _has_real(p) else 0.0 for p in (a, b)]
+    if (least[0] + 1.0) * (least[1] + 1.0) < 0.0:
+        share = (-1.0 - least[0]) / (least[1] - least[0])
+        found.append(Special("period doubling", a.parameter + share * (b.parameter - a.parameter), i))
+    largest = [max((abs(m) for m in p.multipliers if m.imag != 0.0), default=0.0) for p in (a, b)]
+    if min(largest) > 0.0 and (largest[0] - 1.0) * (largest[1] - 1.0) < 0.0:
+        share = (1.0 - largest[0]) / (largest[1] - largest[0])
+        found.append(Special("torus", a.parameter + share * (b.parameter - a.parameter), i))
+    return found
+
+
+def _has_real(point: BranchPoint) -> bool:
+    return any(m.imag == 0.0 for m in point.multipliers)
+
+
+def _turn(a: BranchPoint, b: BranchPoint, c: BranchPoint) -> float:
+    """The extreme value of the parameter on a parabola through three points, over the distance along the branch."""
+    scale = np.maximum(np.abs(b.orbit.start.values), np.finfo(float).tiny)
+    d1 = float(np.linalg.norm((b.orbit.start.values - a.orbit.start.values) / scale))
+    d2 = float(np.linalg.norm((c.orbit.start.values - b.orbit.start.values) / scale))
+    if not d1 > 0.0 or not d2 > 0.0:
+        return b.parameter
+    coefficients = np.polyfit([-d1, 0.0, d2], [a.parameter, b.parameter, c.parameter], 2)
+    at = -coefficients[1] / (2.0 * coefficients[0])
+    return float(np.polyval(coefficients, at)) if -d1 <= at <= d2 else b.parameter

@@ -1,0 +1,281 @@
+"""`continuation`: a branch of periodic orbits followed over a parameter, around folds and where it repels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.analysis.continuation.branch import Branch, BranchPoint, specials
+from hybridsim.analysis.steady.measures import word_of
+from hybridsim.analysis.steady.motion import Motion, point_at_end
+from hybridsim.analysis.steady.settling import relative
+from hybridsim.analysis.steady.shooting import Orbit, multipliers
+from hybridsim.analysis.steady.steady_state import steady_state
+from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.errors import HybridsimError, UsageError, nearest
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+    from hybridsim.solution import Solution
+
+_CORRECTIONS = 8
+_TOL = 1e-9  # of the states' sizes and the range: how closely an orbit closes
+_FIRST, _LARGEST, _SMALLEST = (
+    0.01,
+    0.05,
+    1e-6,
+)  # steps along the branch, in units of the range and of the states
+_MORE, _LESS = 1.5, 0.4
+_FEW = 3  # corrections after which a step may grow
+_DIFFERENCE = 1e-6  # of the parameter, for the forcing's period
+
+
+@dataclass(frozen=True)
+class _Closing:
+    """What Newton's method knows of an orbit: its change over a period with derivatives."""
+
+    point: BranchPoint
+    change: np.ndarray
+    jacobian: np.ndarray  # (n + d [+ 1], n + d [+ 1] + 1): by start, period where it is free, parameter
+
+
+def continuation(
+    model: Model | str | PathLike[str],
+    parameter: str,
+    bounds: tuple[float, float],
+    *,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, float] | None = None,
+    max_points: int = 400,
+    integrator: str = "auto",
+    rtol: float = 1e-11,
+    progress: Callable[[float], None] | None = None,
+    **options: Any,
+) -> Branch:
+    """Follow the periodic orbit that a model settles on over a parameter, both ways, to the bounds or its end.
+
+    Pseudo-arclength continuation (H. B. Keller, in Applications of Bifurcation Theory, ed. P. H. Rabinowitz, Academic
+    Press 1977, 359) of the shooting equations; derivatives come from the variational flow through
+    the events. Orbits that repel are found as well as those that attract: the branch goes around folds. Where
+    the sequence of events changes the map has a corner: the branch goes on beyond it where Newton's method does.
+
+    Parameters
+    ----------
+    model, params, x0 : as in `steady_state`, which finds the first orbit at the model's own value.
+    parameter, bounds : its name; the least and greatest value, between which the model's own value lies.
+    max_points : orbits each way, at most.
+
+    Returns
+    -------
+    Branch, with folds, period doublings, tori and changes of the sequence of modes marked.
+
+    Errors
+    ------
+    UsageError for names and bounds that do not fit, or a model that settles on no periodic orbit.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> branch = hs.continuation("dfcs", "F0", (29.0, 31.0))
+    >>> bool(branch.stable.all())
+    True
+    """
+    model = arguments.chosen_model(model, params)
+    names = [p.name for p in model.parameters]
+    if parameter not in names:
+        raise UsageError(
+            f"model {model.name} has no parameter {parameter!r}",
+            remedy=nearest(str(parameter), names, kind="parameters"),
+        )
+    low, high = arguments.time_span(bounds)
+    value = model.parameter_values()[parameter]
+    if not low <= value <= high or low == high:
+        raise UsageError(
+            f"bounds {bounds!r} do not hold the model's own {parameter} = {value:g}",
+            remedy=f"give bounds around it, or another start with params={{{parameter!r}: ...}}",
+        )
+    method = {"integrator": integrator, "rtol": rtol, **options}
+    start = steady_state(model, x0=x0, **method)
+    if start.kind != "periodic" or start._closed is None:
+        raise UsageError(
+            f"model {model.name} settles on no periodic orbit at {parameter} = {value:g}: {start.message}",
+            remedy="start from other parameters or another x0",
+        )
+    follower = _Follower(
+        model, parameter, (low, high), method, start._closed, start._is_free, int(max_points)
+    )
+    first = follower.close(start._closed, value)
+    if first is None:
+        raise UsageError(
+            f"the orbit at {parameter} = {value:g} does not close by Newton's method: {start.message}"
+        )
+    sides = []
+    for number, sign in enumerate((-1.0, 1.0)):
+        sides.append(follower.follow(first, sign))
+        if progress is not None:
+            progress(0.5 * (number + 1))
+    (backward, why_low), (forward, why_high) = sides
+    points = (*reversed(backward), first.point, *forward)
+    return Branch(parameter, points, specials(points), f"{why_low}; {why_high}")
+
+
+class _Follower:
+    """Steps along one branch."""
+
+    def __init__(
+        self,
+        model: Model,
+        parameter: str,
+        bounds: tuple[float, float],
+        method: dict[str, Any],
+        orbit: Orbit,
+        is_free: bool,
+        max_points: int,
+    ) -> None:
+        self.model, self.parameter, self.bounds, self.method = model, parameter, bounds, method
+        self.is_free, self.multiple, self.max_points = is_free, orbit.multiple, max_points
+        solution = Motion(model, method).run(orbit.start, orbit.period)
+        largest = np.concatenate([sizes(solution), np.abs(orbit.start.discrete)])
+        scale = np.where(largest > 0.0, largest, 1.0)
+        # start of the orbit, its period where that is free, the parameter
+        self.unit = np.concatenate([scale, [orbit.period] if is_free else [], [bounds[1] - bounds[0]]])
+        self.section = 0
+
+    def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
+        """Points from the first one on, the parameter falling (sign -1) or rising at first; and why it ended."""
+        found: list[BranchPoint] = []
+        here, step = first, _FIRST
+        direction = np.zeros(len(self.unit))
+        direction[-1] = sign
+        tangent = self._tangent(here, direction)
+        while len(found) < self.max_points:
+            unknowns = self._unknowns(here.point) + step * tangent
+            there, count = self._correct(here.point, unknowns, tangent)
+            if there is None:
+                step *= _LESS
+                if step < _SMALLEST:
+                    at = here.point.parameter
+                    return (
+                        found,
+                        f"no orbit next to {self.parameter} = {at:.9g} was found (a graze, or its end)",
+                    )
+                continue
+            value = there.point.parameter
+            if not self.bounds[0] <= value <= self.bounds[1]:
+                return found, "the bound was reached"
+            found.append(there.point)
+            tangent = self._tangent(there, tangent)
+            here = there
+            if count <= _FEW:
+                step = min(step * _MORE, _LARGEST)
+        return found, f"{self.max_points} points"
+
+    def _unknowns(self, point: BranchPoint) -> np.ndarray:
+        """Start, period and parameter in units of their own."""
+        orbit = point.orbit
+        return (
+            np.concatenate([orbit.start.values, [orbit.period] if self.is_free else [], [point.parameter]])
+            / self.unit
+        )
+
+    def _tangent(self, here: _Closing, towards: np.ndarray) -> np.ndarray:
+        """Unit vector along the branch, the way of `towards`."""
+        matrix = np.concatenate([here.jacobian, towards[None, :]])
+        right = np.zeros(len(matrix))
+        right[-1] = 1.0
+        found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return found / np.linalg.norm(found)
+
+    def _correct(
+        self, previous: BranchPoint, unknowns: np.ndarray, tangent: np.ndarray
+    ) -> tuple[_Closing | None, int]:
+        """Newton's method from a predicted point, in the plane across the tangent."""
+        start, last = unknowns.copy(), math.inf
+        for count in range(_CORRECTIONS):
+            closing = self._closing(previous, unknowns)
+            if closing is None:
+                return None, count
+            size = float(np.abs(closing.change).max())
+            if size <= _TOL:
+                return closing, count
+            if not size < last:
+                return None, count
+            last = size
+            matrix = np.concatenate([closing.jacobian, tangent[None, :]])
+            right = np.append(-closing.change, -tangent @ (unknowns - start))
+            unknowns = unknowns + np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return None, _CORRECTIONS
+
+    def close(self, orbit: Orbit, value: float) -> _Closing | None:
+        """What is known of an orbit that closes already."""
+        motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
+        point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
+        return self._closing(point, self._unknowns(point))
+
+    def _closing(self, previous: BranchPoint, unknowns: np.ndarray) -> _Closing | None:
+        values = unknowns * self.unit
+        value, count = float(values[-1]), len(previous.orbit.start.values)
+        try:
+            model = self.model.with_(**{self.parameter: value})
+            motion = Motion(model, self.method)
+            period, growth = (float(values[count]), 0.0) if self.is_free else self._forced(value)
+            if not period > 0.0:
+                return None
+            n = len(previous.orbit.start.x)
+            start = replace(previous.orbit.start, x=values[:n], discrete=values[n:count])
+            start = motion.on_constraints(start)
+            solution = motion.run(start, period)
+            end = point_at_end(solution)
+            if end.z != start.z:
+                return None
+            found = sensitivities(solution, (self.parameter,), starts_follow=False)
+        except HybridsimError:
+            return None
+        last = solution._segments[-1]
+        rates = np.zeros(count)
+        rates[:n] = solution._system.flow(float(last.s[-1]), last.x[-1], last.p, last.z)
+        columns = [found.by_start - np.eye(count)]
+        columns += [rates[:, None]] if self.is_free else []
+        columns += [(found.by_parameter[:, 0] + rates * growth)[:, None]]
+        unit = self.unit
+        jacobian = np.concatenate(columns, axis=1) * unit[None, :] / unit[:count, None]
+        change = (end.values - start.values) / unit[:count]
+        if self.is_free:  # the section: one state keeps its value
+            row = np.zeros(len(unit))
+            row[self.section] = 1.0
+            jacobian = np.concatenate([jacobian, row[None, :]])
+            kept = previous.orbit.start.values[self.section]
+            change = np.append(change, (start.values[self.section] - kept) / unit[self.section])
+        orbit = Orbit(start, period, self.multiple, relative(end.values - start.values, unit[:count]))
+        point = BranchPoint(
+            value, orbit, motion, multipliers(found.by_start, self.is_free), _word(solution), self.is_free
+        )
+        return _Closing(point, change, jacobian)
+
+    def _forced(self, value: float) -> tuple[float, float]:
+        """The period of the forcing, and its derivative by the parameter."""
+        from hybridsim.engine.period import system_period
+        from hybridsim.engine.recent import system_of
+
+        def period(at: float) -> float:
+            found = system_period(system_of(self.model.with_(**{self.parameter: at})))
+            if found is None:
+                raise UsageError(f"the forcing has no period at {self.parameter} = {at:g}")
+            return self.multiple * found
+
+        step = _DIFFERENCE * (abs(value) or 1.0)
+        here, ahead, behind = period(value), period(value + step), period(value - step)
+        return here, 0.0 if ahead == behind == here else (ahead - behind) / (2.0 * step)
+
+
+def _word(solution: Solution) -> tuple[str, ...]:
+    """The modes of the orbit in order, from wherever: the rotation that comes first in the alphabet."""
+    word = word_of(solution)
+    return min((word[i:] + word[:i] for i in range(len(word))), default=word)

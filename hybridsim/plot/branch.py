@@ -1,0 +1,62 @@
+"""A branch of periodic orbits: a measure over the parameter, dashed where orbits repel, its special points marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.model.units import units_of
+from hybridsim.plot import style
+from hybridsim.plot.scale import label_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridsim.analysis import Branch
+
+_MARKERS = {"fold": "o", "period doubling": "s", "torus": "D", "sequence": "|"}
+_TITLES = {"sequence": "sequence of modes changes"}
+
+
+def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None) -> Axes:
+    """Draw the amplitude of a quantity (the first state if not given) over the parameter.
+
+    Parameters
+    ----------
+    axes : where to draw; a new figure if not given.
+    """
+    model = result.points[0].motion.model
+    name = name or model.states[0].name
+    if axes is None:
+        axes = style.figure(6.4, 4.2).subplots()
+    across, up, stable = result.parameter, result.amplitude(name), result.stable
+    for attracts, line, label in ((True, "-", "attracts"), (False, "--", "repels")):
+        drawn = _beside(stable == attracts)
+        if drawn.any():
+            axes.plot(
+                np.where(drawn, across, np.nan), np.where(drawn, up, np.nan), line,
+                color=style.PALETTE[0], linewidth=1.4, label=label,
+            )  # fmt: skip
+    for kind, marker in _MARKERS.items():
+        chosen = [s for s in result.special if s.kind == kind]
+        if chosen:
+            heights = [0.5 * (up[s.index] + up[s.index + 1]) for s in chosen]
+            axes.plot(
+                [s.parameter for s in chosen], heights, marker, color=style.INK, markersize=6,
+                markerfacecolor="white", label=_TITLES.get(kind, kind),
+            )  # fmt: skip
+    unit = next(p.unit for p in model.parameters if p.name == result.name)
+    label_axis(axes.xaxis, result.name, unit, across.min(), across.max())
+    label_axis(axes.yaxis, f"amplitude of {name}", units_of(model).get(name, ""), up.min(), up.max())
+    style.dress(axes)
+    style.head(axes, model.title or model.name, f"{len(result.points)} periodic orbits")
+    axes.legend(fontsize=8, frameon=False)
+    return axes
+
+
+def _beside(mask: np.ndarray) -> np.ndarray:
+    """The mask and the points next to it, so that the parts of a line meet."""
+    wider = mask.copy()
+    wider[1:] |= mask[:-1]
+    return wider

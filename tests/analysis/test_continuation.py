@@ -1,0 +1,87 @@
+"""Branches of periodic orbits: where they turn, what repels, and that each orbit closes by another integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.errors import UsageError
+
+
+def hardening(friction: float = 0.02) -> hs.Model:
+    """A spring that stiffens, a little damping and friction: two motions that attract and one that repels."""
+    return hs.Model(
+        "hardening",
+        parameters={"w": 0.8, "a": 0.3},
+        states=[
+            hs.State("x", start=0, der="v", nominal=1),
+            hs.State("v", start=0, der="-0.1*v - x - x**3 - f + a*cos(w*t)", nominal=1),
+        ],
+        contacts=[hs.Contact("f", velocity="v", normal=friction, law="coulomb", arguments={"mu": 1})],
+    )
+
+
+@pytest.fixture(scope="module")
+def branch() -> hs.Branch:
+    return hs.continuation(hardening(), "w", (0.7, 2.0))
+
+
+def test_it_turns_twice_and_repels_between(branch: hs.Branch) -> None:
+    folds = [s for s in branch.special if s.kind == "fold"]
+    assert len(folds) == 2
+    unstable = np.flatnonzero(~branch.stable)
+    assert unstable.min() - folds[0].index in (0, 1, 2)
+    assert folds[1].index - unstable.max() in (-1, 0, 1)
+    assert (np.diff(unstable) == 1).all()
+
+
+def test_each_orbit_closes_by_another_integrator(branch: hs.Branch) -> None:
+    for point in branch.points[:: len(branch.points) // 8]:
+        start = point.orbit.start
+        run = hs.simulate(
+            hardening().with_(w=point.parameter), (0.0, 2.0 * np.pi / point.parameter), x0=start.x.tolist(),
+            integrator="scipy-dop853", rtol=1e-12,
+        )  # fmt: skip
+        assert np.abs(run.y[:, -1] - start.x).max() < 1e-8
+
+
+def test_the_upper_fold_is_where_a_slow_rise_of_the_frequency_falls_off(branch: hs.Branch) -> None:
+    """A route of its own: the motion that attracts, followed until it is lost, from below the fold."""
+    fold = max(s.parameter for s in branch.special if s.kind == "fold")
+
+    def stays(w: float) -> bool:
+        upper = [
+            p
+            for p in branch.points
+            if p.stable and p.parameter < fold - 1e-3 and p.steady.amplitude["x"] > 1.0
+        ]
+        start = max(upper, key=lambda p: p.parameter).orbit.start.x.tolist()
+        run = hs.simulate(
+            hardening().with_(w=w),
+            (0.0, 300.0 * 2.0 * np.pi / w),
+            x0=start,
+            save="last-period",
+            integrator="dop853",
+        )
+        return bool(np.abs(run.y[0]).max() > 1.0)
+
+    assert stays(fold - 2e-4)
+    assert not stays(fold + 2e-4)
+
+
+def test_the_period_of_a_limit_cycle_is_followed() -> None:
+    branch = hs.continuation("belt", "v_belt", (0.1, 0.3))
+    for point in branch.points[::5]:
+        period = hs.steady_state("belt", params={"v_belt": point.parameter}).period
+        assert point.orbit.period == pytest.approx(period, rel=1e-9)
+    assert {p.word for p in branch.points} == {("slip-", "stick")}
+
+
+def test_bad_questions_are_refused() -> None:
+    with pytest.raises(UsageError, match="'F1'"):
+        hs.continuation("dfcs", "F1", (1, 2))
+    with pytest.raises(UsageError, match="bounds"):
+        hs.continuation("dfcs", "F0", (1, 2))
+    with pytest.raises(UsageError, match="no periodic orbit"):
+        hs.continuation("free-decay", "mu", (0.05, 0.2))
