@@ -33,15 +33,16 @@ def test_the_ten_lines_run(tmp_path: Path) -> None:
     assert "mode changes" in done.stdout
 
 
-def test_the_page_on_python_prints_what_it_says(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "fewest"), [("python.md", 20), ("asking.md", 10)])
+def test_a_page_prints_what_it_says(page: str, fewest: int, tmp_path: Path) -> None:
     """Its examples in order; behind each print stands, as a comment, what it prints."""
-    code = "\n".join(blocks(ROOT / "docs" / "reference" / "python.md", "python"))
+    code = "\n".join(blocks(ROOT / "docs" / "reference" / page, "python"))
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     said = re.findall(r"^ *print\(.*\)  # (.+)$", code, re.MULTILINE)
-    assert len(said) == code.count("print(") > 20
+    assert len(said) == code.count("print(") > fewest
     assert done.stdout.splitlines() == said
 
 
