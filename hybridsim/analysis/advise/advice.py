@@ -1,0 +1,180 @@
+"""What `advise` gives back: the ladder, the simplest adequate rung, the integrator to take, and what supports it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.analysis.advise.ladder import FULL, Step
+from hybridsim.analysis.advise.question import Number
+from hybridsim.analysis.advise.settings import Setting
+from hybridsim.analysis.advise.uncertainty import Spread
+from hybridsim.analysis.provenance import provenance
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import Model
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.sweep import Sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """How little model answers a question within a tolerance.
+
+    Parameters
+    ----------
+    model, quantity, tol : what was asked.
+    value : of the full model; nan for a region.
+    ladder : a `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and ``seconds`` of
+        a step are not numbers, ``error`` is the largest of the region and ``why`` counts points.
+    certificates : what theory says without a run.
+    settings : integrator settings for the full model, tried: the quickest adequate one first.
+    spread : what given ranges of parameters do to the quantity.
+    region : a `Sweep` with, at each point, ``simplest`` (a name), ``error`` of it, ``value`` of the full model and
+        ``errors`` of all rungs (inf where a rung does not apply, or was not tried because a simpler one serves).
+    seconds : of all of it.
+    """
+
+    model: Model
+    quantity: str
+    tol: float
+    value: Number
+    ladder: tuple[Step, ...]
+    certificates: tuple[str, ...] = ()
+    settings: tuple[Setting, ...] = ()
+    spread: Spread | None = None
+    region: Sweep | None = None
+    seconds: float = math.nan
+
+    @property
+    def simplest(self) -> Step:
+        """The first rung that is adequate (over a region: everywhere); the full model where no simpler one is."""
+        return next(step for step in self.ladder if step.is_adequate)
+
+    @property
+    def integrator(self) -> Setting | None:
+        """The quickest setting that answers within the tolerance; None where none was tried, or none does."""
+        return next((s for s in self.settings if s.is_adequate), None)
+
+    def __getitem__(self, name: str) -> Step:
+        """The step of a rung."""
+        for step in self.ladder:
+            if step.name == name:
+                return step
+        names = [step.name for step in self.ladder]
+        raise UsageError(f"there is no rung {name!r}", remedy=nearest(str(name), names, kind="rungs"))
+
+    @property
+    def map(self) -> np.ndarray:
+        """Over a region: the name of the simplest adequate rung at each point."""
+        if self.region is None:
+            raise UsageError("the advice is about one scene", remedy="give over={...} for a map")
+        return self.region["simplest"]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know besides, a sentence each."""
+        return tuple(_remarks(self))
+
+    def __repr__(self) -> str:
+        return self.table()
+
+    def table(self) -> str:
+        """The ladder, the settings and the remarks as text."""
+        from hybridsim.analysis.advise.table import table
+
+        return table(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as plain values; None for what is no number."""
+        return {
+            "model": self.model.name,
+            "quantity": self.quantity,
+            "tol": self.tol,
+            "value": _plain(self.value),
+            "simplest": self.simplest.name,
+            "integrator": None if self.integrator is None else self.integrator.title,
+            "ladder": [_fields(s, "name title drops value error seconds verdict why") for s in self.ladder],
+            "settings": [
+                {**_fields(s, "integrator value error seconds is_adequate why"), "options": dict(s.options)}
+                for s in self.settings
+            ],
+            "certificates": list(self.certificates),
+            "spread": None if self.spread is None else _fields(self.spread, "ranges low high relative"),
+            "remarks": list(self.remarks),
+            "region": None if self.region is None else self._region(),
+            "seconds": _plain(self.seconds),
+            "provenance": provenance(self.model),
+        }
+
+    def _region(self) -> dict[str, Any]:
+        assert self.region is not None
+        found = self.region.to_dict()
+        errors = self.region["errors"].astype(object)
+        errors[~np.isfinite(self.region["errors"])] = None
+        found["values"]["errors"] = errors.tolist()
+        return {name: found[name] for name in ("mode", "dimensions", "axes", "values", "status", "units")}
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text
+
+    def plot(self) -> Any:
+        """Draw the errors of the ladder, or the map of a region; see `hybridsim.plot.advice`."""
+        # pictures are a floor above: looked up when they are asked for, so that nothing down here depends on them
+        return import_module("hybridsim.plot").advice(self)
+
+
+def _remarks(advice: Advice) -> list[str]:
+    found = []
+    simplest, full = advice.simplest, advice.ladder[-1]
+    where = " everywhere in the region" if advice.region is not None else ""
+    if simplest.verdict == FULL and len(advice.ladder) > 1:
+        found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
+    elif simplest.seconds > full.seconds:
+        found.append(
+            f"{simplest.name} is simpler but not quicker: {_time(simplest.seconds)} against {_time(full.seconds)} of the "
+            "full model"
+        )
+    spread = advice.spread
+    if spread is not None and spread.relative > advice.tol:
+        found.append(
+            f"the tolerance {advice.tol:g} is finer than what the parameters are known to: their ranges alone move "
+            f"{advice.quantity} by {spread.relative:.2g}; more model is not more truth"
+        )
+        enough = next(s for s in advice.ladder if s.error <= spread.relative or s.verdict == FULL)
+        if enough is not simplest:
+            found.append(f"within that spread {enough.name} is enough (error {enough.error:.2g})")
+    if advice.settings and advice.integrator is None:
+        found.append("no integrator setting that was tried is within the tolerance")
+    if advice.region is not None and advice.region.failed.any():
+        found.append(f"{int(advice.region.failed.sum())} of {advice.region.failed.size} points have no answer")
+    return found
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
+def _fields(item: Any, names: str) -> dict[str, Any]:
+    return {name: _plain(getattr(item, name)) for name in names.split()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: list(ends) for name, ends in value.items()}
+    if isinstance(value, complex):
+        return {"real": value.real, "imaginary": value.imag}
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,159 @@
+"""`advise`: how little model, and which integrator, answers a question within a tolerance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+from hybridsim import arguments
+from hybridsim.analysis.advise.advice import Advice
+from hybridsim.analysis.advise.certificates import certificates
+from hybridsim.analysis.advise.ladder import FULL, Step, asked, climb, scene_of
+from hybridsim.analysis.advise.question import NoAnswer, Question, question_of, watched
+from hybridsim.analysis.advise.region import over_region
+from hybridsim.analysis.advise.settings import settings
+from hybridsim.analysis.advise.uncertainty import ranges_of, spread
+from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.rungs import LADDER, Rung
+from hybridsim.analysis.wanted import positive, words
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.model import Model
+
+_FINER = 1e-6  # of the tolerance: verdicts are then wrong only for errors that near to it
+_ACCURACY = (1e-10, 1e-6)  # bounds of what is asked of the runs
+
+
+def advise(
+    model: Model | str | PathLike[str],
+    quantity: str | Callable[[Any], Any],
+    tol: float = 0.01,
+    *,
+    over: Mapping[str, Sequence[Any]] | None = None,
+    uncertain: Mapping[str, tuple[float, float]] | None = None,
+    t_span: tuple[float, float] | None = None,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, float] | None = None,
+    rungs: Sequence[str] | None = None,
+    v0: float | None = None,
+    integrators: bool = True,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Advice:
+    """The simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
+
+    Every rung of a ladder of simpler models is run and held against the full model; what theory settles without a run
+    is said first. Errors and costs are measured, none is guessed.
+
+    Parameters
+    ----------
+    model, params, x0 : as in `simulate`.
+    quantity : of the steady motion, or with ``t_span`` of a run: "amplitude.x", "peak.x", "maximum.f", "minimum.f",
+        "mean.x", "energy.x" (the integral of x^2), "harmonic.x.3" (its modulus), "dissipated.f" (work per period),
+        "stick_fraction.f", "period"; of a run alone: "final.x", "event_time.f.2" (the second event of f). Or a function
+        of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
+    tol : largest relative error. Where the full model's value is zero, a rung is adequate if it gives zero too; what is
+        below 1e-6 of tol beside the largest value of the same quantity counts as zero.
+    over : values of parameters as in `sweep`: a map of the simplest adequate rung.
+    uncertain : ranges of parameters, {"mu": (0.28, 0.32)}: is the tolerance finer than what they leave open?
+    t_span : of the run that is asked about; without it the question is about the steady motion.
+    rungs : names of those to try; all unless given: at-rest, no-friction, viscous, no-stop, constant-mu-at-rest,
+        constant-mu-mean, mu_s=mu_k, tanh, arctan, karnopp.
+    v0 : width of the regularised forces; a hundredth of the largest sliding speed unless given.
+    integrators : whether to try integrator settings for the full model; over a region none are.
+    workers : threads of a region.
+    progress : called as progress(done, total, what is next).
+
+    Returns
+    -------
+    Advice: ``ladder``, ``simplest``, ``integrator``, ``remarks``, ``table()``, ``plot()``.
+
+    Errors
+    ------
+    UsageError for arguments that do not fit; SimulationError where the full model itself has no answer.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.advise("dfcs", "amplitude.x", 0.03, params={"F0": 100}, rungs=["no-friction", "viscous"])
+    >>> found.simplest.name
+    'no-friction'
+    """
+    began = time.perf_counter()
+    model = arguments.chosen_model(model, params)
+    if x0 is not None:
+        model = model.with_start(**x0)
+    model.validate()
+    tol = positive(tol, "tol")
+    if not tol < 1.0:
+        raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance below 1, such as 0.01")
+    accuracy = min(max(_FINER * tol, _ACCURACY[0]), _ACCURACY[1])
+    span = None if t_span is None else arguments.time_span(t_span)
+    question = question_of(model, quantity, span, accuracy)
+    width = None if v0 is None else positive(v0, "v0")
+    chosen, ranges = _chosen(rungs), None if uncertain is None else ranges_of(uncertain)
+    seen = watched(model)
+    if over is not None:
+        if ranges is not None:
+            raise UsageError("over and uncertain are both given", remedy="ask about ranges at one point")
+        options = {"workers": workers, "progress": progress}
+        region, ladder = over_region(seen, over, chosen, question, tol, width, options)
+        return Advice(
+            model, question.text, tol, float("nan"), ladder, region=region, seconds=time.perf_counter() - began
+        )
+    told = _Told(progress, len(chosen) + 1 + integrators + (ranges is not None))
+    told("full model")
+    try:
+        full = asked(question, seen)
+    except NoAnswer as reason:
+        raise SimulationError(f"the full model gives no {question.text}: {reason}") from reason
+    scene = scene_of(seen, full.motion, width)
+    steps = []
+    for rung, step in zip(chosen, climb(chosen, scene, question, full.value, tol), strict=True):
+        told(rung.name)
+        steps.append(step)
+    steps.append(Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "what the others are held against"))
+    tried = settings(seen, question, full.motion, full.value, tol, told) if integrators else ()
+    known = None if ranges is None else _spread(seen, question, full.value, ranges)
+    return Advice(
+        model,
+        question.text,
+        tol,
+        full.value,
+        tuple(steps),
+        tuple(c.text for c in certificates(model)),
+        tried,
+        known,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _spread(model: Model, question: Question, full: Any, ranges: Any) -> Any:
+    try:
+        return spread(model, question, full, ranges)
+    except NoAnswer as reason:
+        raise SimulationError(f"at an end of the given ranges there is no {question.text}: {reason}") from reason
+
+
+def _chosen(names: Sequence[str] | None) -> tuple[Rung, ...]:
+    if names is None:
+        return LADDER
+    known = {rung.name: rung for rung in LADDER}
+    asked_for = words(names, "rungs")
+    for name in asked_for:
+        if name not in known:
+            raise UsageError(f"there is no rung {name!r}", remedy=nearest(name, known, kind="rungs"))
+    return tuple(rung for rung in LADDER if rung.name in asked_for)
+
+
+class _Told:
+    """Passes on what is next."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = arguments.callback(progress), total, -1
+
+    def __call__(self, what: str) -> None:
+        self._done = min(self._done + 1, self._total - 1)
+        if self._progress is not None:
+            self._progress(self._done, self._total, what)

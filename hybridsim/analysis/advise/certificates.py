@@ -1,0 +1,129 @@
+"""What theory says of a model without running it: that nothing moves, that it is linear, that it never stops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hybridsim.analysis.closed_forms.affine import Affine, NotAffine, affine
+from hybridsim.analysis.rungs import DoesNotApply, Scene
+from hybridsim.analysis.rungs.at_rest import AtRest
+from hybridsim.analysis.rungs.no_stop import NoStop, held
+from hybridsim.expr import evaluate
+from hybridsim.model import Model
+
+_UNIT_BOUND = 1.0  # no shape of a wave exceeds its amplitude
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A statement that no run has to support.
+
+    rung : that is exact by it; "" where the full model itself is the statement. motion : in closed form, if there is
+    one. steady_only : whether it is about the steady motion alone.
+    """
+
+    text: str
+    rung: str = ""
+    motion: Any = None
+    steady_only: bool = False
+
+
+def certificates(model: Model) -> tuple[Certificate, ...]:
+    """All that theory says of a model, the strongest first."""
+    found = []
+    if bound := _nothing_moves(model):
+        text = f"nothing moves: the load of at most {bound[0]:.6g} never exceeds the {bound[1]:.6g} that stick holds"
+        found.append(Certificate(text, AtRest.name, AtRest().apply(Scene(model))))
+    elif _is_linear(model):
+        found.append(Certificate("the model is linear and has no modes: there is nothing to make simpler"))
+    else:
+        found += _never_stops(model)
+    return tuple(found)
+
+
+def _never_stops(model: Model) -> list[Certificate]:
+    try:
+        form = held(model)
+        motion = NoStop().apply(Scene(model))
+    except DoesNotApply:
+        return []
+    if not form.unique:
+        return []
+    s = form.found.system
+    text = (
+        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): the steady motion is Den Hartog's, and no "
+        "other is"
+    )
+    return [Certificate(text, NoStop.name, motion, steady_only=True)]
+
+
+def _is_linear(model: Model) -> bool:
+    if model.contacts or model.components or model.discrete or model.schedules or model.flow is not None:
+        return False
+    if any(monitor.action != "record" for monitor in model.monitors):
+        return False
+    unknowns = {s.name for s in model.states} | {i.name for i in model.inputs}
+    values, definitions = model.parameter_values(), dict(model.definitions)
+    try:
+        for state in model.states:
+            affine(state.der, unknowns, values, definitions)
+    except NotAffine:
+        return False
+    return True
+
+
+def _nothing_moves(model: Model) -> tuple[float, float] | None:
+    """(largest load, limit of stick) where a single contact holds everything from the start on, for ever."""
+    plain = not (model.components or model.discrete or model.schedules or model.flow)
+    if not plain or len(model.contacts) != 1 or any(i.kind != "wave" for i in model.inputs):
+        return None
+    if any(monitor.action != "record" for monitor in model.monitors):
+        return None
+    contact, values, start = model.contacts[0], model.parameter_values(), model.start_values()
+    definitions = dict(model.definitions)
+    unknowns = {*start, contact.name, *(i.name for i in model.inputs)}
+    try:
+        slide = affine(contact.velocity, unknowns, values, definitions)
+        rates = {s.name: affine(s.der, unknowns, values, definitions) for s in model.states}
+        limit = affine(contact.limit_force(), unknowns, values, definitions)
+    except NotAffine:
+        return None
+    if not limit.is_constant or slide.waves or not slide.linear.keys() <= start.keys() or _at(slide, start) != 0.0:
+        return None
+    pull = Affine()
+    for name, weight in slide.linear.items():
+        pull = pull.plus(rates[name], weight)
+    effect = pull.linear.get(contact.name, 0.0)
+    if effect >= 0.0:
+        return None
+    # in stick the force is what makes the rate of the relative velocity zero; then no state may have a rate at all
+    for rate in rates.values():
+        left = rate.plus(pull, -rate.linear.get(contact.name, 0.0) / effect)
+        if _largest(model, left, start, contact.name, values) != 0.0:
+            return None
+    load = _largest(model, Affine().plus(pull, -1.0 / effect), start, contact.name, values)
+    return (load, limit.constant) if load <= limit.constant else None
+
+
+def _at(form: Affine, start: Mapping[str, float]) -> float:
+    return form.constant + sum(value * start.get(name, 0.0) for name, value in form.linear.items())
+
+
+def _largest(
+    model: Model, form: Affine, start: Mapping[str, float], force: str, values: Mapping[str, float]
+) -> float:
+    """A bound of |form| at the start, whatever the time and without the contact's force."""
+    steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
+    inputs = {i.name: i for i in model.inputs}
+    for name, value in form.linear.items():
+        if name in start:
+            steady += value * start[name]
+        elif name in inputs:
+            number = {field: float(evaluate(e, values)) for field, e in inputs[name].expressions.items()}
+            steady += value * number["offset"]
+            swing += abs(value * number["amplitude"]) * _UNIT_BOUND
+        elif name != force and value != 0.0:
+            return float("inf")
+    return abs(steady) + swing

@@ -1,0 +1,262 @@
+"""What is asked of a model: one number, read off its steady motion or off a run."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.analysis.steady.measures import Measures
+from hybridsim.errors import HybridsimError, UsageError, nearest
+from hybridsim.model import Model, Output
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
+OF_CONTACT = ("dissipated", "stick_fraction")
+OF_RUN = ("final", "event_time")
+OF_MOTION = ("period",)
+HEADS = (*OF_QUANTITY, *OF_CONTACT, *OF_MOTION, *OF_RUN)
+_SIGNED = ("amplitude", "maximum", "minimum", "mean", "harmonic", "final")  # what can be zero but for rounding
+_STICK = "stick"  # the mode of every contact in which nothing slides
+
+Number = float | complex
+
+
+class NoAnswer(Exception):
+    """A model has no such quantity, or no steady motion to read it off; the text says why."""
+
+
+class OverRun(Measures):
+    """The same measures over a run instead of a period."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A value, what it took, and the motion it was read off."""
+
+    value: Number
+    seconds: float
+    motion: Any
+
+
+@dataclass(frozen=True)
+class Question:
+    """A quantity by its words, or a function of the motion.
+
+    Parameters
+    ----------
+    text : "amplitude.x", "harmonic.x.3", "final.x", ...; the function's name.
+    function : of a `SteadyState`, or of a `Solution` where there is a span.
+    t_span : of the run that is asked about; None for the steady motion.
+    accuracy : relative, of what is computed.
+    """
+
+    text: str
+    function: Callable[[Any], Any] | None
+    t_span: tuple[float, float] | None
+    accuracy: float
+
+    @property
+    def head(self) -> str:
+        """The kind of quantity."""
+        return self.text.partition(".")[0]
+
+    @property
+    def name(self) -> str:
+        """What it is of."""
+        return self.text.split(".")[1] if "." in self.text else ""
+
+    @property
+    def number(self) -> int:
+        """Of a harmonic or an event; 1 where none is given."""
+        parts = self.text.split(".")
+        return int(parts[2]) if len(parts) > 2 else 1
+
+    def ask(self, model: Model) -> Answer:
+        """The value, from a steady state or a run.
+
+        Errors
+        ------
+        NoAnswer with the reason.
+        """
+        began = time.perf_counter()
+        try:
+            motion = self.motion(model)
+            value = self.read(motion)
+        except HybridsimError as error:
+            raise NoAnswer(error.message) from error
+        return Answer(value, time.perf_counter() - began, motion)
+
+    def motion(self, model: Model) -> Any:
+        """The steady state, or the run."""
+        from hybridsim.analysis.steady import steady_state
+        from hybridsim.simulate import simulate
+
+        if self.t_span is None:
+            steady = steady_state(model, tol=self.accuracy)
+            if not steady.success:
+                raise NoAnswer(steady.message)
+            return steady
+        solution = simulate(model, self.t_span, rtol=0.01 * self.accuracy)
+        if not solution.success:
+            raise NoAnswer(f"{solution.status}: {solution.message}")
+        return OverRun(solution)
+
+    def read(self, motion: Any) -> Number:
+        """The value of a motion; of a formula as far as it goes.
+
+        What is below the accuracy beside the largest value of the same quantity in the motion is zero.
+        """
+        if self.function is not None:
+            return self._call(motion)
+        value = self._read(motion)
+        if isinstance(motion, Measures) and self.head in _SIGNED:
+            return value if abs(value) > self.accuracy * motion.peak[self.name] else 0.0
+        return value
+
+    def _read(self, motion: Any) -> float:
+        head, name = self.head, self.name
+        is_run = isinstance(motion, Measures)
+        if head == "event_time":
+            return self._event_time(motion)
+        if head == "period":
+            found = float(getattr(motion, "period", math.nan))
+            if math.isnan(found):
+                raise NoAnswer("it does not oscillate")
+            return found
+        if head == "harmonic":
+            if not is_run:
+                _of(motion.mean, name, head)
+            return abs(complex(motion.harmonic(name, self.number)))
+        if is_run and head == "final":
+            return float(motion.solution.output(name, motion.solution.t_end))
+        if is_run and head == "dissipated":
+            span = motion.solution.t_end - motion.solution.t_start
+            return float(motion.mean[_power(name)]) * span
+        if is_run and head == "stick_fraction":
+            return stuck(motion.solution, name)
+        return _of(getattr(motion, head, {}), name, head)
+
+    def _call(self, motion: Any) -> Number:
+        assert self.function is not None
+        if not isinstance(motion, Measures):
+            raise NoAnswer("a formula has no trajectory to hand to a function")
+        given = motion if self.t_span is None else motion.solution
+        value = self.function(given)
+        return complex(value) if isinstance(value, complex) else float(value)
+
+    def _event_time(self, motion: Any) -> float:
+        if not isinstance(motion, Measures):
+            raise NoAnswer("it has no events")
+        system = motion.solution.model
+        known = {c.name for c in system.all_components()} | {m.name for m in system.monitors}
+        times = motion.solution.event_times(self.name) if self.name in known else []
+        if len(times) < self.number:
+            raise NoAnswer(f"it has {len(times)} events of {self.name}")
+        return float(times[self.number - 1])
+
+
+def stuck(solution: Solution, contact: str) -> float:
+    """Part of a run that a contact spends in stick; 0 for one that has lost that mode."""
+    spent = sum(i.t1 - i.t0 for i in solution.modes[contact] if i.mode == _STICK)
+    return float(spent / (solution.t_end - solution.t_start))
+
+
+def _of(values: Any, name: str, head: str) -> float:
+    if name not in values:
+        raise NoAnswer(f"it says nothing of {head}.{name}")
+    return float(values[name])
+
+
+# -- what is added to a model so that every rung can be read ----------------------------------------------------
+
+
+def _power(contact: str) -> str:
+    return f"power_of_{contact}"
+
+
+def _velocity(contact: str) -> str:
+    return f"velocity_of_{contact}"
+
+
+def _speed(contact: str) -> str:
+    return f"speed_of_{contact}"
+
+
+def watched(model: Model) -> Model:
+    """The model with the velocity, speed and power of each contact as outputs, which outlive the contact."""
+    known = {output.name for output in model.outputs}
+    more = []
+    for contact in model.contacts:
+        velocity = f"({contact.velocity.text})"
+        texts = {
+            _velocity(contact.name): velocity,
+            _speed(contact.name): f"abs{velocity}",
+            _power(contact.name): f"{contact.name}*{velocity}",
+        }
+        more += [Output(name, text) for name, text in texts.items() if name not in known]  # type: ignore[arg-type]
+    return replace(model, outputs=(*model.outputs, *more)) if more else model
+
+
+def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
+    """Mean speed of each contact while it slides, and the largest of any."""
+    means, peak = {}, 0.0
+    for contact in model.contacts:
+        sliding = 1.0 - stuck(motion.solution, contact.name)
+        means[contact.name] = motion.mean[_speed(contact.name)] / sliding if sliding > 0.0 else 0.0
+        peak = max(peak, motion.peak[_velocity(contact.name)])
+    return means, peak
+
+
+# -- from words to a question -----------------------------------------------------------------------------------
+
+
+def question_of(
+    model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float
+) -> Question:
+    """The question, checked against the model.
+
+    Errors
+    ------
+    UsageError for words that name nothing, and a run's quantity without t_span.
+    """
+    if callable(quantity):
+        return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
+    if not isinstance(quantity, str):
+        raise UsageError(f"quantity is {quantity!r}", remedy=f"give words such as {'amplitude.x'!r}, or a function")
+    head, *rest = quantity.split(".")
+    if head not in HEADS:
+        raise UsageError(f"there is no quantity {quantity!r}", remedy=nearest(head, HEADS, kind="quantities"))
+    if head in OF_RUN and t_span is None:
+        raise UsageError(f"{quantity} is of a run, and there is no t_span", remedy="give t_span=(0, ...)")
+    if head in OF_MOTION:
+        if t_span is not None or rest:
+            raise UsageError(f"quantity is {quantity!r}", remedy="a period is asked for without name and t_span")
+        return Question(quantity, None, None, accuracy)
+    names = _names(model, head)
+    if not rest or rest[0] not in names:
+        near = nearest(rest[0] if rest else "", names, kind=head)
+        raise UsageError(f"there is no quantity {quantity!r}", remedy=near)
+    numbered = head in ("harmonic", "event_time")
+    if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
+        raise UsageError(f"quantity is {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else ""))
+    if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
+        raise UsageError(f"quantity is {quantity!r}", remedy="events are counted from 1")
+    return Question(quantity, None, t_span, accuracy)
+
+
+def _names(model: Model, head: str) -> list[str]:
+    from hybridsim.model.units import units_of
+
+    if head in OF_CONTACT:
+        return [contact.name for contact in model.contacts]
+    if head == "event_time":
+        return [c.name for c in model.all_components()] + [m.name for m in model.monitors]
+    return list(units_of(model))

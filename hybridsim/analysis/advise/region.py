@@ -1,0 +1,100 @@
+"""Advice over a region of parameters: the simplest adequate rung at every point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybridsim.analysis.advise.certificates import certificates
+from hybridsim.analysis.advise.ladder import (
+    ADEQUATE,
+    FULL,
+    NOT_ADEQUATE,
+    NOT_APPLICABLE,
+    Step,
+    by_theory,
+    climb,
+    scene_of,
+)
+from hybridsim.analysis.advise.question import NoAnswer, Question
+from hybridsim.analysis.rungs import Rung
+from hybridsim.analysis.sweep import Sweep, sweep
+from hybridsim.errors import SimulationError
+from hybridsim.model import Model
+
+_DEAR = ("tanh", "arctan", "karnopp")  # tried only where nothing simpler serves: they cost as much as the full model
+
+
+@dataclass(frozen=True)
+class _Point:
+    """What is measured at a point; it can be sent to another process."""
+
+    rungs: tuple[Rung, ...]
+    question: Question
+    tol: float
+    v0: float | None
+
+    def __call__(self, model: Model) -> dict[str, Any]:
+        try:
+            full = by_theory(certificates(model), self.question) or self.question.ask(model)
+        except NoAnswer as reason:
+            raise SimulationError(str(reason)) from reason
+        scene = scene_of(model, full.motion, self.v0)
+        errors = np.full(len(self.rungs), math.inf)
+        simplest = None
+        for k, step in enumerate(climb(self.rungs, scene, self.question, full.value, self.tol, Question.ask)):
+            errors[k] = step.error
+            if simplest is None and step.is_adequate:
+                simplest = k
+            following = self.rungs[k + 1 : k + 2]
+            if simplest is not None and following and following[0].name in _DEAR:
+                break
+        return {
+            "simplest": FULL if simplest is None else self.rungs[simplest].name,
+            "error": 0.0 if simplest is None else float(errors[simplest]),
+            "value": full.value,
+            "errors": errors,
+        }
+
+
+def over_region(
+    model: Model,
+    over: Mapping[str, Any],
+    rungs: Sequence[Rung],
+    question: Question,
+    tol: float,
+    v0: float | None,
+    options: Mapping[str, Any],
+) -> tuple[Sweep, tuple[Step, ...]]:
+    """The map, and the ladder as it fared over all of it."""
+    found = sweep(model, over, _Point(tuple(rungs), question, tol, v0), **options)
+    if found.failed.all():
+        raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")
+    return found, tuple(_steps(found, rungs, tol))
+
+
+def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
+    """For each rung where it serves, and its largest error; it is adequate where it serves at every point."""
+    done = ~found.failed
+    total = int(done.sum())
+    errors, simplest = found["errors"][done], found["simplest"][done]
+    steps = []
+    for k, rung in enumerate(rungs):
+        known = errors[:, k]
+        serves, first = int((known <= tol).sum()), int((simplest == rung.name).sum())
+        verdict = ADEQUATE if serves == total else NOT_ADEQUATE if serves else NOT_APPLICABLE
+        if not np.isfinite(known).any():
+            verdict = NOT_APPLICABLE
+        elif verdict == NOT_APPLICABLE:
+            verdict = NOT_ADEQUATE
+        why = f"serves at {serves} of {total} points, is the simplest at {first}"
+        steps.append(Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why))
+    alone = int((simplest == FULL).sum())
+    steps.append(
+        Step(FULL, FULL, "nothing", None, 0.0, math.nan, FULL, f"needed at {alone} of {total} points")
+    )
+    return steps

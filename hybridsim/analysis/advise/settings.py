@@ -1,0 +1,150 @@
+"""Which integrator setting answers a question within the tolerance, and at what cost: each is run, none is guessed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from hybridsim.analysis.advise.ladder import asked, relative_error
+from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
+from hybridsim.errors import HybridsimError
+from hybridsim.model import Model
+
+# From loose to tight: each family is followed until it is within the tolerance, so that its cheapest is found.
+_RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
+_STEPS = (75, 300, 1200, 4800)  # a period; 1200 is the published one
+_FAMILIES: tuple[tuple[str, str], ...] = (
+    ("exact", ""),
+    ("dop853", "rtol"),
+    ("tsit5", "rtol"),
+    ("rk4-dichotomy", "steps"),
+    ("rk4-sign", "steps"),
+)
+_SHOOTING = "steady_state"
+_FEWEST, _MOST = 8, 2000  # periods of settling
+_SHARE = 0.01  # of the tolerance: what settling may leave over
+_RUN_STEPS = 100  # periods that a run without a period is taken to have, for fixed steps
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to run the full model.
+
+    Parameters
+    ----------
+    integrator, options : as for `simulate`; "steady_state" is the call of that name.
+    value, error : of the quantity; the error is relative to the accurate value.
+    seconds : measured.
+    is_adequate : whether it is within the tolerance.
+    why : what went wrong, if anything.
+    """
+
+    integrator: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    value: Number | None = None
+    error: float = math.inf
+    seconds: float = math.nan
+    is_adequate: bool = False
+    why: str = ""
+
+    @property
+    def title(self) -> str:
+        """Integrator and options in a line."""
+        return " ".join([self.integrator, *(f"{name}={value:g}" for name, value in self.options.items())])
+
+
+@dataclass(frozen=True)
+class _Settling:
+    """How long a run has to be, and how much of its end is read."""
+
+    question: Question
+    span: tuple[float, float]
+    save: str | float
+    step_base: float
+
+    def ask(self, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
+        import time
+
+        from hybridsim.simulate import simulate
+
+        given = dict(options)
+        if "steps" in given:
+            given = {"step": self.step_base / given["steps"]}
+        began = time.perf_counter()
+        try:
+            solution = simulate(model, self.span, integrator=name, save=self.save, **given)
+            if not solution.success:
+                raise NoAnswer(f"{solution.status}: {solution.message}")
+            run = OverRun(solution)
+            if self.question.t_span is None:
+                run.period = solution.t_end - solution.t_start  # type: ignore[attr-defined]
+            value = self.question.read(run)
+        except HybridsimError as error:
+            raise NoAnswer(error.message) from error
+        return Answer(value, time.perf_counter() - began, run)
+
+
+def settings(
+    model: Model,
+    question: Question,
+    motion: Any,
+    full: Number,
+    tol: float,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Setting, ...]:
+    """Every family from its loosest setting on until one is within the tolerance, quickest adequate one first."""
+    found = []
+    if question.t_span is None:
+        loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
+        found.append(_measured(_SHOOTING, {}, lambda: asked(loose, model), full, tol))
+    if question.function is None or question.t_span is not None:
+        settling = _settling(question, motion, tol)
+        for name, option in _FAMILIES:
+            values: tuple[float, ...] = {"rtol": _RTOLS, "steps": _STEPS}.get(option, (0.0,))
+            for value in values:
+                options = {option: value} if option else {}
+                if progress is not None:
+                    progress(f"{name} {value:g}" if option else name)
+                one = _measured(name, options, lambda: _twice(settling, model, name, options), full, tol)
+                found.append(one)
+                if one.is_adequate or one.value is None:
+                    break
+    return tuple(sorted(found, key=lambda s: (not s.is_adequate, math.isnan(s.seconds), s.seconds)))
+
+
+def _twice(settling: _Settling, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
+    first = settling.ask(model, name, options)
+    second = settling.ask(model, name, options) if first.seconds < 20.0 else first
+    return min(first, second, key=lambda answer: answer.seconds)
+
+
+def _measured(
+    name: str, options: Mapping[str, Any], ask: Callable[[], Answer], full: Number, tol: float
+) -> Setting:
+    try:
+        answer = ask()
+    except NoAnswer as reason:
+        return Setting(name, options, why=str(reason))
+    error = relative_error(answer.value, full)
+    return Setting(name, options, answer.value, error, answer.seconds, error <= tol)
+
+
+def _settling(question: Question, motion: Any, tol: float) -> _Settling:
+    """A run from the model's start that is long enough: by how fast the slowest disturbance decays."""
+    if question.t_span is not None:
+        t0, t1 = question.t_span
+        return _Settling(question, (t0, t1), "all", (t1 - t0) / _RUN_STEPS)
+    period = motion.period if math.isfinite(motion.period) else motion.solution.t_end - motion.solution.t_start
+    try:
+        slowest = float(max(abs(motion.multipliers), default=0.0))
+    except HybridsimError:
+        slowest = 1.0
+    if slowest <= 0.0:
+        count = _FEWEST
+    elif slowest >= 1.0:
+        count = _MOST
+    else:
+        count = min(max(math.ceil(math.log(_SHARE * tol) / math.log(slowest)), _FEWEST), _MOST)
+    return _Settling(question, (0.0, count * period), period, period)

@@ -1,0 +1,76 @@
+"""An advice as text."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.advise.ladder import NOT_APPLICABLE
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.advise.advice import Advice
+    from hybridsim.analysis.advise.ladder import Step
+
+
+def table(advice: Advice) -> str:
+    """Heading, certificates, ladder, settings, remarks."""
+    lines = [f"{advice.quantity} of {advice.model.name} within {advice.tol:g}: {_conclusion(advice)}"]
+    lines += [f"  by theory: {text}" for text in advice.certificates]
+    lines += ["", *_columns(_ladder(advice))]
+    if advice.settings:
+        lines += ["", *_columns(_settings(advice))]
+    if advice.spread is not None:
+        lines += ["", _spread(advice)]
+    if advice.remarks:
+        lines += ["", *advice.remarks]
+    return "\n".join(lines)
+
+
+def _conclusion(advice: Advice) -> str:
+    if advice.region is not None:
+        return f"over {' x '.join(f'{len(v)} {n}' for n, v in advice.region.axes.items())}"
+    simplest, setting = advice.simplest, advice.integrator
+    how = f"; run the full model by {setting.title}" if setting is not None else ""
+    return f"{simplest.title} is enough{how}"
+
+
+def _ladder(advice: Advice) -> list[tuple[str, ...]]:
+    rows = [("rung", "value", "error", "cost", "verdict", "why")]
+    return rows + [_row(step) for step in advice.ladder]
+
+
+def _row(step: Step) -> tuple[str, ...]:
+    value = "" if step.value is None or _is_nan(step.value) else f"{step.value:.7g}"
+    error = "" if step.verdict == NOT_APPLICABLE or (step.value is None) else f"{step.error:.2e}"
+    return (step.name, value, error, _cost(step.seconds), step.verdict, step.why)
+
+
+def _settings(advice: Advice) -> list[tuple[str, ...]]:
+    rows = [("full model by", "value", "error", "cost", "verdict", "why")]
+    for s in advice.settings:
+        value = "" if s.value is None else f"{s.value:.7g}"
+        error = "" if s.value is None else f"{s.error:.2e}"
+        rows.append((s.title, value, error, _cost(s.seconds), "adequate" if s.is_adequate else "not adequate", s.why))
+    return rows
+
+
+def _spread(advice: Advice) -> str:
+    spread = advice.spread
+    assert spread is not None
+    ranges = ", ".join(f"{name} in [{low:g}, {high:g}]" for name, (low, high) in spread.ranges.items())
+    return f"with {ranges}: {spread.low:.7g} to {spread.high:.7g}, +-{spread.relative:.2g} of the value"
+
+
+def _cost(seconds: float) -> str:
+    if math.isnan(seconds):
+        return ""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
+def _is_nan(value: float | complex) -> bool:
+    return value != value
+
+
+def _columns(rows: list[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -1,0 +1,66 @@
+"""How far the quantity itself is known, when parameters are known in ranges only."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hybridsim.analysis.advise.question import Number, Question
+from hybridsim.arguments import is_row, number
+from hybridsim.errors import UsageError
+from hybridsim.model import Model
+
+_MOST = 6  # ranges: 2**6 corners are as many runs
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The quantity over the corners of a box of parameters.
+
+    low, high : least and greatest value found. relative : half of the difference, in units of the full model's value.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+    low: float
+    high: float
+    relative: float
+
+
+def ranges_of(given: Any) -> dict[str, tuple[float, float]]:
+    """Ranges by parameter, checked."""
+    if not isinstance(given, Mapping) or not given:
+        raise UsageError(f"uncertain is {given!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}")
+    if len(given) > _MOST:
+        raise UsageError(f"uncertain has {len(given)} ranges", remedy=f"give at most {_MOST}")
+    found = {}
+    for name, ends in given.items():
+        if not is_row(ends) or len(ends) != 2:
+            raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high)")
+        low, high = (number(end, f"an end of the range of {name}") for end in ends)
+        if not low < high:
+            raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high) with low < high")
+        found[str(name)] = (low, high)
+    return found
+
+
+def spread(
+    model: Model, question: Question, full: Number, ranges: Mapping[str, tuple[float, float]]
+) -> Spread:
+    """The quantity at the corners of the ranges, and at both ends of each with the others as declared."""
+    values = [abs(full) if isinstance(full, complex) else full]
+    for point in _points(ranges):
+        value = question.ask(model.with_(**point)).value
+        values.append(abs(value) if isinstance(value, complex) else value)
+    low, high = min(values), max(values)
+    half = 0.5 * (high - low)
+    relative = half / abs(full) if full != 0 else float("inf") if half else 0.0
+    return Spread(dict(ranges), low, high, relative)
+
+
+def _points(ranges: Mapping[str, tuple[float, float]]) -> Sequence[dict[str, float]]:
+    names = list(ranges)
+    corners = [dict(zip(names, ends, strict=True)) for ends in itertools.product(*ranges.values())]
+    alone = [{name: end} for name in names for end in ranges[name]] if len(names) > 1 else []
+    return [*corners, *alone]

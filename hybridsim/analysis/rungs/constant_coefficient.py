@@ -1,0 +1,62 @@
+"""Rungs with one constant coefficient of friction in place of a law of the speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hybridsim.analysis.rungs.forces import with_parameters
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.expr import parse, substitute
+from hybridsim.model import Contact, Model
+from hybridsim.model.law import SPEED
+
+_MEAN = "mean_speed"
+
+
+def _need_velocity_law(model: Model) -> None:
+    need_contacts(model)
+    if not any(SPEED in contact.law.slip.names for contact in model.contacts):
+        raise DoesNotApply("no friction force depends on the speed")
+
+
+class ConstantAtRest(Rung):
+    """slip := stick := slip(0)."""
+
+    name = "constant-mu-at-rest"
+    title = "constant mu, of the force at rest"
+    drops = "how friction changes with speed: the force is the law's at v = 0"
+
+    def apply(self, scene: Scene) -> Model:
+        """The model with Coulomb's law at the force of slow sliding."""
+        model = scene.model
+        _need_velocity_law(model)
+        contacts = tuple(_constant(contact, "0") for contact in model.contacts)
+        return replace(model, contacts=contacts, title=f"{model.title or model.name}, constant mu (at rest)")
+
+
+class ConstantAtMeanSpeed(Rung):
+    """slip := stick := slip(mean speed of sliding in the full motion)."""
+
+    name = "constant-mu-mean"
+    title = "constant mu, of the force at the mean sliding speed"
+    drops = "how friction changes with speed: the force is the law's at the mean speed of sliding"
+
+    def apply(self, scene: Scene) -> Model:
+        """The model with Coulomb's law at the force of the mean speed, a parameter for each contact."""
+        model = scene.model
+        _need_velocity_law(model)
+        if any(not scene.speed.get(contact.name) for contact in model.contacts):
+            raise DoesNotApply("nothing slides in the full motion, so there is no mean speed")
+        wishes = {f"{_MEAN}_{c.name}": scene.speed[c.name] for c in model.contacts}
+        changed, names = with_parameters(model, wishes)
+        contacts = tuple(_constant(c, _MEAN, names[f"{_MEAN}_{c.name}"]) for c in model.contacts)
+        return replace(changed, contacts=contacts, title=f"{model.title or model.name}, constant mu (mean)")
+
+
+def _constant(contact: Contact, speed: str, parameter: str | None = None) -> Contact:
+    law = contact.law
+    force = substitute(law.slip, {SPEED: parse(speed)})
+    parameters = dict(law.parameters) | ({speed: None} if parameter else {})
+    arguments = dict(contact.arguments) | ({speed: parse(parameter)} if parameter else {})
+    fixed = replace(law, name=f"{law.name}, constant", slip=force, stick=force, parameters=parameters)
+    return replace(contact, law=fixed, arguments=arguments)

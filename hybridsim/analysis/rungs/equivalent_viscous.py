@@ -1,0 +1,148 @@
+"""The rung of equivalent viscous damping: one-term harmonic balance, solved together with the motion it gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hybridsim.analysis.rungs.describing import FirstHarmonic
+from hybridsim.analysis.rungs.forces import with_forces, with_parameters
+from hybridsim.analysis.rungs.linear_response import LinearResponse, NotLinear
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.errors import HybridsimError
+from hybridsim.expr import parse, substitute
+from hybridsim.model import Model, Output
+
+Response = Callable[[np.ndarray], np.ndarray]
+
+_SOLVED = 1e-12  # relative change of the dampers at which they are solved for
+_MOST, _MOST_RUNS = 5000, 60  # rounds with a linear response, and with runs
+_BELOW, _NO_END = 1e3, 1e15  # where a search begins, and where it is given up, in dampers of the free motion
+_ONE_WAY = 1e-6  # a mean velocity below that part of its amplitude is none
+_DRIFTS = "a contact slides one way on average: friction is no damper of its vibration"
+_NOTHING = "the balance has no motion: it says that friction stops everything"
+
+
+class EquivalentViscous(Rung):
+    """f = c_eq v with c_eq = F1(V)/V, F1 the first harmonic of friction while v is a cosine of amplitude V.
+
+    For Coulomb friction c_eq = 4 mu N/(pi V): a damper that takes as much work per cycle. V is the first harmonic of
+    the relative velocity in the steady motion of the model with these dampers, at the forcing's period; both are
+    solved for together, for all contacts.
+    """
+
+    name = "viscous"
+    title = "equivalent viscous damping"
+    drops = "stick and all harmonics of friction: a damper takes the same work per cycle at the forcing's frequency"
+
+    def apply(self, scene: Scene) -> Model:
+        """The model with a damper in place of each contact."""
+        model = scene.model
+        need_contacts(model)
+        period = _period(model)
+        forces = [FirstHarmonic(model, contact) for contact in model.contacts]
+        wishes = {f"c_eq_{c.name}": 0.0 for c in model.contacts}
+        changed, names = with_parameters(model, wishes)
+        dampers = {
+            c.name: substitute(parse("c*(v)"), {"c": parse(names[f"c_eq_{c.name}"]), "v": c.velocity})
+            for c in model.contacts
+        }
+        viscous = with_forces(changed, dampers, "viscous", "equivalent viscous damping")
+        order = [names[wish] for wish in wishes]
+        try:
+            response = LinearResponse(model, 2.0 * math.pi / period)
+            c = _solve(response, forces, _MOST)
+            if (np.abs(response.mean(c)) > _ONE_WAY * np.abs(response(c))).any():
+                raise DoesNotApply(_DRIFTS)
+        except NotLinear:
+            c = _solve(_by_runs(viscous, model, order, period), forces, _MOST_RUNS)
+        return viscous.with_(**dict(zip(order, c.tolist(), strict=True)))
+
+
+def _period(model: Model) -> float:
+    from hybridsim.engine.period import system_period
+    from hybridsim.engine.recent import system_of
+
+    period = system_period(system_of(model))
+    if period is None:
+        raise DoesNotApply("there is no forcing of one period, whose harmonics could be balanced")
+    return period
+
+
+def _by_runs(viscous: Model, model: Model, names: list[str], period: float) -> Response:
+    """The response of a model that is not linear, from its own steady state."""
+    from hybridsim.analysis.steady import steady_state
+
+    velocities = {f"{n}_v": c.velocity for n, c in zip(names, model.contacts, strict=True)}
+    seen = replace(viscous, outputs=(*viscous.outputs, *(Output(n, e) for n, e in velocities.items())))
+
+    def response(c: np.ndarray) -> np.ndarray:
+        try:
+            steady = steady_state(seen.with_(**dict(zip(names, c.tolist(), strict=True))), tol=1e-9)
+        except HybridsimError as error:
+            raise DoesNotApply(f"the model with dampers has no steady motion: {error.message}") from error
+        if not steady.success or steady.multiple > 1:
+            raise DoesNotApply(f"the model with dampers has no motion of the forcing's period: {steady.message}")
+        found = np.array([steady.harmonic(name, 1) for name in velocities])
+        for name, wave in zip(velocities, found, strict=True):
+            if abs(steady.mean[name]) > _ONE_WAY * abs(wave):
+                raise DoesNotApply(_DRIFTS)
+        return found
+
+    return response
+
+
+def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
+    """The dampers (contacts,) that agree with the motion they give.
+
+    From small dampers up, so that of several solutions that of the largest motion is found: one of them by bisection
+    of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c), each taken half way in the logarithm.
+    """
+    c = _first(response, forces)
+    if len(c) == 1:
+        return _solve_one(lambda value: _wanted(response, forces, np.array([value]))[0], float(c[0]))
+    largest = _NO_END * c
+    for _ in range(most):
+        wanted = _wanted(response, forces, c)
+        if (np.abs(wanted - c) <= _SOLVED * wanted).all():
+            return wanted
+        c = np.sqrt(c * wanted)
+        if (c > largest).any():
+            raise DoesNotApply(_NOTHING)
+    raise DoesNotApply(f"the balance is not solved after {most} rounds")
+
+
+def _solve_one(wanted: Callable[[float], float], start: float) -> np.ndarray:
+    from scipy.optimize import brentq
+
+    low = start / _BELOW
+    if wanted(low) < low:
+        raise DoesNotApply("the balance has no solution above a thousandth of the damper of the free motion")
+    high = 2.0 * low
+    while wanted(high) > high:
+        low, high = high, 2.0 * high
+        if high > _NO_END * start:
+            raise DoesNotApply(_NOTHING)
+    root = brentq(lambda z: math.log(wanted(math.exp(z))) - z, math.log(low), math.log(high), xtol=_SOLVED)
+    return np.array([math.exp(root)])
+
+
+def _wanted(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> np.ndarray:
+    speeds = np.abs(response(c))
+    if not (np.isfinite(speeds) & (speeds > 0.0)).all():
+        raise DoesNotApply(_NOTHING)
+    return np.array([force(float(v)) / v for force, v in zip(forces, speeds, strict=True)])
+
+
+def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
+    """Dampers of the motion without friction; where that has no bound, of one with next to no damping."""
+    try:
+        found = _wanted(response, forces, np.zeros(len(forces)))
+    except (np.linalg.LinAlgError, DoesNotApply):
+        found = _wanted(response, forces, np.full(len(forces), 1e-6))
+    if not (found > 0.0).all():
+        raise DoesNotApply("a contact without load has no friction to stand for")
+    return found

@@ -1,0 +1,49 @@
+"""A model whose contacts are replaced by given forces: the modes of friction are gone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from hybridsim.expr import Expression, substitute
+from hybridsim.model import Component, Mode, Model, Parameter
+
+
+def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
+    """The model with a component of one mode for each contact, which sets its force to an expression."""
+    components = tuple(Component(c.name, (Mode(mode, set={c.name: forces[c.name]}),)) for c in model.contacts)
+    outputs = tuple(
+        replace(output, modes={p: e for p, e in output.modes.items() if p.split(".")[0] not in forces})
+        for output in model.outputs
+    )
+    return replace(
+        model,
+        contacts=(),
+        components=(*components, *model.components),
+        outputs=outputs,
+        title=f"{model.title or model.name}, {title}",
+    )
+
+
+def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
+    """The model with more parameters, and the free name that each wish got."""
+    taken = {p.name for p in model.parameters} | {i.name for i in model.inputs} | set(model.variables())
+    taken |= {s.name for s in model.states} | {d.name for d in model.discrete}
+    taken |= {name for name, _ in model.definitions}
+    names = {}
+    for wish in wishes:
+        name = wish
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        names[wish] = name
+    more = tuple(Parameter(names[wish], value) for wish, value in wishes.items())  # type: ignore[arg-type]
+    return replace(model, parameters=(*model.parameters, *more)), names
+
+
+def inlined(model: Model, expression: Expression) -> Expression:
+    """An expression with the model's definitions put in."""
+    definitions = dict(model.definitions)
+    while used := expression.names & definitions.keys():
+        expression = substitute(expression, {name: definitions[name] for name in used})
+    return expression

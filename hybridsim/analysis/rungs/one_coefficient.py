@@ -1,0 +1,54 @@
+"""The rung without static friction above kinetic: mu_s := mu_k."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.expr import evaluate, parse, substitute
+from hybridsim.model import Contact, Model
+from hybridsim.model.law import SPEED
+
+_TRIALS = 4  # points at which a jump at rest is looked for; one would do but for accidents
+
+
+class OneCoefficient(Rung):
+    """stick := slip(0), for every contact that holds more at rest than it slides with."""
+
+    name = "mu_s=mu_k"
+    title = "mu_s := mu_k"
+    drops = "static friction above kinetic: a body breaks loose at the force with which it slides"
+
+    def apply(self, scene: Scene) -> Model:
+        """The model with the limit of stick lowered to the force of slow sliding."""
+        model = scene.model
+        need_contacts(model)
+        jumps = [_jumps(model, contact) for contact in model.contacts]
+        if not any(jumps):
+            raise DoesNotApply("no contact holds more at rest than it slides with")
+        contacts = tuple(
+            _lowered(contact) if jump else contact
+            for contact, jump in zip(model.contacts, jumps, strict=True)
+        )
+        return replace(model, contacts=contacts, title=f"{model.title or model.name}, mu_s := mu_k")
+
+
+def _lowered(contact: Contact) -> Contact:
+    at_rest = substitute(contact.law.slip, {SPEED: parse(0)})
+    return replace(contact, law=replace(contact.law, name=f"{contact.law.name} mu_s := mu_k", stick=at_rest))
+
+
+def _jumps(model: Model, contact: Contact) -> bool:
+    surface = contact.component(model.constant_names()).surface
+    assert surface is not None  # every contact has one
+    jump, values, draw = surface.jump_above, model.parameter_values(), random.Random(0)
+    definitions = dict(model.definitions)
+    while used := jump.names & definitions.keys():
+        jump = substitute(jump, {name: definitions[name] for name in used})
+    for _ in range(_TRIALS):
+        others = {name: draw.uniform(0.5, 1.5) for name in sorted(jump.names - values.keys())}
+        size = evaluate(jump, {**values, **others})
+        if abs(size) > 1e-12 * max(abs(v) for v in (1.0, *values.values())):
+            return True
+    return False

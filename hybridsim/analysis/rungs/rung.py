@@ -1,0 +1,63 @@
+"""What a rung is: a model made simpler on purpose, with what it drops in words, and where it does not apply."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+
+class DoesNotApply(Exception):
+    """A rung cannot stand for a model; the text says why."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The full model and what is known of its motion, from which a rung takes the numbers it needs.
+
+    Parameters
+    ----------
+    model : the full model.
+    speed : mean speed of each contact while it slides, of the full motion; empty where it is not known.
+    peak : the largest speed of any contact in the full motion.
+    v0 : width of a regularised force; a hundredth of ``peak`` unless given.
+    """
+
+    model: Model
+    speed: Mapping[str, float] = field(default_factory=dict)
+    peak: float | None = None
+    v0: float | None = None
+
+
+class Rung(ABC):
+    """A simpler model: a transformation Model -> Model, or a formula in place of one.
+
+    name : one word for options and maps.
+    title, drops : what it is, and what the full model has that it has not.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    drops: ClassVar[str]
+
+    @abstractmethod
+    def apply(self, scene: Scene) -> Model | Any:
+        """The simpler model; of a formula a motion with the measures of a steady state.
+
+        Errors
+        ------
+        DoesNotApply with the reason.
+        """
+
+    def __repr__(self) -> str:
+        return f"<Rung {self.name}: {self.title}>"
+
+
+def need_contacts(model: Model) -> None:
+    """Rungs are about friction: without a contact there is nothing to drop."""
+    if not model.contacts:
+        raise DoesNotApply("the model has no contact")
