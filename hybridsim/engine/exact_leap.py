@@ -14,6 +14,7 @@ from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
+from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
     first_zero,
     first_zero_of_wave,
@@ -25,7 +26,6 @@ from hybridsim.engine.linear_kernels import (
     states_of,
     to_modal,
 )
-from hybridsim.engine.linear_tables import TERMS
 from hybridsim.engine.ordinary_event import Before, find_modes, put
 from hybridsim.engine.segment_end import is_crowded, moved_on, settle_and_move_on, state_errors
 

@@ -11,7 +11,8 @@ from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.exact_leap import Record, Room, exact_leap
 from hybridsim.engine.leap import AT_TARGET, FULL
-from hybridsim.engine.linear_tables import TERMS, LinearTables, tables_of
+from hybridsim.engine.linear_guards import TERMS
+from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.outcome import Outcome

@@ -7,11 +7,14 @@ such polynomials, so the states and the monomials that occur obey one linear sys
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+import operator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.engine.recipe import Traced
 from hybridsim.engine.stepping import StepFailure
 from hybridsim.engine.tape import (
     ABS,
@@ -37,6 +40,7 @@ Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else
 Monomial = tuple[Factor, ...]  # sorted; () is 1
 Key = int | Monomial  # a state's index, or a monomial over atoms
 Form = dict[Key, float]
+Read = Form | float  # a register that is one number is kept as that
 
 _ONE: Monomial = ()
 _PAIRED = (SINCOS, SINHCOSH, TANGENT)
@@ -106,7 +110,10 @@ class LinearReader:
     """Linear forms of the registers of one tape, at given values of the parameters.
 
     constants: (register, value); parameters: (register, source in p); varying: sources that differ from segment to
-    segment; p: the run-time vector, of which only the other sources are read.
+    segment; p: the run-time vector, of which only the other sources are read, as numbers or as numbers of a
+    `hybridsim.engine.recipe`. None: for whatever values. A parameter is then NaN, and so is all that is made of it
+    alone; a condition on that is none that can be read. What is a linear form so is one at any values, since these can
+    only let terms vanish.
     """
 
     def __init__(
@@ -117,23 +124,25 @@ class LinearReader:
         constants: Iterable[tuple[int, float]],
         parameters: Iterable[tuple[int, int]],
         varying: range,
-        p: np.ndarray,
+        p: Sequence[float] | None,
     ) -> None:
-        self.atoms = atoms
-        self.forms: dict[int, Form | NotLinear] = {time: {((0, 0),): 1.0}}
+        self.atoms, self.is_open = atoms, p is None
+        self.forms: dict[int, Read | NotLinear] = {time: {((0, 0),): 1.0}}
         self.forms |= {register: {i: 1.0} for i, register in enumerate(states)}
-        for register, value in constants:
-            self.forms[register] = _constant(value)
+        self.forms |= constants
         for register, source in parameters:
             if source in varying:
                 value_of = Atom(VALUE, 0.0, 0.0, ((source, 1.0),))
                 self.forms[register] = {((atoms.number(value_of), 0),): 1.0}
             else:
-                self.forms[register] = _constant(float(p[source]))
+                self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
         """Add the results of these rows; what is no linear form is kept as the reason."""
         for op, a, b, c, out in rows:
+            if op == COPY:
+                self.forms[out] = self.forms[a]
+                continue
             try:
                 found = self._apply(op, a, b, c)
             except NotLinear as reason:
@@ -147,50 +156,68 @@ class LinearReader:
 
     def form(self, register: int) -> Form:
         """The linear form of a register; raises NotLinear."""
+        return _form(self._read(register))
+
+    def _read(self, register: int) -> Read:
         found = self.forms[register]
         if isinstance(found, NotLinear):
             raise found
         return found
 
-    def _apply(self, op: int, a: int, b: int, c: int) -> tuple[Form, ...]:
+    def _apply(self, op: int, a: int, b: int, c: int) -> tuple[Read, ...]:
+        first = self._read(a)
         if op == SELECT:
-            condition = _number(self.form(a))
-            if condition is None:
+            if isinstance(first, dict) or (self.is_open and math.isnan(first)):
                 raise NotLinear("a condition that changes")
-            return (self.form(b) if condition != 0.0 else self.form(c),)
-        given = [self.form(a)] if op in (COPY, *_SINGLE) else [self.form(a), self.form(b)]
-        numbers = [_number(form) for form in given]
-        if op != COPY and None not in numbers:
-            return self._evaluated(op, b, c, [float(v) for v in numbers if v is not None])
-        if op == COPY:
-            return (given[0],)
-        if op == NEG:
-            return ({key: -weight for key, weight in given[0].items()},)
+            return (self._read(b) if first != 0.0 else self._read(c),)
+        if op in _SINGLE:
+            if isinstance(first, float):
+                return self._evaluated(op, b, c, first)
+            return self._of_form(op, first)
+        second = self._read(b)
+        if isinstance(first, float) and isinstance(second, float):
+            if op in _ARITHMETIC and (op != DIV or second != 0.0):
+                return (_ARITHMETIC[op](first, second),)
+            return self._evaluated(op, b, c, first, second)
         if op in (ADD, SUB):
-            return (_sum(given[0], given[1], 1.0 if op == ADD else -1.0),)
+            return (_plain(_sum(_form(first), _form(second), 1.0 if op == ADD else -1.0)),)
         if op == MUL:
-            return (_product(given[0], given[1]),)
-        if op == DIV and numbers[1] is not None:
-            return ({key: weight / numbers[1] for key, weight in given[0].items()},)
+            return (_plain(_product(_form(first), _form(second))),)
+        if op == DIV and isinstance(first, dict) and isinstance(second, float):
+            if second == 0.0:
+                raise NotLinear("a quotient by zero")
+            return (_plain({key: weight / second for key, weight in first.items()}),)
+        raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
+
+    def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
+        """An operation of one operand that is no number."""
+        if op == NEG:
+            return ({key: -weight for key, weight in form.items()},)
         if op == SINCOS:
-            number = self.atoms.number(_linear_atom(ANGLE, given[0], self.atoms))
+            number = self.atoms.number(_linear_atom(ANGLE, form, self.atoms))
             return {((number, 0),): 1.0}, {((number, 1),): 1.0}
         if op == EXP:
-            return ({((self.atoms.number(_linear_atom(GROWTH, given[0], self.atoms)), 0),): 1.0},)
-        raise NotLinear(_IN_THE_WAY.get(op, "a corner, a jump or another function of what moves"))
+            return ({((self.atoms.number(_linear_atom(GROWTH, form, self.atoms)), 0),): 1.0},)
+        raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
-    def _evaluated(self, op: int, b: int, c: int, values: list[float]) -> tuple[Form, ...]:
+    def _evaluated(self, op: int, b: int, c: int, *values: float) -> tuple[Read, ...]:
         """An operation on numbers; b and c are flags where there is one operand."""
+        if op == NEG:
+            return (-values[0],)
+        if self.is_open and any(map(math.isnan, values)):
+            return (math.nan, math.nan) if op in _PAIRED else (math.nan,)
+        for value in values:
+            if isinstance(value, Traced):
+                found = value.numbers.operation(op, values, b, c)
+                return found if op in _PAIRED else found[:1]
         V = np.zeros((4, 1))
         V[: len(values), 0] = values
         advance(np.array([[op, 0, 1 if len(values) > 1 else b, c, 2]], dtype=np.int64), V, 0)
-        return (
-            (_constant(float(V[2, 0])), _constant(float(V[3, 0])))
-            if op in _PAIRED
-            else (_constant(float(V[2, 0])),)
-        )
+        return (float(V[2, 0]), float(V[3, 0])) if op in _PAIRED else (float(V[2, 0]),)
 
 
+_ARITHMETIC = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv}
+_OTHER = "a corner, a jump or another function of what moves"
 _IN_THE_WAY = {
     DIV: "a quotient by what moves",
     SQRT: "a root of what moves",
@@ -199,15 +226,17 @@ _IN_THE_WAY = {
 }
 
 
-def _constant(value: float) -> Form:
-    return {_ONE: value} if value != 0.0 else {}
+def _form(read: Read) -> Form:
+    if isinstance(read, dict):
+        return read
+    return {_ONE: read} if read != 0.0 else {}
 
 
-def _number(form: Form) -> float | None:
-    """The value of a form that is one number; None for any other."""
+def _plain(form: Form) -> Read:
+    """A form that is one number as that."""
     if not form:
         return 0.0
-    return form[_ONE] if len(form) == 1 and _ONE in form else None
+    return form[_ONE] if len(form) == 1 and _ONE in form else form
 
 
 def _sum(a: Form, b: Form, sign: float) -> Form:
@@ -248,4 +277,4 @@ def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
             terms += [(source, weight * w) for source, w in atoms.known[key[0][0]].terms]
         else:
             raise NotLinear("a sine or an exponential of what is not linear in time alone")
-    return Atom(kind, rate, offset, tuple(sorted(terms)))
+    return Atom(kind, rate, offset, tuple(sorted(terms, key=operator.itemgetter(0))))

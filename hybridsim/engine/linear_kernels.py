@@ -14,7 +14,7 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import allocating_kernel, inlined, kernel, polynomial_kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
-from hybridsim.engine.linear_tables import FARTHEST, TERMS
+from hybridsim.engine.linear_guards import FARTHEST, TERMS
 
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _ITERATIONS = 100

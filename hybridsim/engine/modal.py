@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from hybridsim.engine.jit import kernel
 
 _CONDITION = 1e3  # of the basis, at most: so many roundings of the state does the change of basis cost
 _SWEEPS = 8  # of balancing
@@ -33,6 +36,18 @@ class Modal:
     growth: np.ndarray
     speeds: np.ndarray
 
+    def power(self, exponent: int) -> np.ndarray:
+        """|B**exponent| (J,) of the block of each coordinate."""
+        result, first = self.speeds**exponent, 0
+        while first < len(result):
+            end = int(self.ends[first])
+            if end > first + 1:
+                here = slice(first, end)
+                block = np.diag(self.values[here]) + self.upper[here, here]
+                result[here] = np.linalg.norm(np.linalg.matrix_power(block, exponent), 2)
+            first = end
+        return result
+
 
 @dataclass(frozen=True)
 class _Cluster:
@@ -42,17 +57,97 @@ class _Cluster:
     folded: bool  # real eigenvalues are
 
 
+class Modals(NamedTuple):
+    """Block diagonal forms of many matrices: the fields of `Modal` one behind the other, filled up with zeros.
+
+    counts (K,): the coordinates of each. powers (K, J): |B**exponent| of the block, for the exponent that was asked.
+    """
+
+    counts: np.ndarray
+    values: np.ndarray
+    upper: np.ndarray
+    ends: np.ndarray
+    full_basis: np.ndarray
+    inverse: np.ndarray
+    growth: np.ndarray
+    speeds: np.ndarray
+    powers: np.ndarray
+
+
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
-    scale = _balance(A, 1.0 / horizon)
-    balanced = A * scale[None, :] / scale[:, None]
+    return Modal(*(field[0] for field in modals(A[None], horizon)[1:-1]))
+
+
+def modals(A: np.ndarray, horizon: float = math.inf, exponent: int = 1) -> Modals:
+    """The same for many matrices (K, m, m)."""
+    scales = np.ones(A.shape[:2])
+    _balance(np.abs(A), 1.0 / horizon, scales)
+    balanced = A * scales[:, None, :] / scales[:, :, None]
     values, vectors = np.linalg.eig(balanced)
+    values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
+    is_diagonal = np.zeros(len(A), dtype=np.bool_)
+    try:
+        inverses = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:  # of one of them
+        inverses = vectors
+    else:
+        # the norm of Frobenius bounds that which makes the condition; each eigenvector has norm 1
+        with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
+            squares = (inverses.real**2 + inverses.imag**2).sum(axis=(1, 2))
+            is_diagonal = A.shape[1] * squares <= _CONDITION**2
+    others = {
+        int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k])
+        for k in np.flatnonzero(~is_diagonal)
+    }
+    counts = (values.imag >= 0.0).sum(axis=1)
+    for k, flow in others.items():
+        counts[k] = len(flow.values)
+    count, size, widest = *A.shape[:2], int(counts.max(initial=0))
+    result = Modals(
+        counts,
+        np.zeros((count, widest), dtype=complex),
+        np.zeros((count, widest, widest), dtype=complex),
+        np.zeros((count, widest), dtype=np.int64),
+        np.zeros((count, size, widest), dtype=complex),
+        np.zeros((count, widest, size), dtype=complex),
+        *(np.zeros((count, widest)) for _ in range(3)),
+    )
+    _diagonal(values, vectors, inverses, scales, is_diagonal, exponent, result)
+    for k, flow in others.items():
+        for whole, part in zip(result[1:], (*vars(flow).values(), flow.power(exponent)), strict=True):
+            whole[k][tuple(slice(0, m) for m in part.shape)] = part
+    return result
+
+
+@kernel
+def _diagonal(
+    values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
+) -> None:
+    """A block for each eigenvalue, of which LAPACK gives conjugates in a row."""
+    for k in range(values.shape[0]):
+        if not chosen[k]:
+            continue
+        j, size = 0, values.shape[1]
+        for i in range(size):
+            value = values[k, i]
+            if not value.imag >= 0.0:
+                continue
+            twice = 2.0 if value.imag > 0.0 else 1.0
+            for m in range(size):
+                out.full_basis[k, m, j] = twice * vectors[k, m, i] * scales[k, m]
+                out.inverse[k, j, m] = inverses[k, i, m] / scales[k, m]
+            out.values[k, j], out.ends[k, j], out.growth[k, j] = value, j + 1, value.real
+            out.speeds[k, j] = abs(value)
+            out.powers[k, j] = out.speeds[k, j] ** exponent
+            j += 1
+
+
+def _by_blocks(balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, scale: np.ndarray) -> Modal:
+    """Eigenvalues in common blocks until the basis is well conditioned."""
     partners = _partners(values)
-    clusters = [_Cluster((i,), partners[i] == i) for i in range(len(A)) if values[i].imag >= 0.0]
-    blocks = [
-        (np.array([[values[i]]], dtype=complex), vectors[:, [i]].astype(complex))
-        for (i,) in (c.members for c in clusters)
-    ]
+    clusters = [_Cluster((i,), partners[i] == i) for i in range(len(values)) if values[i].imag >= 0.0]
+    blocks = [(np.array([[values[i]]]), vectors[:, [i]]) for (i,) in (c.members for c in clusters)]
     while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _merged(clusters, values)
         blocks = [_block(balanced, c, values, partners) for c in clusters]
@@ -68,25 +163,48 @@ def _partners(values: np.ndarray) -> list[int]:
     return partners
 
 
-def _balance(A: np.ndarray, slowest: float) -> np.ndarray:
-    """Powers of two that make rows and columns of D^-1 A D about equally large (E. E. Osborne, J. ACM 7 (1960) 338).
+@kernel
+def _balance(sizes: Any, slowest: float, scales: Any) -> None:
+    """Powers of two, in place of ones (k, m), that make rows and columns of D^-1 A D about equally large.
+
+    After E. E. Osborne, J. ACM 7 (1960) 338; sizes (k, m, m), the absolute values of A, are used up.
 
     Their 2-norms, with the diagonal: without it couplings that are nothing beside the diagonal would be blown up, and
     its roundings with them (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). So would those below the rate
     `slowest`, which do nothing over the time at hand: exponentials that are 1 but for little would have to cancel.
     """
-    scale = np.ones(len(A))
-    size = np.abs(A) + slowest * np.eye(len(A))
-    for _ in range(_SWEEPS):
-        for i in range(len(A)):
-            others = np.arange(len(A)) != i
-            if not size[i, others].any() or not size[others, i].any():
-                continue
-            factor = 2.0 ** round(0.5 * np.log2(np.linalg.norm(size[i]) / np.linalg.norm(size[:, i])))
-            scale[i] *= factor
-            size[:, i] *= factor
-            size[i] /= factor
-    return scale
+    for k in range(sizes.shape[0]):
+        size, scale = sizes[k], scales[k]
+        m = size.shape[0]
+        for i in range(m):
+            size[i, i] += slowest
+        for _ in range(_SWEEPS):
+            moved = False
+            for i in range(m):
+                row = column = 0.0  # the largest entries off the diagonal
+                for j in range(m):
+                    if j != i:
+                        row, column = max(row, size[i, j]), max(column, size[j, i])
+                if row == 0.0 or column == 0.0:
+                    continue
+                row, column = max(row, size[i, i]), max(column, size[i, i])
+                rows = columns = 0.0
+                for j in range(m):
+                    rows += (size[i, j] / row) ** 2
+                    columns += (size[j, i] / column) ** 2
+                ratio = (row / column) * math.sqrt(rows / columns)
+                if not 0.0 < ratio < math.inf:
+                    continue
+                steps = round(0.5 * math.log2(ratio))
+                if steps != 0:
+                    moved = True
+                    factor = math.ldexp(1.0, steps)
+                    scale[i] *= factor
+                    for j in range(m):
+                        size[j, i] *= factor
+                        size[i, j] /= factor
+            if not moved:
+                break
 
 
 def _full(clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

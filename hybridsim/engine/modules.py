@@ -66,7 +66,7 @@ def compiled(model: Model) -> Compiled | PythonCode:
     """The compiled form of a model, from memory, from disk, or lowered now."""
     if model.flow is not None:
         return _code_of_functions(model)
-    name = _name(model)
+    name: str = model.once("module", lambda: _name(model))
     if name not in _loaded:
         _loaded[name] = _load(model, name)
     return _loaded[name]

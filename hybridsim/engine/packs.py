@@ -43,11 +43,11 @@ if ENABLED:
             words: list[int] = []
             for array in arrays:
                 assert array.flags.c_contiguous
-                words += (array.ctypes.data, *array.shape, *_REST[array.ndim])
+                words += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
             self.table = np.array(words, dtype=np.int64)
-            self.address = self.table.ctypes.data
+            self.address = self.table.__array_interface__["data"][0]
             kind: Any = type(arrays)
-            self.numba_type = _type_of_arrays(kind, tuple((a.dtype, a.ndim) for a in arrays))
+            self.numba_type = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self.arrays, name)
@@ -69,9 +69,9 @@ if ENABLED:
             return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
 
     @cache
-    def _type_of_arrays(kind: Any, fields: tuple[tuple[np.dtype, int], ...]) -> PackType:
+    def _type_of_arrays(kind: Any, fields: tuple[tuple[str, int], ...]) -> PackType:
         named = zip(kind._fields, fields, strict=True)
-        return PackType(kind.__name__, tuple((name, str(dtype), n) for name, (dtype, n) in named))
+        return PackType(kind.__name__, tuple((name, str(np.dtype(char)), n) for name, (char, n) in named))
 
     @typeof_impl.register(Packed)
     def _type_of(value: Packed, context: Any) -> PackType:

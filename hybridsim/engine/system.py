@@ -150,6 +150,38 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
     )
 
 
+class _Frame:
+    """What systems of one structure have in common."""
+
+    def __init__(self, model: Model, data: dict[str, Any]) -> None:
+        self.names = tuple(s.name for s in model.states)
+        self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
+        self.automata = tuple(
+            _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
+        )
+        self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
+        self.monitor_names = tuple(m.name for m in model.monitors)
+        self.owner = np.zeros(data["guard_count"], dtype=np.int64)
+        for c, automaton in enumerate(self.automata):
+            for numbers in automaton.guards:
+                self.owner[list(numbers)] = c
+        self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
+        self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
+        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
+        self.component_numbers = np.arange(len(self.automata))
+        self.guard_table = self._guard_table()
+
+    def _guard_table(self) -> np.ndarray:
+        """Guard numbers (components, modes, widest) of every mode, -1 where it has fewer."""
+        most = max((len(a.modes) for a in self.automata), default=0)
+        widest = max((len(g) for a in self.automata for g in a.guards), default=0)
+        table = np.full((len(self.automata), most, max(widest, 1)), -1, dtype=np.int64)
+        for c, automaton in enumerate(self.automata):
+            for m, numbers in enumerate(automaton.guards):
+                table[c, m, : len(numbers)] = numbers
+        return table
+
+
 class System:
     """A model with values: what integrators and the mode loop work on.
 
@@ -164,43 +196,37 @@ class System:
         self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data
-        self.names = tuple(s.name for s in model.states)
+        self._frame = frame = self.code.shared("frame", lambda: _Frame(model, data))
+        self.names: tuple[str, ...] = frame.names
         self.n = len(self.names)
-        self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
-        self.automata = tuple(
-            _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
-        )
+        self.layout: Layout = frame.layout
+        self.automata: tuple[Automaton, ...] = frame.automata
+        self.declared: tuple[Automaton, ...] = frame.declared  # those that are no corners
+        self.has_surface: np.ndarray = frame.has_surface
+        self.is_corner: np.ndarray = frame.is_corner
+        self.owner: np.ndarray = frame.owner  # component of each guard
         self.guard_count: int = data["guard_count"]
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
         self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
         self.pins: dict[int, int] = data["pins"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
         self.quantities: tuple[str, ...] = data["quantities"]
-        self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
-        self.monitor_names = tuple(m.name for m in model.monitors)
+        self.resets: dict[tuple[Any, ...], tuple[int, tuple[str, ...]]] = frame.resets
+        self.monitor_names: tuple[str, ...] = frame.monitor_names
         self.values = model.parameter_values()
         self._base = np.zeros(self.layout.size)
         self._base[: self.layout.parameters] = list(self.values.values())
         self._base[self.layout.pin_at] = 1.0
         self.rates = self._plain("rates", self._base, data["rates"])
         self.signals = tuple(Signal(i, self.values) for i in model.inputs)
-        self.owner = np.zeros(self.guard_count, dtype=np.int64)  # component of each guard
-        for c, automaton in enumerate(self.automata):
-            for numbers in automaton.guards:
-                self.owner[list(numbers)] = c
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
-        self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
-        self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
-        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
         self.has_tape: bool = data["tape"] is not None  # it is made from expressions
         if self.has_tape:
             self._registers: _Registers = self.code.shared(
                 "registers", lambda: _Registers(data["tape"], self.layout)
             )
         self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
-        self._component_numbers = np.arange(len(self.automata))
-        self._widest = max((len(g) for a in self.automata for g in a.guards), default=0)
 
     @property
     def has_corners(self) -> bool:
@@ -329,17 +355,8 @@ class System:
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
         """Active guard numbers (components, widest), -1 where a mode has fewer."""
-        return self._guard_table[self._component_numbers, z]
-
-    @cached_property
-    def _guard_table(self) -> np.ndarray:
-        """Guard numbers (components, modes, widest) of every mode."""
-        most = max((len(a.modes) for a in self.automata), default=0)
-        table = np.full((len(self.automata), most, max(self._widest, 1)), -1, dtype=np.int64)
-        for c, automaton in enumerate(self.automata):
-            for m, numbers in enumerate(automaton.guards):
-                table[c, m, : len(numbers)] = numbers
-        return table
+        numbers: np.ndarray = self._frame.guard_table[self._frame.component_numbers, z]
+        return numbers
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
         """A guard of the modes z in words."""

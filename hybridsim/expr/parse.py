@@ -103,6 +103,8 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
     """
     if isinstance(text, Expression):
         return text
+    if isinstance(text, float) and math.isfinite(text):
+        return _of_number(float(text), place)
     where = place or Place()
     text = _as_text(text, where)
     text = re.sub(r"[ \t\r\n]", " ", text).strip()
@@ -132,12 +134,20 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
     return Expression(text, names, place, tree)
 
 
+def _of_number(number: float, place: Place | None) -> Expression:
+    """The expression that the text of a number gives, without the way through the text."""
+    tree: ast.expr = ast.Constant(abs(number))
+    if math.copysign(1.0, number) < 0.0:
+        tree = ast.UnaryOp(ast.USub(), tree)
+    return Expression(repr(number), frozenset(), place, tree)
+
+
 def require_names(expr: Expression, known: Iterable[str]) -> None:
     """See to it that every name of an expression is known; else an error with the nearest ones."""
-    allowed = set(known)
-    unknown = expr.names - allowed
+    unknown = expr.names.difference(known)
     if not unknown:
         return
+    allowed = set(known)
     nodes = [n for n in ast.walk(expr.tree) if isinstance(n, ast.Name) and n.id in unknown]
     node = min(nodes, key=lambda n: n.col_offset)
     remedy = nearest(node.id, allowed | set(FUNCTIONS) | set(CONSTANTS))

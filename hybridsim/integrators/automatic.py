@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear_tables import what_is_not_linear
+from hybridsim.engine.linear_modes import what_is_not_linear
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.engine.rosenbrock_step import linearise
 from hybridsim.engine.system import System

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.exact_leaper import ExactLeaper
 from hybridsim.engine.leaper import compile_leaps
-from hybridsim.engine.linear_tables import refuse_nonlinear
+from hybridsim.engine.linear_modes import refuse_nonlinear
 from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator

@@ -17,8 +17,7 @@ Item = tuple[str, Expression, bool]
 
 def check_expressions(scope: Scope) -> None:
     """Report unknown names, wrong kinds, circles, and definitions that grow beyond bounds when put in."""
-    for what, expr in _of_parameters(scope):
-        scope.need(expr, what, scope.parameters)
+    check_given(scope)
     items = list(_of_everything(scope))
     for what, expr, boolean in items:
         scope.need(expr, what, scope.all_names, boolean=boolean)
@@ -26,6 +25,13 @@ def check_expressions(scope: Scope) -> None:
         _circles(scope)
     if not scope.errors:
         _constants(scope, items)
+
+
+def check_given(scope: Scope) -> None:
+    """Report what is wrong with the expressions that are fixed before a run begins."""
+    for what, expr in _of_parameters(scope):
+        if expr.names or expr.is_boolean:  # any other is a number
+            scope.need(expr, what, scope.parameters)
 
 
 def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hybridsim.errors import ModelError
-from hybridsim.expr import Expression, evaluate, parse
+from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared
@@ -93,7 +93,7 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
             scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative.")
             return
-    forces = contact.limit_force(), contact.slip_force(parse(0))
+    forces = contact.limit_force, contact.onset_force
     if not all(force.names <= values.keys() for force in forces):
         return
     limit, onset = (_value(scope, force, values) for force in forces)

@@ -85,8 +85,7 @@ class Contact(Declared):
         backward = self._form("-v", v=self.velocity)
         forward_slip = self.slip_force(self.velocity)
         backward_slip = self._form("-f", f=self.slip_force(backward))
-        at_rest = self.slip_force(parse(0))
-        limit = self.limit_force()
+        at_rest, limit = self.onset_force, self.limit_force
         loaded: tuple[Guard, ...] = ()
         if varies:
             message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
@@ -109,10 +108,16 @@ class Contact(Declared):
         )
         return Component(self.name, modes, surface=surface, place=self.place)
 
+    @cached_property
+    def onset_force(self) -> Expression:
+        """Magnitude of the force at the onset of slip, over the model's names."""
+        return self.slip_force(parse(0))
+
     def slip_force(self, speed: Expression) -> Expression:
         """Magnitude of the force when sliding at a speed >= 0, over the model's names."""
         return substitute(self._form("slip", slip=self.law.slip), {SPEED: speed, **self._values()})
 
+    @cached_property
     def limit_force(self) -> Expression:
         """The most that stick can carry, over the model's names."""
         return substitute(self._form("stick", stick=self.law.stick), self._values())

@@ -139,7 +139,7 @@ class Model(Declared):
         changed = (
             replace(p, value=parse(changes[p.name])) if p.name in changes else p for p in self.parameters
         )
-        return replace(self, parameters=tuple(changed))
+        return self._valued(parameters=tuple(changed))
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
@@ -152,7 +152,29 @@ class Model(Declared):
                 for part in parts
             )
 
-        return replace(self, states=changed(self.states), discrete=changed(self.discrete))
+        return self._valued(states=changed(self.states), discrete=changed(self.discrete))
+
+    def with_values_of(self, other: Model) -> Model:
+        """A copy with the values of a model that has the same parameters, states and discrete states."""
+        states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
+        return self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
+
+    def _valued(self, **parts: Any) -> Model:
+        """A copy that differs in values alone: it shares what does not depend on them, and is not taken apart again."""
+        copy: Model = object.__new__(type(self))
+        vars(copy).update(vars(self), **parts, _common=self._common)
+        vars(copy).pop("_values", None)
+        return copy
+
+    @cached_property
+    def _common(self) -> dict[str, Any]:
+        return {}
+
+    def once(self, name: str, make: Callable[[], Any]) -> Any:
+        """What follows from the declaration whatever its values are, made once for all copies with other values."""
+        if name not in self._common:
+            self._common[name] = make()
+        return self._common[name]
 
     def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
         """A copy in which every contact has a single-valued force, for a look at what that costs.
@@ -183,33 +205,39 @@ class Model(Declared):
 
     def parameter_values(self) -> dict[str, float]:
         """Numbers of all parameters; a circle among them, or a value that is not finite, is an error."""
+        return dict(self._values)
+
+    @cached_property
+    def _values(self) -> dict[str, float]:
         return resolve({parameter.name: parameter.value for parameter in self.parameters})
 
     def start_values(self) -> dict[str, float]:
         """Initial values of the states at the parameters' values."""
-        values = self.parameter_values()
-        return {state.name: evaluate(state.start, values) for state in self.states}
+        return {state.name: evaluate(state.start, self._values) for state in self.states}
 
     def discrete_values(self) -> dict[str, float]:
         """Initial values of the discrete states at the parameters' values."""
-        values = self.parameter_values()
-        return {part.name: evaluate(part.start, values) for part in self.discrete}
+        return {part.name: evaluate(part.start, self._values) for part in self.discrete}
 
     def duration_value(self) -> float | None:
         """The model's own duration at the parameters' values; None where it declares none."""
-        return None if self.duration is None else evaluate(self.duration, self.parameter_values())
+        return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
         """All automata: the contacts expanded, then the components, each in order of declaration."""
-        return self._all_components
+        components: tuple[Component, ...] = self.once("components", self._components)
+        return components
 
-    @cached_property
-    def _all_components(self) -> tuple[Component, ...]:
+    def _components(self) -> tuple[Component, ...]:
         constants = self.constant_names()
         return (*(contact.component(constants) for contact in self.contacts), *self.components)
 
     def constant_names(self) -> frozenset[str]:
         """Names that cannot change during a run: parameters, and definitions over these alone."""
+        names: frozenset[str] = self.once("constants", self._constant_names)
+        return names
+
+    def _constant_names(self) -> frozenset[str]:
         constants = {parameter.name for parameter in self.parameters}
         for _ in self.definitions:
             constants |= {name for name, expr in self.definitions if expr.names <= constants}
@@ -227,7 +255,13 @@ class Model(Declared):
         """
         from hybridsim.model.structure import structure
 
-        return structure(self)
+        text: str = self.once("structure", lambda: structure(self))
+        return text
+
+    @property
+    def is_known_to_be_sound(self) -> bool:
+        """Whether a check of this model, or of a copy with other values, found no fault but in values."""
+        return "is sound" in self._common
 
     def validate(self) -> Model:
         """See to it that the declaration holds together; returns the model itself.

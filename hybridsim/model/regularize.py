@@ -105,7 +105,7 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     left the band.
     """
     name, velocity, loaded = contact.name, contact.velocity, _loaded(model, contact)
-    held, limit, width = parse(_holding(name)), contact.limit_force(), parse(v0)
+    held, limit, width = parse(_holding(name)), contact.limit_force, parse(v0)
     backward = _form("-velocity", velocity=velocity)
     parts = {"velocity": velocity, "v0": width, "held": held, "limit": limit}
     up, down = _form("held > limit", **parts), _form("-held > limit", **parts)

@@ -76,6 +76,8 @@ class Scope:
     def need(self, expr: Expression, what: str, known: Iterable[str], *, boolean: bool = False) -> None:
         """Report unknown names in an expression, and a number where a condition is wanted or the reverse."""
         allowed = frozenset(known)
+        if expr.names <= allowed and (expr.is_boolean == boolean or isinstance(expr, FunctionExpression)):
+            return  # a function is seen when it is called
         misplaced = sorted((expr.names - allowed) & self.all_names)
         try:
             if misplaced:
@@ -84,8 +86,6 @@ class Scope:
                 remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
                 raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
             require_names(expr, allowed)
-            if isinstance(expr, FunctionExpression):
-                return  # what it gives is seen when it is called
             if boolean and not expr.is_boolean:
                 raise expr.error(f"'{expr.text}' is a number", remedy="a condition is needed, e.g. 'x > 0'.")
             if expr.is_boolean and not boolean:

@@ -40,9 +40,16 @@ class Smoothed:
 
 def smoothed(model: Model) -> Model:
     """The model with its corners as components; the model itself where there is none."""
-    if model.flow is not None or not uses_primitives(model):
+    if model.flow is not None:
         return model
-    return smoothing_of(model).model
+    found: Model | None = model.once("smoothed", lambda: _smoothed(model))
+    return model if found is None else found.with_values_of(model)
+
+
+def _smoothed(model: Model) -> Model | None:
+    """None where there is no corner; the same model but for its values, whatever these are."""
+    result = smoothing_of(model).model if uses_primitives(model) else model
+    return None if result is model else result
 
 
 def smoothing_of(model: Model) -> Smoothed:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from hybridsim.errors import ModelError
 from hybridsim.model.check_automata import check_automata
 from hybridsim.model.check_contacts import check_contacts
-from hybridsim.model.check_expressions import check_expressions
+from hybridsim.model.check_expressions import check_expressions, check_given
 from hybridsim.model.check_functions import check_functions
 from hybridsim.model.check_names import check_names
 from hybridsim.model.check_signals import check_signals
@@ -23,8 +23,15 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
 
     Names come first, then how the parts fit together, then the expressions; values are only looked at where
     all of that is sound, since they would repeat the same faults in other words.
+
+    In a copy of a sound model with other values, only these are looked at.
     """
     scope = Scope(model)
+    if model.is_known_to_be_sound:
+        check_given(scope)
+        if not scope.errors:
+            check_values(scope)
+        return tuple(scope.errors)
     check_names(scope)
     check_automata(scope)
     check_contacts(scope)
@@ -32,5 +39,6 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_functions(scope)
     check_expressions(scope)
     if not scope.errors:
+        model.once("is sound", lambda: True)
         check_values(scope)
     return tuple(scope.errors)

@@ -1,0 +1,115 @@
+"""Guards of linear modes as series: Taylor coefficients in states and in modal coordinates, with their bounds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.jit import kernel
+
+TERMS = 16  # of the series that bounds a guard from below
+_FACTORIAL = float(math.factorial(TERMS))
+FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
+_ROUNDINGS = (
+    8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
+)
+
+
+@kernel
+def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
+    """Of rows (K, G, m), functions of y with y' = A y: Taylor coefficients, and what rounding makes of each entry.
+
+    rows are used up; A (K, m, m); series, roundings (K, G, m, ORDER + 1).
+    """
+    modes, guards, size = rows.shape
+    for k in range(modes):
+        for g in range(guards):
+            row = rows[k, g]
+            for m in range(size):
+                series[k, g, m, 0] = row[m]
+                roundings[k, g, m, 0] = abs(row[m])
+            for order in range(ORDER):
+                for m in range(size):
+                    total = bound = 0.0
+                    for i in range(size):
+                        total += series[k, g, i, order] * A[k, i, m]
+                        bound += roundings[k, g, i, order] * abs(A[k, i, m])
+                    series[k, g, m, order + 1] = total / (order + 1)
+                    roundings[k, g, m, order + 1] = bound / (order + 1)
+            for m in range(size):
+                for order in range(ORDER + 1):
+                    roundings[k, g, m, order] *= (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
+
+
+@kernel
+def modal_guards(
+    rows: Any,
+    flows: Any,
+    gamma: Any,
+    terms: Any,
+    sizes: Any,
+    rests: Any,
+    farthest: Any,
+    grown: Any,
+    waves: Any,
+) -> None:
+    """Of Re(gamma c) with gamma = row basis along c' = B c: coefficients, bounds of |c|'s factors, reach, waves.
+
+    flows: `hybridsim.engine.modal.Modals` with |B**TERMS|; gamma (J,) is room. The rest is what
+    `hybridsim.engine.linear_tables` describes.
+    """
+    counts, values, upper, ends, basis = flows.counts, flows.values, flows.upper, flows.ends, flows.full_basis
+    modes, guards, size = rows.shape
+    for k in range(modes):
+        for g in range(guards):
+            for j in range(counts[k]):
+                total = 0.0 + 0.0j
+                for m in range(size):
+                    total += rows[k, g, m] * basis[k, m, j]
+                gamma[j] = total
+            waves[k, g] = _wave(gamma, counts[k], values[k], upper[k])
+            first = 0
+            fastest = growing = 0.0
+            while first < counts[k]:
+                end, square = ends[k, first], 0.0
+                # what a guard does not see now it may see later, of another coordinate of the block
+                for j in range(first, end):
+                    square += gamma[j].real ** 2 + gamma[j].imag ** 2
+                for j in range(first, end):
+                    sizes[k, g, j] = math.sqrt(square)
+                    rests[k, g, j] = sizes[k, g, j] * flows.powers[k, j] / _FACTORIAL
+                    if rests[k, g, j] > 0.0:
+                        fastest, growing = max(fastest, flows.speeds[k, j]), max(growing, flows.growth[k, j])
+                for order in range(TERMS):
+                    for j in range(first, end):
+                        terms[k, g, j, 0, order], terms[k, g, j, 1, order] = gamma[j].real, gamma[j].imag
+                    for j in range(end - 1, first - 1, -1):  # B is triangular
+                        total = gamma[j] * values[k, j]
+                        for i in range(first, j):
+                            total += gamma[i] * upper[k, i, j]
+                        gamma[j] = total / (order + 1)
+                first = end
+            if fastest > 0.0:
+                farthest[k, g] = FARTHEST / fastest
+            if growing > 0.0:
+                farthest[k, g], grown[k, g] = min(farthest[k, g], math.log(2.0) / growing), 2.0
+
+
+@kernel
+def _wave(gamma: Any, count: int, values: Any, upper: Any) -> int:
+    """The coordinate that turns, where Re(gamma c) is a constant and one undamped wave; else -1."""
+    found = -1
+    for j in range(count):
+        if gamma[j] == 0.0:
+            continue
+        for i in range(count):
+            if upper[j, i] != 0.0:  # what others drive is no wave
+                return -1
+        if values[j] != 0.0:
+            if found >= 0:
+                return -1
+            found = j
+    if found >= 0 and values[found].real == 0.0 and values[found].imag > 0.0:
+        return found
+    return -1

@@ -1,0 +1,91 @@
+"""Whether the modes of a system are linear, and their rates and guards as linear forms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybridsim.engine.linear_form import Atoms, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.system import System
+from hybridsim.errors import UsageError
+
+_KEPT = 64  # answers of a structure, one for each set of parameter values
+
+
+class LinearMode:
+    """Forms of the rates and active guards of one vector of modes; raises NotLinear with what is in the way.
+
+    p: the run-time vector, or None for whatever values.
+    """
+
+    def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
+        tape, layout = system.code.data["tape"], system.layout
+        varying = range(layout.discrete_at, layout.size)
+        parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
+        constants = [(r, v) for r, v, _ in tape["constants"]]
+        constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
+        reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
+        reader.read(system.mode_rows(z))
+        self.rates: list[Form] = []
+        for name, register in zip(system.names, tape["derivatives"], strict=True):
+            self.rates.append(_named(reader, register, f"the rate of {name}"))
+        self.guards: dict[int, Form] = {}
+        for g in map(int, np.flatnonzero(system.active(z))):
+            self.guards[g] = _named(reader, tape["guards"][g], system.guard_title(g, z))
+
+    def monomials(self) -> set[Monomial]:
+        """The functions of time in it."""
+        forms = [*self.rates, *self.guards.values()]
+        return {key for form in forms for key in form if isinstance(key, tuple)}
+
+
+def _named(reader: LinearReader, register: int, title: str) -> Form:
+    try:
+        return reader.form(register)
+    except NotLinear as reason:
+        raise NotLinear(f"{title} has {reason}") from None
+
+
+def what_is_not_linear(system: System) -> str | None:
+    """What keeps a model from being linear in each of its modes, in words; None where nothing does.
+
+    Each mode of each component is looked at; other combinations of modes are when they are entered. Most models are
+    linear at any values of their parameters or at none; the others are looked at for each set of values.
+    """
+    if system.code.shared("is linear", lambda: _first_reason(system, None) is None):
+        return None
+    known: dict[tuple[float, ...], str | None] = system.code.shared("what is not linear", dict)
+    values = tuple(system.values.values())
+    reason = known.get(values, "")
+    if reason == "":  # not looked at yet
+        reason = _first_reason(system, values)
+        if len(known) >= _KEPT:
+            known.clear()
+        known[values] = reason
+    return reason
+
+
+def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
+    vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
+    for c, automaton in enumerate(system.automata):
+        for m, mode in enumerate(automaton.modes):
+            z = vectors[f"in {automaton.name}.{mode} "] = vectors[""].copy()
+            z[c] = m
+    for place, z in reversed(vectors.items()):
+        try:
+            LinearMode(system, Atoms(), z, p)
+        except NotLinear as reason:
+            return f"{place}{reason}"
+    return None
+
+
+def refuse_nonlinear(system: System) -> None:
+    """Refuse a model of which some mode is not linear."""
+    reason = what_is_not_linear(system)
+    if reason is not None:
+        raise UsageError(
+            f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
+            f"and {reason}",
+            remedy="choose taylor or dop853",
+        )

@@ -1,0 +1,90 @@
+"""Where the numbers of linear modes come from: what is read off the tape once, for all values that are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear_form import Atoms, Form
+from hybridsim.engine.linear_modes import LinearMode
+from hybridsim.engine.recipe import Numbers, Recipe
+from hybridsim.engine.system import System
+
+_MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
+
+
+class LinearPlan:
+    """Matrices of some vectors of modes (K, components) as entries whose values are registers of a recipe."""
+
+    def __init__(self, system: System, met: np.ndarray, p: np.ndarray) -> None:
+        numbers = Numbers(p[: system.layout.parameters].tolist())
+        atoms = Atoms()
+        modes = [LinearMode(system, atoms, z, numbers.inputs) for z in met]
+        monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
+        n, guards = system.n, system.guard_count
+        size = n + len(monomials)
+        place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
+        motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
+
+        def entries(rows: Iterable[tuple[int, Form]]) -> tuple[np.ndarray, np.ndarray]:
+            """Places in a matrix of `size` columns, and registers."""
+            found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
+            places, registers = np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
+            return places, registers
+
+        self._shapes = (len(met), size, size), (len(met), guards, size)
+        self._flow = entries(
+            (k * size + row, form)
+            for k, mode in enumerate(modes)
+            for row, form in [*enumerate(mode.rates), *motion]
+        )
+        self._guards = entries(
+            (k * guards + g, form) for k, mode in enumerate(modes) for g, form in mode.guards.items()
+        )
+        known, terms = atoms.known, [term for a in atoms.known for term in a.terms]
+        self._computed = {
+            name: np.array([numbers.place(value) for value in values], dtype=np.int64)
+            for name, values in (
+                ("rates", [a.rate for a in known]),
+                ("offsets", [a.offset for a in known]),
+                ("weights", [weight for _, weight in terms]),
+            )
+        }
+        self._fixed = {
+            "kinds": np.array([a.kind for a in known], dtype=np.int64),
+            "term_start": np.cumsum([0, *(len(a.terms) for a in known)]).astype(np.int64),
+            "sources": np.array([source for source, _ in terms], dtype=np.int64),
+            "factor_start": np.cumsum([0, *(len(m) for m in monomials)]).astype(np.int64),
+            "factors": np.array([2 * a + part for m in monomials for a, part in m], dtype=np.int64),
+        }
+        self.recipe = Recipe(numbers)
+
+    def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y."""
+        A, rows = (np.zeros(shape) for shape in self._shapes)
+        for matrix, (places, sources) in ((A, self._flow), (rows, self._guards)):
+            matrix.reshape(-1)[places] = registers[sources]
+        return A, rows
+
+    def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
+        """The atoms and monomials as arrays."""
+        return self._fixed | {name: registers[places] for name, places in self._computed.items()}
+
+
+def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
+    """The plan of these vectors of modes that holds at the parameters in p, and its registers there."""
+    kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
+    plans, inputs = kept.setdefault(met.tobytes(), []), p[: system.layout.parameters]
+    for plan in list(plans):
+        registers = plan.recipe.values(inputs)
+        if registers is not None:
+            return plan, registers
+    plan = LinearPlan(system, met, p)
+    registers = plan.recipe.values(inputs)
+    assert registers is not None  # the comparisons are those of these inputs
+    if len(plans) >= _MOST:
+        plans.clear()
+    plans.append(plan)
+    return plan, registers

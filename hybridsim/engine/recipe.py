@@ -1,0 +1,129 @@
+"""Arithmetic on numbers written down while it is done, to be done again with other numbers in compiled code.
+
+What is done may depend on the numbers: whether one is zero, whether two are equal. Such comparisons are written down
+with their results, and a recipe holds for other numbers where all of them come out the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.tape import ADD, DIV, MUL, NEG, SUB
+from hybridsim.engine.taylor import advance
+
+_PAIR = 2  # registers of an operation: some have two results
+
+
+class Numbers:
+    """The registers of a recipe in the making: inputs first, then constants and results as they come."""
+
+    def __init__(self, inputs: Sequence[float]) -> None:
+        self.values = list(inputs)
+        self.rows: list[tuple[int, int, int, int, int]] = []
+        self.comparisons: list[tuple[int, int, bool]] = []
+        self._constants: dict[str, int] = {}
+        self.inputs = [Traced(value, self, i) for i, value in enumerate(self.values)]
+
+    def place(self, value: float) -> int:
+        """The register of a number; one that was not computed here is a constant."""
+        if isinstance(value, Traced):
+            return value.register
+        name = float(value).hex()  # tells zeros by their signs
+        if name not in self._constants:
+            self._constants[name] = len(self.values)
+            self.values.append(value)
+        return self._constants[name]
+
+    def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
+        """An operation of the tape on numbers; b and c are flags where there is one operand."""
+        places = [self.place(value) for value in values]
+        row = (op, places[0], places[1] if len(places) > 1 else b, c, len(self.values))
+        self.rows.append(row)
+        self.values += [0.0] * _PAIR
+        V = np.array(self.values)[:, None]
+        advance(np.array([row], dtype=np.int64), V, 0)
+        self.values[-_PAIR:] = V[-_PAIR:, 0].tolist()
+        first, second = (Traced(self.values[i], self, i) for i in (row[4], row[4] + 1))
+        return first, second
+
+    def equal(self, a: float, b: float) -> bool:
+        """Whether two numbers are equal, written down."""
+        i, j = self.place(a), self.place(b)
+        found = self.values[i] == self.values[j]
+        self.comparisons.append((i, j, found))
+        return found
+
+
+class Traced(float):
+    """A number that knows its register."""
+
+    __slots__ = ("numbers", "register")
+    numbers: Numbers
+    register: int
+
+    def __new__(cls, value: float, numbers: Numbers, register: int) -> Traced:
+        """The number in a register."""
+        self = super().__new__(cls, value)
+        self.numbers, self.register = numbers, register
+        return self
+
+    def __add__(self, other: float) -> Traced:
+        return self.numbers.operation(ADD, (self, other))[0]
+
+    def __radd__(self, other: float) -> Traced:
+        return self.numbers.operation(ADD, (other, self))[0]
+
+    def __sub__(self, other: float) -> Traced:
+        return self.numbers.operation(SUB, (self, other))[0]
+
+    def __rsub__(self, other: float) -> Traced:
+        return self.numbers.operation(SUB, (other, self))[0]
+
+    def __mul__(self, other: float) -> Traced:
+        return self.numbers.operation(MUL, (self, other))[0]
+
+    def __rmul__(self, other: float) -> Traced:
+        return self.numbers.operation(MUL, (other, self))[0]
+
+    def __truediv__(self, other: float) -> Traced:
+        return self.numbers.operation(DIV, (self, other))[0]
+
+    def __rtruediv__(self, other: float) -> Traced:
+        return self.numbers.operation(DIV, (other, self))[0]
+
+    def __neg__(self) -> Traced:
+        return self.numbers.operation(NEG, (self,))[0]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, float) and self.numbers.equal(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = float.__hash__
+    # a decision that is not written down must not be taken
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]
+
+
+class Recipe:
+    """What was written down, for other inputs."""
+
+    def __init__(self, numbers: Numbers) -> None:
+        self._start = np.array(numbers.values)[:, None]
+        self._inputs = len(numbers.inputs)
+        self._rows = np.array(numbers.rows, dtype=np.int64).reshape(-1, 5)
+        self._left = np.array([i for i, _, _ in numbers.comparisons], dtype=np.int64)
+        self._right = np.array([j for _, j, _ in numbers.comparisons], dtype=np.int64)
+        self._found = np.array([found for *_, found in numbers.comparisons], dtype=np.bool_)
+
+    def values(self, inputs: Any) -> np.ndarray | None:
+        """All registers at these inputs; None where a comparison comes out otherwise than it did."""
+        V = self._start.copy()
+        V[: self._inputs, 0] = inputs
+        advance(self._rows, V, 0)
+        registers = V[:, 0]
+        same = (registers[self._left] == registers[self._right]) == self._found
+        return registers if same.all() else None
