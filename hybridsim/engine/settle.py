@@ -55,6 +55,9 @@ class Settling:
         self.released_by = [-1] * len(system.automata)
         self.sides = np.ones(system.guard_count, dtype=np.int64)
         self.orders = np.zeros(system.guard_count, dtype=np.int64)
+        # the series at hand by modes, and what they are the series at: arrays that are replaced, never written to
+        self.series: dict[bytes, Series | DifferenceSeries] = {}
+        self.behind: tuple[object, ...] = (None,) * 4
 
     # -- the rounds -----------------------------------------------------------------------------------------
 
@@ -158,7 +161,13 @@ class Settling:
 
     def _series(self, z: np.ndarray, x: np.ndarray) -> Series | DifferenceSeries:
         at = self.at
-        return self.system.series(at.s, x, at.p, z, at.x_error, at.s_error)
+        behind = (at.s, x, at.p, at.x_error)
+        if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
+            self.behind, self.series = behind, {}
+        key = z.tobytes()
+        if key not in self.series:
+            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error)
+        return self.series[key]
 
     def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
         """Verdict on the guards of some components in the candidate z."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -61,9 +60,12 @@ class Trajectory:
         elif keep.events < math.inf:
             start = _before(end, keep.events, forward)
             sign = 1.0 if forward else -1.0
-            self.occurrences.drop(
-                bisect_left(self.occurrences, 0.0, key=lambda o: sign * o.instant.minus(start))
-            )
+            times = np.concatenate([np.empty(0), *(block.times for block in self.occurrences.blocks)])
+            first = int(np.searchsorted(sign * times, sign * start.high))
+            # a double before it by less than an ulp
+            while first < len(times) and sign * self.occurrences[first].instant.minus(start) < 0.0:
+                first += 1
+            self.occurrences.drop(first)
 
     def warn(self, message: str) -> None:
         """Count a warning; each message is kept once."""
