@@ -130,3 +130,27 @@ def test_a_run_inside_the_progress_of_another(model: hs.Model) -> None:
 
     assert content(hs.simulate(model, SPAN, integrator="taylor", progress=progress)) == wanted
     assert inner and all(found == wanted for found in inner)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_a_sweep_in_threads_is_the_sweep_in_turn(integrator: str) -> None:
+    """Values differ from thread to thread, zeros among them; what is kept for a structure is shared by all."""
+    points = [{"F0": 5.0 * k, "omega": 380.0 + 20.0 * k} for k in range(12)]
+    points += [{"F0": 30.0, "c": 0.0}, {"F0": 30.0, "mu": 0.0}, {"F0": 30.0, "N": 0.0}]
+    in_turn = [content(hs.simulate("dfcs", SPAN, params=p, integrator=integrator)) for p in points]
+    model = hs.load("dfcs")
+    found: list[list[object]] = [[] for _ in points]
+    together = threading.Barrier(4)
+
+    def work(first: int) -> None:
+        together.wait()
+        for _ in range(6):
+            for k in range(first, len(points), 4):
+                found[k] = content(hs.simulate(model.with_(**points[k]), SPAN, integrator=integrator))
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == in_turn

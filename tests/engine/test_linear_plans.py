@@ -1,0 +1,101 @@
+"""Linear modes at many values of the parameters: read once, and right for each, zeros and conditions included."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine.linear_modes import what_is_not_linear
+from hybridsim.engine.linear_tables import linear_tables
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+
+MODEL = hs.Model(
+    "values",
+    [
+        hs.State("x", 0, "v"),
+        hs.State("v", 0, "(a*sin(w*t) + b*cos(u*t) - c*v - k*x + d*exp(-g*t) - (x*x if q > 0 else 0.5*x))/m"),
+        hs.State("y", 0, "(x if s > 0 else y)*s + a*b*t"),
+    ],
+    parameters=dict.fromkeys(("a", "b", "c", "d", "g", "k", "m", "s", "u", "w"), 1) | {"q": 0},
+)
+NAMES = [p.name for p in MODEL.parameters]
+
+
+def rates(system: System, s: float, x: np.ndarray) -> np.ndarray:
+    """By the tables, from states and functions of time."""
+    values = system.values
+    p = system.vector(Instant(0.0), np.zeros(0))
+    tables = linear_tables(system, np.zeros((1, len(system.automata)), dtype=np.int64), p, 1.0)
+    atoms = []
+    for a, kind in enumerate(tables.kinds):
+        terms = range(tables.term_start[a], tables.term_start[a + 1])
+        angle = tables.offsets[a] + sum(tables.weights[i] * p[tables.sources[i]] for i in terms)
+        moved = angle + tables.rates[a] * s
+        atoms.append({0: (s,), 1: (angle,), 2: (np.sin(moved), np.cos(moved)), 3: (np.exp(moved),)}[kind])
+    starts = tables.factor_start
+    functions = [
+        np.prod([atoms[f // 2][f % 2] for f in tables.factors[starts[m] : starts[m + 1]]])
+        for m in range(len(starts) - 1)
+    ]
+    assert values["q"] == 0.0
+    return tables.slopes[0] @ np.concatenate([x, functions])
+
+
+def expected(values: dict[str, float], t: float, x: np.ndarray) -> list[float]:
+    a, b, c, d, g, k, m, s, u, w = (values[n] for n in NAMES[:10])
+    force = a * np.sin(w * t) + b * np.cos(u * t) - c * x[1] - (k + 0.5) * x[0] + d * np.exp(-g * t)
+    return [x[1], force / m, (x[0] if s > 0 else x[2]) * s + a * b * t]
+
+
+def test_every_pattern_of_zeros() -> None:
+    """Terms vanish, frequencies coincide, a condition turns: each time the matrices are those of the formula."""
+    draw = np.random.default_rng(0)
+    for zeros in itertools.product([False, True], repeat=4):
+        for same, sign in itertools.product([False, True], [-1.0, 1.0]):
+            values = {n: float(draw.uniform(0.5, 2.0)) for n in NAMES} | {"q": 0.0}
+            values |= {n: 0.0 for n, zero in zip("abdk", zeros, strict=True) if zero}
+            values["s"] *= sign
+            if same:
+                values["u"] = values["w"]
+            system = System(MODEL.with_(**values))
+            x, t = draw.normal(size=3), float(draw.uniform(0, 3))
+            want = np.array(expected(values, t, x))
+            scale = np.abs(x).sum() + sum(abs(v) for v in values.values())
+            assert np.abs(rates(system, t, x) - want).max() <= 1e-14 * scale**2
+
+
+def test_the_order_of_values_does_not_matter() -> None:
+    """Plans are kept and found again: the tables are the same to the bit, whatever was made before."""
+    sets = [{"a": 0.0}, {"a": 1.5}, {"w": 1.0, "u": 1.0}, {"s": -1.0}, {"a": 0.0, "b": 0.0}, {"k": 0.0}]
+    modes = np.zeros((1, 0), dtype=np.int64)
+
+    def tables(values: dict[str, float]) -> list[object]:
+        system = System(MODEL.with_(**values))
+        made = linear_tables(system, modes, system.vector(Instant(0.0), np.zeros(0)), 1.0)
+        return [getattr(made, name).tolist() for name in ("slopes", "rates", "weights", "values", "inverse")]
+
+    forward = [tables(values) for values in sets]
+    System(MODEL).code.shared("linear plans", dict).clear()
+    backward = [tables(values) for values in reversed(sets)]
+    assert forward == backward[::-1]
+
+
+def test_linear_at_some_values_only() -> None:
+    for q, is_linear in ((0, True), (0.5, False), (0, True), (1, False)):
+        system = System(MODEL.with_(q=q))
+        assert (what_is_not_linear(system) is None) == is_linear
+        if not is_linear:
+            with pytest.raises(hs.UsageError, match="the rate of v has a product of states"):
+                hs.simulate(MODEL.with_(q=q), (0, 0.1), integrator="exact")
+
+
+def test_a_quotient_by_zero_is_said() -> None:
+    model = hs.Model("free", [hs.State("x", 1, "v"), hs.State("v", 0, "-k*x/m")], parameters={"k": 4, "m": 1})
+    assert hs.simulate(model, (0, 1), integrator="exact").success
+    broken = hs.simulate(model.with_(m=0), (0, 1), integrator="exact")
+    assert broken.status == "step-failure"
+    assert "the rate of v has a quotient by zero" in broken.message
