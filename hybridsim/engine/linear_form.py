@@ -12,9 +12,7 @@ import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from hybridsim.engine.recipe import Traced
+from hybridsim.engine.recipe import Traced, computed
 from hybridsim.engine.stepping import StepFailure
 from hybridsim.engine.tape import (
     ABS,
@@ -33,7 +31,6 @@ from hybridsim.engine.tape import (
     SUB,
     TANGENT,
 )
-from hybridsim.engine.taylor import advance
 
 TIME, VALUE, ANGLE, GROWTH = range(4)  # kinds of atoms
 Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else 0
@@ -210,10 +207,8 @@ class LinearReader:
             if isinstance(value, Traced):
                 found = value.numbers.operation(op, values, b, c)
                 return found if op in _PAIRED else found[:1]
-        V = np.zeros((4, 1))
-        V[: len(values), 0] = values
-        advance(np.array([[op, 0, 1 if len(values) > 1 else b, c, 2]], dtype=np.int64), V, 0)
-        return (float(V[2, 0]), float(V[3, 0])) if op in _PAIRED else (float(V[2, 0]),)
+        first, second = computed(op, values, b, c)
+        return (first, second) if op in _PAIRED else (first,)
 
 
 _ARITHMETIC = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv}

@@ -6,6 +6,7 @@ with their results, and a recipe holds for other numbers where all of them come 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,7 +15,17 @@ import numpy as np
 from hybridsim.engine.tape import ADD, DIV, MUL, NEG, SUB
 from hybridsim.engine.taylor import advance
 
-_PAIR = 2  # registers of an operation: some have two results
+_PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # the same in Python, and faster
+
+
+def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
+    """An operation of the tape on numbers: the second result is 0 for most. b and c are flags for a single operand."""
+    if op in _PLAIN:
+        return _PLAIN[op](values[0], values[1]), 0.0
+    V = np.zeros((4, 1))
+    V[: len(values), 0] = values
+    advance(np.array([[op, 0, 1 if len(values) > 1 else b, c, 2]], dtype=np.int64), V, 0)
+    return float(V[2, 0]), float(V[3, 0])
 
 
 class Numbers:
@@ -39,15 +50,10 @@ class Numbers:
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
         """An operation of the tape on numbers; b and c are flags where there is one operand."""
-        places = [self.place(value) for value in values]
-        row = (op, places[0], places[1] if len(places) > 1 else b, c, len(self.values))
-        self.rows.append(row)
-        self.values += [0.0] * _PAIR
-        V = np.array(self.values)[:, None]
-        advance(np.array([row], dtype=np.int64), V, 0)
-        self.values[-_PAIR:] = V[-_PAIR:, 0].tolist()
-        first, second = (Traced(self.values[i], self, i) for i in (row[4], row[4] + 1))
-        return first, second
+        places, out = [self.place(value) for value in values], len(self.values)
+        self.rows.append((op, places[0], places[1] if len(places) > 1 else b, c, out))
+        self.values += computed(op, [self.values[i] for i in places], b, c)
+        return Traced(self.values[out], self, out), Traced(self.values[out + 1], self, out + 1)
 
     def equal(self, a: float, b: float) -> bool:
         """Whether two numbers are equal, written down."""
