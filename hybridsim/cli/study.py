@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,6 +66,7 @@ def _print(study: Study) -> None:
 
 
 def _write(study: Study, name: str, folder: Path, images: Path, session: Session) -> None:
+    from hybridsim.analysis.study import page
     from hybridsim.plot import save
     from hybridsim.plot.study import pictures
 
@@ -72,6 +74,15 @@ def _write(study: Study, name: str, folder: Path, images: Path, session: Session
     images.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").write_text(study.to_json(), encoding="utf-8")
     session.wrote(folder / f"{name}.json")
+    (folder / f"{name}.md").write_text(
+        page(study, lambda title: _link(title, name, folder, images)), encoding="utf-8"
+    )
+    session.wrote(folder / f"{name}.md")
     for title, draw in pictures(study).items():
         save(draw(), images / f"{name}-{title}.png")
         session.wrote(images / f"{name}-{title}.png")
+
+
+def _link(title: str, name: str, folder: Path, images: Path) -> str:
+    """Path of a picture as the page in the folder has to write it."""
+    return Path(os.path.relpath(images / f"{name}-{title}.png", folder)).as_posix()

@@ -3,5 +3,6 @@
 from __future__ import annotations
 
 from hybridsim.analysis.study.he2026 import Study, he2026
+from hybridsim.analysis.study.page import page
 
-__all__ = ["Study", "he2026"]
+__all__ = ["Study", "he2026", "page"]

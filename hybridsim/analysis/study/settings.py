@@ -98,7 +98,7 @@ class Size:
     race_count, race_sample : points along each side of the map that is timed, and how many of them the published
         method is timed on.
     ladder_count : points along each side of the maps of the setting that is needed.
-    repeats : timed runs of which the mean is taken; the paper takes five.
+    timed_periods, repeats : length of a timed run, and the number of runs of which the mean is taken; the paper takes five.
     """
 
     name: str
@@ -112,11 +112,17 @@ class Size:
     ladder_count: int
     steps: tuple[int, ...]
     eps: tuple[float, ...]
+    timed_periods: int = 100
     repeats: int = 5
 
 
 def _range(first: float, last: float, step: float) -> tuple[float, ...]:
     return tuple(round(first + k * step, 10) for k in range(round((last - first) / step) + 1))
+
+
+def _intervals(first: float, step: float) -> tuple[float, ...]:
+    """Powers of ten down to 1e-6, and the paper's own choice among them."""
+    return tuple(sorted([*(10.0**k for k in _range(first, -6.0, -step)), EPS_V], reverse=True))
 
 
 FULL = Size(
@@ -130,7 +136,7 @@ FULL = Size(
     race_sample=400,
     ladder_count=15,
     steps=_range(100, 2400, 100),  # type: ignore[arg-type]
-    eps=tuple(10.0**k for k in _range(-1.5, -6.0, -0.25)),
+    eps=_intervals(-1.5, 0.25),
 )
 QUICK = Size(
     name="quick",
@@ -143,5 +149,5 @@ QUICK = Size(
     race_sample=60,
     ladder_count=5,
     steps=(100, 200, 400, 600, 800, 1000, 1200, 1400, 2000, 2400),
-    eps=tuple(10.0**k for k in _range(-2.0, -6.0, -0.5)),
+    eps=_intervals(-2.0, 0.5),
 )

@@ -66,7 +66,8 @@ class StepStudy:
         values = [self.along(v.name, quantity) for v in SIGNS]
         parts = " and ".join(f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
-            f"along it the deviation from the exact motion (sign by step and by stage) falls {parts} as h0 goes from "
+            f"along it the deviation from the exact motion (sign by step and by stage) falls {parts} as h0 "
+            f"goes from "
             f"{STEPS_PER_PERIOD} to {STEPS[-1]}"
         )
 
