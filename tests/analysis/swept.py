@@ -25,3 +25,11 @@ def longer(model: hs.Model, previous: float | None) -> float:
     if load < 0:
         raise RuntimeError("negative")
     return math.sin(load) + (0.0 if previous is None else 0.5 * previous)
+
+
+def fall(t: float, x: object, p: object) -> tuple[float, float]:
+    return x[1], -p.g
+
+
+def height(model: hs.Model) -> float:
+    return hs.simulate(model, (0.0, 0.5)).y[0, -1]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analysis.swept import SPAN, end, longer
+from analysis.swept import SPAN, end, fall, height, longer
 
 import hybridsim as hs
 from hybridsim.analysis.sweep.pieces import Pieces
@@ -267,6 +267,17 @@ def test_what_cannot_be_sent_to_a_process_is_refused_with_a_remedy() -> None:
         pytest.raises(hs.UsageError, match=r"(?s)measure of the sweep cannot be sent .*leave executor out"),
     ):
         hs.sweep("dfcs", {"F0": [1.0]}, lambda model: 1.0, executor=processes)
+
+
+def test_models_of_python_functions_go_where_their_functions_can_be_imported() -> None:
+    model = hs.Model("ball", states={"h": 1.0, "w": 0.0}, parameters={"g": 9.81}, flow=fall)
+    gravity = [1.62, 9.81]
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as processes:
+        found = hs.sweep(model, {"g": gravity}, height, executor=processes)
+        assert found["value"] == pytest.approx([1.0 - g / 8.0 for g in gravity], rel=1e-9)
+        lost = hs.Model("ball", states={"h": 1.0}, flow=lambda t, x, p: (1.0,), parameters={"g": 1.0})
+        with pytest.raises(hs.UsageError, match="the model of the sweep cannot be sent"):
+            hs.sweep(lost, {"g": gravity}, height, executor=processes)
 
 
 def test_a_pool_that_breaks_loses_its_points_and_says_so() -> None:

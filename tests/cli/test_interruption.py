@@ -67,3 +67,13 @@ def test_compare_stops_altogether(tmp_path: Path) -> None:
     assert code == 130, messages
     assert "interrupted; nothing was written" in messages
     assert "Traceback" not in messages
+
+
+def test_sweep_writes_the_points_that_it_has(tmp_path: Path) -> None:
+    argv = ("sweep", "dfcs", "F0=20:40:300", "omega=300:900:300", "--measure", "final", "--t-end", "10T")
+    code, messages = interrupted(tmp_path, *argv)
+    assert code == 130, messages
+    assert "interrupted after" in messages and "wrote sweep-dfcs/sweep.csv" in messages
+    assert "Traceback" not in messages
+    lines = (tmp_path / "sweep-dfcs" / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 90_001 and lines[-1].endswith(",not run")
