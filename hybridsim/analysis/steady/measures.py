@@ -169,19 +169,16 @@ class Measures:
         orbit, solution = self._orbit, self.solution
         largest = {name: abs(orbit.of(name)).max() for name in orbit.names if name.startswith("guard ")}
         found: list[Grazing] = []
-        for turn in orbit.turns:
-            name = orbit.names[turn.quantity]
-            if name not in largest or not turn.is_minimum:
+        for quantity, piece, t, value, is_minimum in zip(*orbit.turns, strict=True):
+            name = orbit.names[quantity]
+            if name not in largest or not is_minimum or value <= _ROUNDING * largest[name]:
                 continue
-            if turn.value <= _ROUNDING * largest[name]:
-                continue
-            z = solution._segments[int(orbit.segments[turn.piece])].z
+            z = solution._segments[int(orbit.segments[piece])].z
             guard = int(name.removeprefix("guard "))
             if solution._system.active(z)[guard]:
                 title = solution._system.guard_title(guard, z)
-                found.append(
-                    Grazing(title, solution.t_start + turn.t, turn.value, turn.value / largest[name])
-                )
+                relative = float(value / largest[name])
+                found.append(Grazing(title, solution.t_start + float(t), float(value), relative))
         return min(found, key=lambda g: g.relative, default=None)
 
 

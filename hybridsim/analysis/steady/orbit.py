@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -86,38 +86,24 @@ class Orbit:
     def extremes(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest value (Q,) of each quantity, both sides of every jump included."""
         ends = np.einsum("ij,kjq->kiq", _AT_ENDS, self.coefficients)
-        candidates = [ends.reshape(-1, len(self.names)), self.values.reshape(-1, len(self.names))]
-        low, high = (
-            np.min([c.min(axis=0) for c in candidates], axis=0),
-            np.max([c.max(axis=0) for c in candidates], axis=0),
-        )
-        for turn in self.turns:
-            low[turn.quantity], high[turn.quantity] = (
-                min(low[turn.quantity], turn.value),
-                max(high[turn.quantity], turn.value),
-            )
+        sampled = np.concatenate([ends, self.values], axis=1)
+        low, high = sampled.min(axis=(0, 1)), sampled.max(axis=(0, 1))
+        np.minimum.at(low, self.turns.quantity, self.turns.value)
+        np.maximum.at(high, self.turns.quantity, self.turns.value)
         return low, high
 
     @cached_property
-    def turns(self) -> list[Turn]:
+    def turns(self) -> Turns:
         """Where the slope of a quantity changes its sign inside a piece."""
         slopes = np.einsum("gj,kjq->kgq", _SLOPES_ON_GRID, self.coefficients)
-        found = []
-        for k, g, q in np.argwhere(slopes[:, :-1] * slopes[:, 1:] < 0.0):
-            before, after = slopes[k, g, q], slopes[k, g + 1, q]
-            at = _GRID[g] + (_GRID[g + 1] - _GRID[g]) * before / (before - after)
-            series = self.coefficients[k, :, q]
-            first, second = legendre.legder(series), legendre.legder(series, 2)
-            for _ in range(_STEPS):
-                curvature = legendre.legval(at, second)
-                if curvature == 0.0:
-                    break
-                at = min(max(at - legendre.legval(at, first) / curvature, _GRID[g]), _GRID[g + 1])
-            t = self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at)
-            found.append(
-                Turn(int(q), int(k), float(t), float(legendre.legval(at, series)), bool(before < 0.0))
-            )
-        return found
+        k, g, q = np.nonzero(slopes[:, :-1] * slopes[:, 1:] < 0.0)
+        before, after = slopes[k, g, q], slopes[k, g + 1, q]
+        series = self.coefficients[k, :, q]
+        first = series @ _DIFFERENTIATE.T
+        at, last = _zeros(first, _GRID[g], _GRID[g + 1], before, after), POINTS - 1
+        values = (series * legendre.legvander(at, last)).sum(axis=1)
+        times = self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at)
+        return Turns(q, k, times, values, before < 0.0)
 
     def rises_through(self, name: str, level: float) -> np.ndarray:
         """Times, from the beginning of the run, at which a quantity rises through a level."""
@@ -125,31 +111,37 @@ class Orbit:
         series = self.coefficients[:, :, q].copy()
         series[:, 0] -= level
         values = series @ _VALUES_ON_GRID.T
-        found = []
-        for k, g in np.argwhere((values[:, :-1] < 0.0) & (values[:, 1:] >= 0.0)):
-            low, high = _GRID[g], _GRID[g + 1]
-            at = low + (high - low) * values[k, g] / (values[k, g] - values[k, g + 1])
-            slope = legendre.legder(series[k])
-            for _ in range(_STEPS):
-                steepness = legendre.legval(at, slope)
-                if steepness == 0.0:
-                    break
-                at = min(max(at - legendre.legval(at, series[k]) / steepness, low), high)
-            found.append(self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at))
+        k, g = np.nonzero((values[:, :-1] < 0.0) & (values[:, 1:] >= 0.0))
+        at = _zeros(series[k], _GRID[g], _GRID[g + 1], values[k, g], values[k, g + 1])
+        found = (self.starts[k] + 0.5 * self.lengths[k] * (1.0 + at)).tolist()
         ends = values[:-1, -1] < 0.0, values[1:, 0] >= 0.0
         found += self.starts[1:][ends[0] & ends[1]].tolist()  # a jump, or rounding between two pieces
         return np.sort(np.array(found))
 
 
-@dataclass(frozen=True)
-class Turn:
-    """A local extremum inside a piece."""
+def _zeros(
+    series: np.ndarray, low: np.ndarray, high: np.ndarray, at_low: np.ndarray, at_high: np.ndarray
+) -> np.ndarray:
+    """Zeros (m,) of Legendre series (m, degree + 1), each between two points where it has those values."""
+    slope = series @ legendre.legder(np.eye(series.shape[1])).T
+    at = low + (high - low) * at_low / (at_low - at_high)
+    for _ in range(_STEPS):
+        basis = legendre.legvander(at, series.shape[1] - 1)
+        value = (series * basis).sum(axis=1)
+        steepness = (slope * basis[:, : slope.shape[1]]).sum(axis=1)
+        move = np.divide(value, steepness, out=np.zeros_like(value), where=steepness != 0.0)
+        at = np.clip(at - move, low, high)
+    return at
 
-    quantity: int
-    piece: int
-    t: float
-    value: float
-    is_minimum: bool
+
+class Turns(NamedTuple):
+    """Local extrema inside pieces: number of the quantity and of the piece, time, value, whether it is a minimum."""
+
+    quantity: np.ndarray
+    piece: np.ndarray
+    t: np.ndarray
+    value: np.ndarray
+    is_minimum: np.ndarray
 
 
 class Sampler:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,12 +57,28 @@ class Passings:
         back = (len(self.values) - 1) // (2 * multiple)
         if back == 0:
             return float("inf")
-        earlier = relative(
-            self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
-        )
+        earlier = self._change(back, multiple)
         if not residual < earlier:
             return residual if residual <= rounding else float("inf")
         return float(residual / (1.0 - (residual / earlier) ** (1.0 / back)))
+
+    def more(self, multiple: int, tolerance: float) -> float:
+        """How many more passings the motion needs to settle to the tolerance, at the pace of the last ones."""
+        residual, back = self.residual(multiple), (len(self.values) - 1) // (2 * multiple)
+        if back == 0:
+            return float("inf")
+        earlier = self._change(back, multiple)
+        if not 0.0 < residual < earlier:
+            return float("inf")
+        rate = math.log(earlier / residual) / back
+        left = math.log(max(residual, tolerance) / tolerance) + max(0.0, -math.log(-math.expm1(-rate)))
+        return multiple * left / rate
+
+    def _change(self, back: int, multiple: int) -> float:
+        """The change over so many passings, as many times earlier."""
+        return relative(
+            self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
+        )
 
     def nearest(self) -> int:
         """After how many passings the motion comes closest to repeating: the fewest that are about as good."""

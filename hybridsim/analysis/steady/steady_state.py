@@ -26,6 +26,8 @@ _MOST_AT_ONCE = 512
 _MAX_PERIODS = 4096
 _DURATION = 100.0  # of a first run without forcing, where the model has none of its own
 _FEWEST = 4  # passings that say something
+_WAIT = 256  # periods that are run in the time of a few Newton steps
+_MARGIN = 1.1  # on how many are expected to be needed
 _TIGHTER = 1e-2  # the runs' tolerance, in units of that of the steady state
 _NEUTRAL = 1e-3  # an exponent below that, per period, is nought
 PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
@@ -129,6 +131,7 @@ class _Search:
         self.progress = progress
         self.newton_steps, self.periods = 0, 0
         self.duration = motion.model.duration_value() or _DURATION
+        self.expected = 0  # periods that the motion is expected to need until it has settled
 
     def run(self) -> SteadyState:
         passings = self._follow(None)
@@ -148,7 +151,8 @@ class _Search:
             self.progress(min(self.periods / self.max_periods, 1.0))
         start = None if last is None else last.last
         if self.period is not None:
-            count = min(max(self.settle, self.periods), _MOST_AT_ONCE, max(self.max_periods, self.settle))
+            count = self.expected or min(max(self.settle, self.periods), _MOST_AT_ONCE)
+            self.expected = 0
             self.periods += count
             return forced_passings(self.motion, start, self.period, count)
         for _ in range(_LONGER):
@@ -169,7 +173,14 @@ class _Search:
             return self._orbit(passings, multiple)
         if len(passings.values) < 2:
             return None
-        return self._shot(passings, passings.nearest())
+        multiple = passings.nearest()
+        self.expected = (
+            math.ceil(min(_MARGIN * passings.more(multiple, self.tol), _MOST_AT_ONCE)) + 2 * multiple
+        )
+        if self.period is not None and self.expected <= _WAIT:
+            return None  # it settles while Newton's method would be made ready
+        self.expected = 0
+        return self._shot(passings, multiple)
 
     def _shot(self, passings: Passings, multiple: int) -> Orbit | None:
         start = self._orbit(passings, multiple)
