@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.analysis.study.pool import Pool
 from hybridsim.analysis.study.settings import LITERAL, SIGNS, STEPS_PER_PERIOD, ZEROED, Point, Size, Variant
-from hybridsim.analysis.study.steady import measured, periods_of, settling_periods
+from hybridsim.analysis.study.steady import declared, measured, periods_of, settling_periods
 from hybridsim.simulate import simulate
 
 TOLERANCE = 0.01
@@ -69,7 +69,7 @@ def needed(size: Size, pool: Pool) -> Needed:
 def _start(point: Point) -> tuple[float, tuple[float, float]]:
     """The exact amplitude, and the state at the beginning of a period of the exact orbit."""
     solution = simulate(
-        "dfcs",
+        declared("dfcs"),
         (0.0, settling_periods(point) * point.period),
         params=point.params,
         integrator="exact",
@@ -89,7 +89,7 @@ def _coarsest(variant: Variant, point: Point, start: tuple[float, tuple[float, f
         if not by_steps:
             options["eps_v"] = setting
         solution = simulate(
-            "dfcs",
+            declared("dfcs"),
             (0.0, _PERIODS * point.period),
             params=point.params,
             x0=state,

@@ -12,7 +12,7 @@ import numpy as np
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.study.pool import Pool
 from hybridsim.analysis.study.settings import LITERAL, ZEROED, Point, Size, Variant
-from hybridsim.analysis.study.steady import ExactState, Periods, by_steps, exact
+from hybridsim.analysis.study.steady import ExactState, Periods, by_steps, declared, exact
 
 RATIO_SPAN, R_SPAN = (0.5, 1.5), (0.05, 2.0)
 PERIODS = 100  # settling of both
@@ -110,7 +110,7 @@ def _timed(
 
 
 def _by_shooting(point: Point) -> tuple[float, float]:
-    orbit = steady_state("dfcs", params=point.params, integrator="exact")
+    orbit = steady_state(declared("dfcs"), params=point.params, integrator="exact")
     return float(orbit.amplitude["x"]), float(orbit.energy["x"])
 
 

@@ -21,7 +21,7 @@ PLACES = {
 
 @dataclass(frozen=True)
 class Readings:
-    """By reading and place: least, mean and greatest deviation of A from the exact one over the last periods, signed."""
+    """By reading and place: least, mean, greatest signed deviation of A from the exact one over the last periods."""
 
     table: dict[str, dict[str, tuple[float, float, float]]]
 

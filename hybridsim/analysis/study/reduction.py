@@ -20,7 +20,7 @@ from hybridsim.analysis.study.settings import (
     Size,
     Variant,
 )
-from hybridsim.analysis.study.steady import ExactState, by_steps, exact, measured
+from hybridsim.analysis.study.steady import ExactState, by_steps, declared, exact, measured
 from hybridsim.analysis.study.verdicts import Claim, Verdict
 from hybridsim.simulate import simulate
 
@@ -116,7 +116,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
 def _stribeck(point: Point) -> ExactState:
     """The same with a coefficient that falls with the velocity: that velocity is a scale of its own."""
     solution = simulate(
-        "dfcs-stribeck",
+        declared("dfcs-stribeck"),
         (0.0, _STRIBECK_PERIODS * point.period),
         params=point.params,
         integrator="taylor",

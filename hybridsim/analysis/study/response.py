@@ -17,7 +17,7 @@ from hybridsim.analysis.study.settings import (
     Size,
     Variant,
 )
-from hybridsim.analysis.study.steady import CONTACT, settling_periods, solve_by_steps
+from hybridsim.analysis.study.steady import CONTACT, declared, settling_periods, solve_by_steps
 from hybridsim.analysis.study.step_study import PLACES, STEPS, StepStudy
 from hybridsim.analysis.study.verdicts import Claim, Verdict
 from hybridsim.simulate import simulate
@@ -71,7 +71,7 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
     if variant is None:
         periods = settling_periods(point) + kept
         solution = simulate(
-            "dfcs",
+            declared("dfcs"),
             (0.0, periods * point.period),
             params=point.params,
             integrator="exact",

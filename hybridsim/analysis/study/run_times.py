@@ -20,6 +20,7 @@ from hybridsim.analysis.study.settings import (
     Size,
     Variant,
 )
+from hybridsim.analysis.study.steady import declared
 from hybridsim.analysis.study.verdicts import Claim, Verdict
 from hybridsim.simulate import simulate
 
@@ -98,7 +99,7 @@ def _run(point: Point, variant: Variant | None, eps: float, periods: int) -> Cos
     if variant in WITH:
         options["eps_v"] = eps
     solution = simulate(
-        "dfcs",
+        declared("dfcs"),
         (0.0, periods * point.period),
         params=point.params,
         integrator="exact" if variant is None else variant.integrator,

@@ -98,7 +98,7 @@ class Size:
     race_count, race_sample : points along each side of the map that is timed, and how many of them the published
         method is timed on.
     ladder_count : points along each side of the maps of the setting that is needed.
-    timed_periods, repeats : length of a timed run, and the number of runs of which the mean is taken; the paper takes five.
+    timed_periods, repeats : length of a timed run, and the number of runs of which the mean is taken; five there.
     """
 
     name: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from hybridsim.analysis.study.settings import (
     Point,
     Variant,
 )
+from hybridsim.model import Model, load
 from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
@@ -57,6 +59,12 @@ class ExactState:
     residual: float
 
 
+@cache
+def declared(name: str) -> Model:
+    """A packaged model, read once for all runs."""
+    return load(name)
+
+
 def settling_periods(point: Point) -> int:
     """Periods of the forcing after which the free vibration has decayed below rounding."""
     return max(_LEAST_PERIODS, math.ceil(_DECAYS * point.r / (2.0 * math.pi * DAMPING_RATIO)))
@@ -66,7 +74,7 @@ def exact(point: Point, periods: int | None = None) -> ExactState:
     """The steady motion by the integrator `exact`, settled to rounding unless the number of periods is given."""
     count = settling_periods(point) if periods is None else periods
     solution = simulate(
-        "dfcs",
+        declared("dfcs"),
         (0.0, count * point.period),
         params=point.params,
         integrator="exact",
@@ -116,7 +124,7 @@ def solve_by_steps(
     if eps_v is not None:
         options["eps_v"] = eps_v
     return simulate(
-        "dfcs",
+        declared("dfcs"),
         (0.0, periods * point.period),
         params=point.params,
         integrator=variant.integrator,
