@@ -42,6 +42,7 @@ _HOME = {
     "to_ivp": "hybridsim.ivp",
     # asking
     "Branch": "hybridsim.analysis",
+    "Advice": "hybridsim.analysis",
     "Comparison": "hybridsim.analysis",
     "Equilibrium": "hybridsim.analysis",
     "Linearization": "hybridsim.analysis",
@@ -50,6 +51,7 @@ _HOME = {
     "SuiteComparison": "hybridsim.analysis",
     "Sweep": "hybridsim.analysis",
     "bifurcation": "hybridsim.analysis",
+    "advise": "hybridsim.analysis",
     "compare": "hybridsim.analysis",
     "compare_suite": "hybridsim.analysis",
     "continuation": "hybridsim.analysis",

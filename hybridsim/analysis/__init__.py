@@ -1,5 +1,6 @@
 """What is asked of a model beyond one run: comparisons, steady states, sensitivities, sweeps over parameters."""
 
+from hybridsim.analysis.advise import Advice, advise
 from hybridsim.analysis.compare import compare
 from hybridsim.analysis.comparison import Comparison
 from hybridsim.analysis.continuation import Branch, continuation
@@ -12,6 +13,7 @@ from hybridsim.analysis.variations import Sensitivities, sensitivities
 
 __all__ = [
     "Branch",
+    "Advice",
     "Comparison",
     "Equilibrium",
     "Linearization",
@@ -21,6 +23,7 @@ __all__ = [
     "SuiteComparison",
     "Sweep",
     "bifurcation",
+    "advise",
     "compare",
     "compare_suite",
     "frequency_response",

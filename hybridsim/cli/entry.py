@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from hybridsim import __version__
-from hybridsim.cli import cache, check, compare, integrators, models, run, steady, study, sweep
+from hybridsim.cli import advise, cache, check, compare, integrators, models, run, steady, study, sweep
 from hybridsim.cli.output import INTERRUPTED, complain
 from hybridsim.cli.parser import Parser
 from hybridsim.cli.session import Session
@@ -24,7 +24,18 @@ from hybridsim.errors import HybridsimError
 if TYPE_CHECKING:
     from types import ModuleType
 
-COMMANDS: tuple[ModuleType, ...] = (run, compare, steady, sweep, study, check, models, integrators, cache)
+COMMANDS: tuple[ModuleType, ...] = (
+    run,
+    compare,
+    advise,
+    steady,
+    sweep,
+    study,
+    check,
+    models,
+    integrators,
+    cache,
+)
 
 PIPE_CLOSED = 141  # 128 + SIGPIPE
 

@@ -79,7 +79,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     model = values.changed_model(args)
     folder: Path = args.out or Path(f"sweep-{model.name}")
     require_folder(folder, "--out")
-    axes = _axes(model, args.axes)
+    axes = values_by_name(model, args.axes)
     if args.over is not None and args.over not in axes:
         raise UsageError(f"--over {args.over}", remedy=f"name one of the parameters: {', '.join(axes)}")
     if len(axes) > _MOST_DRAWN and not args.list:
@@ -129,7 +129,8 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
     session.wrote(folder / "sweep.png")
 
 
-def _axes(model: Model, pairs: list[tuple[str, str]]) -> dict[str, list[Any]]:
+def values_by_name(model: Model, pairs: list[tuple[str, str]]) -> dict[str, list[Any]]:
+    """Values of parameters as they are written on a command line, FROM:TO:COUNT or A,B,C, by name."""
     axes: dict[str, list[Any]] = {}
     for name, text in pairs:
         if name in axes:
@@ -151,7 +152,7 @@ def _row(model: Model, name: str, text: str) -> list[Any]:
         raise UsageError(
             f"{name}={text}", remedy="write FROM:TO:COUNT, FROM:TO:COUNT:log, or values with commas between"
         )
-    low, high, count = _number(model, name, parts[0]), _number(model, name, parts[1]), int(parts[2])
+    low, high, count = number_of(model, name, parts[0]), number_of(model, name, parts[1]), int(parts[2])
     if is_log and not (low > 0 and high > 0):
         raise UsageError(f"{name}={text}", remedy="equal ratios go between two numbers above zero")
     between = [k / (count - 1) for k in range(1, count - 1)]
@@ -174,7 +175,8 @@ def _parts(text: str) -> list[str]:
     return [part.strip() for part in parts]
 
 
-def _number(model: Model, name: str, text: str) -> float:
+def number_of(model: Model, name: str, text: str) -> float:
+    """A number that is written as an expression of the model's parameters."""
     from hybridsim.expr import evaluate, parse, require_names
 
     known = model.parameter_values()

@@ -1,5 +1,6 @@
 """Pictures of solutions and comparisons: functions return the axes they drew in and change nothing global."""
 
+from hybridsim.plot.advice import advice
 from hybridsim.plot.branch import branch
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
@@ -14,6 +15,7 @@ from hybridsim.plot.work_precision import work_precision
 
 __all__ = [
     "TimeHistoryAxes",
+    "advice",
     "branch",
     "friction_loop",
     "phase_portrait",

@@ -158,7 +158,9 @@ def _remarks(advice: Advice) -> list[str]:
     if advice.settings and advice.integrator is None:
         found.append("no integrator setting that was tried is within the tolerance")
     if advice.region is not None and advice.region.failed.any():
-        found.append(f"{int(advice.region.failed.sum())} of {advice.region.failed.size} points have no answer")
+        found.append(
+            f"{int(advice.region.failed.sum())} of {advice.region.failed.size} points have no answer"
+        )
     return found
 
 

@@ -100,7 +100,13 @@ def advise(
         options = {"workers": workers, "progress": progress}
         region, ladder = over_region(seen, over, chosen, question, tol, width, options)
         return Advice(
-            model, question.text, tol, float("nan"), ladder, region=region, seconds=time.perf_counter() - began
+            model,
+            question.text,
+            tol,
+            float("nan"),
+            ladder,
+            region=region,
+            seconds=time.perf_counter() - began,
         )
     told = _Told(progress, len(chosen) + 1 + integrators + (ranges is not None))
     told("full model")
@@ -113,7 +119,9 @@ def advise(
     for rung, step in zip(chosen, climb(chosen, scene, question, full.value, tol), strict=True):
         told(rung.name)
         steps.append(step)
-    steps.append(Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "what the others are held against"))
+    steps.append(
+        Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "what the others are held against")
+    )
     tried = settings(seen, question, full.motion, full.value, tol, told) if integrators else ()
     known = None if ranges is None else _spread(seen, question, full.value, ranges)
     return Advice(
@@ -133,7 +141,9 @@ def _spread(model: Model, question: Question, full: Any, ranges: Any) -> Any:
     try:
         return spread(model, question, full, ranges)
     except NoAnswer as reason:
-        raise SimulationError(f"at an end of the given ranges there is no {question.text}: {reason}") from reason
+        raise SimulationError(
+            f"at an end of the given ranges there is no {question.text}: {reason}"
+        ) from reason
 
 
 def _chosen(names: Sequence[str] | None) -> tuple[Rung, ...]:

@@ -87,10 +87,15 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
     try:
         slide = affine(contact.velocity, unknowns, values, definitions)
         rates = {s.name: affine(s.der, unknowns, values, definitions) for s in model.states}
-        limit = affine(contact.limit_force(), unknowns, values, definitions)
+        limit = affine(contact.limit_force, unknowns, values, definitions)
     except NotAffine:
         return None
-    if not limit.is_constant or slide.waves or not slide.linear.keys() <= start.keys() or _at(slide, start) != 0.0:
+    if (
+        not limit.is_constant
+        or slide.waves
+        or not slide.linear.keys() <= start.keys()
+        or _at(slide, start) != 0.0
+    ):
         return None
     pull = Affine()
     for name, weight in slide.linear.items():

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.steady.measures import Measures
@@ -13,6 +14,7 @@ from hybridsim.errors import HybridsimError, UsageError, nearest
 from hybridsim.model import Model, Output
 
 if TYPE_CHECKING:
+    from hybridsim.analysis.steady import SteadyState
     from hybridsim.solution import Solution
 
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
@@ -20,7 +22,15 @@ OF_CONTACT = ("dissipated", "stick_fraction")
 OF_RUN = ("final", "event_time")
 OF_MOTION = ("period",)
 HEADS = (*OF_QUANTITY, *OF_CONTACT, *OF_MOTION, *OF_RUN)
-_SIGNED = ("amplitude", "maximum", "minimum", "mean", "harmonic", "final")  # what can be zero but for rounding
+_SIGNED = (
+    "amplitude",
+    "maximum",
+    "minimum",
+    "mean",
+    "harmonic",
+    "final",
+)  # what can be zero but for rounding
+_NEUTRAL = 1e-6  # a disturbance that a period takes less of than that stays
 _STICK = "stick"  # the mode of every contact in which nothing slides
 
 Number = float | complex
@@ -33,13 +43,28 @@ class NoAnswer(Exception):
 class OverRun(Measures):
     """The same measures over a run instead of a period."""
 
+    period = math.nan
+
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
+
+    def _extreme(self, name: str, side: int) -> float:
+        """Of this quantity alone: fixed steps leave a piece for each, and turning points are looked for on all."""
+        if name not in self._alone:
+            orbit = self._orbit
+            q = orbit.names.index(name)
+            one = replace(orbit, names=(name,), values=orbit.values[:, :, q : q + 1])
+            self._alone[name] = tuple(float(ends[0]) for ends in one.extremes)
+        return self._alone[name][side]
+
+    @cached_property
+    def _alone(self) -> dict[str, tuple[float, ...]]:
+        return {}
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A value, what it took, and the motion it was read off."""
+    """A value, what it took to find the motion, and the motion it was read off."""
 
     value: Number
     seconds: float
@@ -89,10 +114,11 @@ class Question:
         began = time.perf_counter()
         try:
             motion = self.motion(model)
+            seconds = time.perf_counter() - began
             value = self.read(motion)
         except HybridsimError as error:
             raise NoAnswer(error.message) from error
-        return Answer(value, time.perf_counter() - began, motion)
+        return Answer(value, seconds, motion)
 
     def motion(self, model: Model) -> Any:
         """The steady state, or the run."""
@@ -103,6 +129,7 @@ class Question:
             steady = steady_state(model, tol=self.accuracy)
             if not steady.success:
                 raise NoAnswer(steady.message)
+            _require_limit_cycle(model, steady)
             return steady
         solution = simulate(model, self.t_span, rtol=0.01 * self.accuracy)
         if not solution.success:
@@ -157,10 +184,21 @@ class Question:
             raise NoAnswer("it has no events")
         system = motion.solution.model
         known = {c.name for c in system.all_components()} | {m.name for m in system.monitors}
-        times = motion.solution.event_times(self.name) if self.name in known else []
+        times = motion.solution.event_times(self.name).tolist() if self.name in known else []
         if len(times) < self.number:
             raise NoAnswer(f"it has {len(times)} events of {self.name}")
         return float(times[self.number - 1])
+
+
+def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
+    """A vibration of a free, undamped system is no steady state: its size is that of the start."""
+    from hybridsim.engine.period import system_period
+    from hybridsim.engine.recent import system_of
+
+    if steady.kind != "periodic" or system_period(system_of(model)) is not None:
+        return
+    if max(abs(steady.multipliers), default=0.0) > 1.0 - _NEUTRAL:
+        raise NoAnswer("it has no limit cycle: its vibration keeps the size with which it starts")
 
 
 def stuck(solution: Solution, contact: str) -> float:
@@ -218,9 +256,7 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
 # -- from words to a question -----------------------------------------------------------------------------------
 
 
-def question_of(
-    model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float
-) -> Question:
+def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float) -> Question:
     """The question, checked against the model.
 
     Errors
@@ -230,7 +266,9 @@ def question_of(
     if callable(quantity):
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
-        raise UsageError(f"quantity is {quantity!r}", remedy=f"give words such as {'amplitude.x'!r}, or a function")
+        raise UsageError(
+            f"quantity is {quantity!r}", remedy=f"give words such as {'amplitude.x'!r}, or a function"
+        )
     head, *rest = quantity.split(".")
     if head not in HEADS:
         raise UsageError(f"there is no quantity {quantity!r}", remedy=nearest(head, HEADS, kind="quantities"))
@@ -238,7 +276,9 @@ def question_of(
         raise UsageError(f"{quantity} is of a run, and there is no t_span", remedy="give t_span=(0, ...)")
     if head in OF_MOTION:
         if t_span is not None or rest:
-            raise UsageError(f"quantity is {quantity!r}", remedy="a period is asked for without name and t_span")
+            raise UsageError(
+                f"quantity is {quantity!r}", remedy="a period is asked for without name and t_span"
+            )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)
     if not rest or rest[0] not in names:
@@ -246,7 +286,9 @@ def question_of(
         raise UsageError(f"there is no quantity {quantity!r}", remedy=near)
     numbered = head in ("harmonic", "event_time")
     if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
-        raise UsageError(f"quantity is {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else ""))
+        raise UsageError(
+            f"quantity is {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else "")
+        )
     if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
         raise UsageError(f"quantity is {quantity!r}", remedy="events are counted from 1")
     return Question(quantity, None, t_span, accuracy)

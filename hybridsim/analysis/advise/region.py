@@ -26,7 +26,11 @@ from hybridsim.analysis.sweep import Sweep, sweep
 from hybridsim.errors import SimulationError
 from hybridsim.model import Model
 
-_DEAR = ("tanh", "arctan", "karnopp")  # tried only where nothing simpler serves: they cost as much as the full model
+_DEAR = (
+    "tanh",
+    "arctan",
+    "karnopp",
+)  # tried only where nothing simpler serves: they cost as much as the full model
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,9 @@ def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
         elif verdict == NOT_APPLICABLE:
             verdict = NOT_ADEQUATE
         why = f"serves at {serves} of {total} points, is the simplest at {first}"
-        steps.append(Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why))
+        steps.append(
+            Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why)
+        )
     alone = int((simplest == FULL).sum())
     steps.append(
         Step(FULL, FULL, "nothing", None, 0.0, math.nan, FULL, f"needed at {alone} of {total} points")

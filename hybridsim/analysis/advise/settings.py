@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from hybridsim.analysis.advise.ladder import asked, relative_error
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
 from hybridsim.errors import HybridsimError
 from hybridsim.model import Model
+from hybridsim.simulate import simulate
 
 # From loose to tight: each family is followed until it is within the tolerance, so that its cheapest is found.
 _RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
@@ -23,7 +26,7 @@ _FAMILIES: tuple[tuple[str, str], ...] = (
     ("rk4-sign", "steps"),
 )
 _SHOOTING = "steady_state"
-_FEWEST, _MOST = 8, 2000  # periods of settling
+_FEWEST, _MOST = 8, 1000  # periods of settling
 _SHARE = 0.01  # of the tolerance: what settling may leave over
 _RUN_STEPS = 100  # periods that a run without a period is taken to have, for fixed steps
 
@@ -65,25 +68,22 @@ class _Settling:
     step_base: float
 
     def ask(self, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
-        import time
-
-        from hybridsim.simulate import simulate
-
         given = dict(options)
         if "steps" in given:
             given = {"step": self.step_base / given["steps"]}
         began = time.perf_counter()
         try:
             solution = simulate(model, self.span, integrator=name, save=self.save, **given)
+            seconds = time.perf_counter() - began
             if not solution.success:
                 raise NoAnswer(f"{solution.status}: {solution.message}")
             run = OverRun(solution)
             if self.question.t_span is None:
-                run.period = solution.t_end - solution.t_start  # type: ignore[attr-defined]
+                run.period = solution.t_end - solution.t_start
             value = self.question.read(run)
         except HybridsimError as error:
             raise NoAnswer(error.message) from error
-        return Answer(value, time.perf_counter() - began, run)
+        return Answer(value, seconds, run)
 
 
 def settings(
@@ -99,7 +99,8 @@ def settings(
     if question.t_span is None:
         loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
         found.append(_measured(_SHOOTING, {}, lambda: asked(loose, model), full, tol))
-    if question.function is None or question.t_span is not None:
+    # a run has no period of its own, and a function of a steady state cannot be handed a run
+    if question.t_span is not None or (question.function is None and question.head != "period"):
         settling = _settling(question, motion, tol)
         for name, option in _FAMILIES:
             values: tuple[float, ...] = {"rtol": _RTOLS, "steps": _STEPS}.get(option, (0.0,))
@@ -107,11 +108,16 @@ def settings(
                 options = {option: value} if option else {}
                 if progress is not None:
                     progress(f"{name} {value:g}" if option else name)
-                one = _measured(name, options, lambda: _twice(settling, model, name, options), full, tol)
+                one = _measured(name, options, partial(_twice, settling, model, name, options), full, tol)
                 found.append(one)
-                if one.is_adequate or one.value is None:
+                if one.is_adequate or one.value is None or one.seconds > _dear(found):
                     break
     return tuple(sorted(found, key=lambda s: (not s.is_adequate, math.isnan(s.seconds), s.seconds)))
+
+
+def _dear(found: list[Setting]) -> float:
+    """Seconds beyond which tighter settings of a family are not tried: they cannot be the cheapest by far."""
+    return max(1.0, 100.0 * min((s.seconds for s in found if s.is_adequate), default=math.inf))
 
 
 def _twice(settling: _Settling, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
@@ -136,7 +142,11 @@ def _settling(question: Question, motion: Any, tol: float) -> _Settling:
     if question.t_span is not None:
         t0, t1 = question.t_span
         return _Settling(question, (t0, t1), "all", (t1 - t0) / _RUN_STEPS)
-    period = motion.period if math.isfinite(motion.period) else motion.solution.t_end - motion.solution.t_start
+    period = (
+        motion.period if math.isfinite(motion.period) else motion.solution.t_end - motion.solution.t_start
+    )
+    if motion.kind == "equilibrium":
+        return _Settling(question, (0.0, _FEWEST * period), period, period)
     try:
         slowest = float(max(abs(motion.multipliers), default=0.0))
     except HybridsimError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from hybridsim.analysis.advise.ladder import NOT_APPLICABLE
+from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice
@@ -31,11 +31,13 @@ def _conclusion(advice: Advice) -> str:
         return f"over {' x '.join(f'{len(v)} {n}' for n, v in advice.region.axes.items())}"
     simplest, setting = advice.simplest, advice.integrator
     how = f"; run the full model by {setting.title}" if setting is not None else ""
+    if simplest.verdict == FULL:
+        return f"the full model is needed{how}"
     return f"{simplest.title} is enough{how}"
 
 
 def _ladder(advice: Advice) -> list[tuple[str, ...]]:
-    rows = [("rung", "value", "error", "cost", "verdict", "why")]
+    rows: list[tuple[str, ...]] = [("rung", "value", "error", "cost", "verdict", "why")]
     return rows + [_row(step) for step in advice.ladder]
 
 
@@ -46,11 +48,13 @@ def _row(step: Step) -> tuple[str, ...]:
 
 
 def _settings(advice: Advice) -> list[tuple[str, ...]]:
-    rows = [("full model by", "value", "error", "cost", "verdict", "why")]
+    rows: list[tuple[str, ...]] = [("full model by", "value", "error", "cost", "verdict", "why")]
     for s in advice.settings:
         value = "" if s.value is None else f"{s.value:.7g}"
         error = "" if s.value is None else f"{s.error:.2e}"
-        rows.append((s.title, value, error, _cost(s.seconds), "adequate" if s.is_adequate else "not adequate", s.why))
+        rows.append(
+            (s.title, value, error, _cost(s.seconds), "adequate" if s.is_adequate else "not adequate", s.why)
+        )
     return rows
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hybridsim.analysis.rungs.forces import with_parameters
+from hybridsim.analysis.rungs.forces import with_law, with_parameters
 from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Contact, Model
@@ -59,4 +59,4 @@ def _constant(contact: Contact, speed: str, parameter: str | None = None) -> Con
     parameters = dict(law.parameters) | ({speed: None} if parameter else {})
     arguments = dict(contact.arguments) | ({speed: parse(parameter)} if parameter else {})
     fixed = replace(law, name=f"{law.name}, constant", slip=force, stick=force, parameters=parameters)
-    return replace(contact, law=fixed, arguments=arguments)
+    return with_law(replace(contact, arguments=arguments), fixed)

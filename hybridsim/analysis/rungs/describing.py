@@ -27,7 +27,9 @@ class FirstHarmonic:
         self._slip = inlined(model, contact.slip_force(parse(self._speed)))
         unknown = self._slip.names - self._values.keys() - {self._speed}
         if unknown:
-            raise DoesNotApply(f"the friction of contact {contact.name} depends on {', '.join(sorted(unknown))}")
+            raise DoesNotApply(
+                f"the friction of contact {contact.name} depends on {', '.join(sorted(unknown))}"
+            )
         self._constant = self._slip_at(0.0) if self._speed not in self._slip.names else None
 
     def __call__(self, speed: float) -> float:

@@ -85,7 +85,9 @@ def _by_runs(viscous: Model, model: Model, names: list[str], period: float) -> R
         except HybridsimError as error:
             raise DoesNotApply(f"the model with dampers has no steady motion: {error.message}") from error
         if not steady.success or steady.multiple > 1:
-            raise DoesNotApply(f"the model with dampers has no motion of the forcing's period: {steady.message}")
+            raise DoesNotApply(
+                f"the model with dampers has no motion of the forcing's period: {steady.message}"
+            )
         found = np.array([steady.harmonic(name, 1) for name in velocities])
         for name, wave in zip(velocities, found, strict=True):
             if abs(steady.mean[name]) > _ONE_WAY * abs(wave):

@@ -1,4 +1,4 @@
-"""A model whose contacts are replaced by given forces: the modes of friction are gone."""
+"""How rungs rewrite a model: forces in place of contacts, another law for a contact, more parameters."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from hybridsim.expr import Expression, substitute
-from hybridsim.model import Component, Mode, Model, Parameter
+from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
 
 
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
@@ -23,6 +23,16 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
         outputs=outputs,
         title=f"{model.title or model.name}, {title}",
     )
+
+
+def with_law(contact: Contact, law: FrictionLaw) -> Contact:
+    """The contact with another law, without the parameters that this does not use."""
+    used = set(law.slip.names | law.stick.names)
+    while more := {n for u in used if (e := law.parameters.get(u)) is not None for n in e.names} - used:
+        used |= more
+    parameters = {name: value for name, value in law.parameters.items() if name in used}
+    arguments = {name: value for name, value in contact.arguments.items() if name in used}
+    return replace(contact, law=replace(law, parameters=parameters), arguments=arguments)
 
 
 def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:

@@ -1,6 +1,6 @@
 """How the contacts of a linear model slide under its forcing, at its frequency, where each is a viscous damper.
 
-    x' = A x + b e^{iwt} - B F,    V = W x + u e^{iwt},    F_i = c_i V_i
+x' = A x + b e^{iwt} - B F,    V = W x + u e^{iwt},    F_i = c_i V_i
 """
 
 from __future__ import annotations
@@ -40,7 +40,9 @@ class LinearResponse:
         self._frequency = frequency
         self._A, self._B = _matrix(rates, states), _matrix(rates, forces)
         self._W = _matrix(slides, states)
-        self._b0, self._u0 = (np.array([_mean(a, model.inputs, values) for a in rows]) for rows in (rates, slides))
+        self._b0, self._u0 = (
+            np.array([_mean(a, model.inputs, values) for a in rows]) for rows in (rates, slides)
+        )
         self._b, self._u = (np.array([_wave(a, frequency, inputs) for a in rows]) for rows in (rates, slides))
 
     def __call__(self, dampers: np.ndarray) -> np.ndarray:
@@ -58,7 +60,9 @@ class LinearResponse:
 
 
 def _matrix(rows: list[Affine], names: list[str]) -> np.ndarray:
-    return np.array([[row.linear.get(name, 0.0) for name in names] for row in rows]).reshape(len(rows), len(names))
+    return np.array([[row.linear.get(name, 0.0) for name in names] for row in rows]).reshape(
+        len(rows), len(names)
+    )
 
 
 def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> complex:

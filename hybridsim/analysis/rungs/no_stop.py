@@ -121,12 +121,16 @@ def held(model: Model) -> _Held:
     except np.linalg.LinAlgError:
         raise DoesNotApply(f"without damping the form has no solution at r = {r:.6g}") from None
     if not form.holds:
-        raise DoesNotApply(f"the motion stops: mu N/F0 = {f:.4g} is beyond the no-stop boundary at r = {r:.4g}")
+        raise DoesNotApply(
+            f"the motion stops: mu N/F0 = {f:.4g} is beyond the no-stop boundary at r = {r:.4g}"
+        )
     amplitude = form.amplitude * s.force / s.stiffness
     angle = _angle_at_top(s, amplitude)
     load = s.stiffness * amplitude - s.force * math.sin(angle)
     if load < s.stick_limit:
-        raise DoesNotApply(f"the motion stops: at its turning points the load {load:.4g} is below what stick holds")
+        raise DoesNotApply(
+            f"the motion stops: at its turning points the load {load:.4g} is below what stick holds"
+        )
     return _Held(found, amplitude, angle, s.damping > 0.0 and s.stick_limit == s.slip_force)
 
 

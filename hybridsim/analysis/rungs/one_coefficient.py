@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
+from hybridsim.analysis.rungs.forces import inlined, with_law
 from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Contact, Model
@@ -36,16 +37,13 @@ class OneCoefficient(Rung):
 
 def _lowered(contact: Contact) -> Contact:
     at_rest = substitute(contact.law.slip, {SPEED: parse(0)})
-    return replace(contact, law=replace(contact.law, name=f"{contact.law.name} mu_s := mu_k", stick=at_rest))
+    return with_law(contact, replace(contact.law, name=f"{contact.law.name}, mu_s := mu_k", stick=at_rest))
 
 
 def _jumps(model: Model, contact: Contact) -> bool:
     surface = contact.component(model.constant_names()).surface
     assert surface is not None  # every contact has one
-    jump, values, draw = surface.jump_above, model.parameter_values(), random.Random(0)
-    definitions = dict(model.definitions)
-    while used := jump.names & definitions.keys():
-        jump = substitute(jump, {name: definitions[name] for name in used})
+    jump, values, draw = inlined(model, surface.jump_above), model.parameter_values(), random.Random(0)
     for _ in range(_TRIALS):
         others = {name: draw.uniform(0.5, 1.5) for name in sorted(jump.names - values.keys())}
         size = evaluate(jump, {**values, **others})
