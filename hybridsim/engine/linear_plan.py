@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
 
 _MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
+_MOST_VECTORS = 64  # sets of modes that plans are kept for
+
+_lock = Lock()
 
 
 class LinearPlan:
@@ -76,7 +80,11 @@ class LinearPlan:
 def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
     """The plan of these vectors of modes that holds at the parameters in p, and its registers there."""
     kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
-    plans, inputs = kept.setdefault(met.tobytes(), []), p[: system.layout.parameters]
+    with _lock:
+        while len(kept) >= _MOST_VECTORS and met.tobytes() not in kept:
+            del kept[next(iter(kept))]
+        plans = kept.setdefault(met.tobytes(), [])
+    inputs = p[: system.layout.parameters]
     for plan in list(plans):
         registers = plan.recipe.values(inputs)
         if registers is not None:
