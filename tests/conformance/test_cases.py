@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import hybridsim as hs
@@ -17,8 +19,25 @@ INTEGRATORS = [one.name for one in hs.list_integrators()]
 REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corners", "nonlinear"}
 
 
-@pytest.mark.parametrize("name", INTEGRATORS)
-@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
+QUICK = {"scipy-dop853", "scipy-rk45"}
+# They step from Python and share all that hybridsim adds to them: each scene has its turn with one or two of them,
+# and the rest, some minutes, where slow tests are asked for; `python -m conformance.table` runs all of them as well.
+TURNS = [name for name in NATIVE if name not in QUICK]
+
+
+def runs() -> list[Any]:
+    """Every scene with every integrator."""
+    found = []
+    for number, scene in enumerate(SCENES):
+        for name in INTEGRATORS:
+            is_slow = name in TURNS and (number + TURNS.index(name)) % len(TURNS) != 0
+            marks = [pytest.mark.slow] if is_slow else []
+            found.append(pytest.param(scene, name, id=f"{scene.name}-{name}", marks=marks))
+    return found
+
+
+@pytest.mark.parametrize(("scene", "name"), runs())
 def test_scene(scene: Scene, name: str) -> None:
     """Right, or lacking a capability that the integrator declares."""
     result = outcome(name, scene)
@@ -30,10 +49,6 @@ def test_scene(scene: Scene, name: str) -> None:
             with pytest.raises(HybridsimError) as refusal:
                 judge.run(scene, name)
             assert any(reasons[capability] in str(refusal.value) for capability in missing)
-
-
-NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
-QUICK = {"scipy-dop853", "scipy-rk45"}  # the others find their events by the same code of SciPy's
 
 
 @pytest.mark.parametrize(
