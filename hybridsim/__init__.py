@@ -21,6 +21,7 @@ _HOME = {
     "Contact": "hybridsim.model",
     "Discrete": "hybridsim.model",
     "FrictionLaw": "hybridsim.model",
+    "LawTable": "hybridsim.model",
     "Guard": "hybridsim.model",
     "Input": "hybridsim.model",
     "Mode": "hybridsim.model",

@@ -35,6 +35,7 @@ from hybridsim.model import Discrete as Discrete
 from hybridsim.model import FrictionLaw as FrictionLaw
 from hybridsim.model import Guard as Guard
 from hybridsim.model import Input as Input
+from hybridsim.model import LawTable as LawTable
 from hybridsim.model import Mode as Mode
 from hybridsim.model import Model as Model
 from hybridsim.model import Monitor as Monitor

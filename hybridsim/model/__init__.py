@@ -5,6 +5,7 @@ from hybridsim.model.contact import Contact
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.inputs import Input
 from hybridsim.model.law import FrictionLaw
+from hybridsim.model.law_table import LawTable
 from hybridsim.model.library import ModelInfo, list_laws, list_models, load, load_law
 from hybridsim.model.model import Model
 from hybridsim.model.monitor import Monitor
@@ -20,6 +21,7 @@ __all__ = [
     "FrozenMap",
     "Guard",
     "Input",
+    "LawTable",
     "Mode",
     "Model",
     "ModelInfo",

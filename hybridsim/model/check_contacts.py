@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from hybridsim.model.check_names import check_identifier
 from hybridsim.model.contact import Contact
-from hybridsim.model.law import NORMAL, SPEED, FrictionLaw
+from hybridsim.model.law import FORCE, INDEX, LOAD_RATE, NORMAL, SPEED, FrictionLaw
 from hybridsim.model.scope import Scope
 
 # Keys of a law in TOML, which parameters of a law cannot be told from.
-_KEYS = ("name", "slip", "stick", "parameters", "title", "source")
+_KEYS = (
+    "name", "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial",
+    "copies", "tables", "parameters", "title", "source",
+)  # fmt: skip
+_TAKEN = {
+    SPEED: "the speed",
+    NORMAL: "the normal load",
+    LOAD_RATE: "the rate of the normal load",
+    INDEX: "the index of a copy",
+} | dict.fromkeys(_KEYS, "a key of the declaration")
+_AT_REST = ("stick", "stick_backward")
 
 
 def check_contacts(scope: Scope) -> None:
@@ -22,35 +32,81 @@ def check_contacts(scope: Scope) -> None:
 
 
 def check_law(scope: Scope, law: FrictionLaw) -> None:
-    """Report a law that uses other names than v, N and its own parameters."""
+    """Report a law that uses other names than v, N, dN and its own."""
     what = f"law {law.name}"
-    for name in law.parameters:
-        if check_identifier(scope, law, f"{what}, parameter", name) and name in (SPEED, NORMAL, *_KEYS):
-            taken = (
-                "the speed"
-                if name == SPEED
-                else "the normal load"
-                if name == NORMAL
-                else "a key of the declaration"
-            )
-            scope.fail(law, f"{what}: the parameter '{name}' is already {taken}", "rename it.")
-    own = frozenset(law.parameters)
-    defaults = {name: value for name, value in law.parameters.items() if value is not None}
-    _law_names(scope, law, "slip", own | {SPEED, NORMAL})
-    _law_names(scope, law, "stick", own | {NORMAL})
-    for name, value in defaults.items():
-        scope.need_own(value, f"{what}, parameter {name}", own)
-    used = law.slip.names | law.stick.names | {name for value in defaults.values() for name in value.names}
-    for name in sorted(own - used):
+    names = _own_names(scope, law)
+    known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
+    parameters = frozenset(law.parameters)
+    at_rest = {t.name for t in law.tables if t.over.text == SPEED or SPEED not in t.over.names}
+    used: set[str] = set()
+    for field, expr in law.expressions():
+        used |= expr.names
+        if field.endswith(", when"):
+            continue  # a condition; the contact's automaton is checked for it
+        if field in _AT_REST:
+            allowed = parameters | at_rest | {NORMAL}
+        elif field.startswith("slip"):
+            allowed = parameters | {table.name for table in law.tables} | {SPEED, NORMAL}
+        elif field.endswith(", start"):
+            allowed = parameters
+        elif field.startswith("table "):
+            allowed = parameters | {SPEED}
+        else:
+            allowed = known
+        scope.need_own(expr, f"{what}, {field}", allowed)
+    for name, value in law.parameters.items():
+        if value is not None:
+            scope.need_own(value, f"{what}, parameter {name}", parameters)
+            used |= value.names
+    for name in sorted(parameters - used - {law.copies}):
+        where = "in neither slip nor stick" if law.is_set_valued else "nowhere in the law"
+        scope.fail(law, f"{what}: the parameter '{name}' is used {where}", "use it or leave it out.")
+    _form(scope, law, what)
+
+
+def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
+    """Parameters, definitions, tables and states; reports names that cannot be, and those that mean two things."""
+    seen: dict[str, str] = {}
+    named = [("parameter", name) for name in law.parameters]
+    named += [("definition", name) for name in law.definitions]
+    named += [("table", table.name) for table in law.tables] + [("state", state.name) for state in law.states]
+    for kind, name in named:
+        what = f"law {law.name}"
+        if not check_identifier(scope, law, f"{what}, {kind}", name):
+            continue
+        if name in _TAKEN:
+            scope.fail(law, f"{what}: the {kind} '{name}' is already {_TAKEN[name]}", "rename it.")
+        elif name in seen:
+            scope.fail(law, f"{what}: '{name}' is both a {seen[name]} and a {kind}", "rename one of them.")
+        seen.setdefault(name, kind)
+    return frozenset(seen)
+
+
+def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
+    """Report parts that the form of the law has no use for, and modes that change what is not the law's."""
+    if law.is_set_valued:
+        for field in ("states", "definitions", "modes", "copies"):
+            if getattr(law, field):
+                scope.fail(
+                    law, f"{what}: slip and stick have no {field}", "give the law a force instead of the two."
+                )
+        return
+    states = [state.name for state in law.states]
+    for mode in law.modes:
+        resets = [name for guard in mode.guards for choice in guard.then for name in choice.reset]
+        for name in (*mode.der, *resets):
+            if name not in states:
+                scope.unknown(law, f"{what}, mode {mode.name}: the law has no state", name, states, "states")
+        for name in mode.set:
+            if name != FORCE:
+                message = f"{what}, mode {mode.name} sets '{name}'"
+                scope.fail(law, message, "a mode of a law can set its force, and nothing else.")
+    if law.copies is not None and law.copies not in law.parameters:
         scope.fail(
             law,
-            f"{what}: the parameter '{name}' is used in neither slip nor stick",
-            "use it or leave it out.",
+            f"{what}: copies is '{law.copies}', which is no parameter",
+            f'write parameters = ["{law.copies}", ...], so that a contact says how many.',
         )
-
-
-def _law_names(scope: Scope, law: FrictionLaw, field: str, known: frozenset[str]) -> None:
-    scope.need_own(getattr(law, field), f"law {law.name}, {field}", known)
 
 
 def _contact(scope: Scope, contact: Contact) -> None:
@@ -60,8 +116,13 @@ def _contact(scope: Scope, contact: Contact) -> None:
     scope.need(contact.normal, f"{what}, normal", known)
     for name, value in contact.arguments.items():
         scope.need(value, f"{what}, law argument {name}", known)
+    own = [state.name for state in contact.law.states]
+    for field in ("start", "nominal"):
+        for name in getattr(contact, field):
+            if name.rstrip("0123456789") not in own and name not in own:
+                scope.unknown(contact, f"{what}, {field}: the law has no state", name, own, "states")
     reached = scope.reached(contact.velocity)
-    if not reached <= scope.all_names:
+    if not (reached <= scope.all_names and contact.law.is_set_valued):
         return
     forces = sorted(
         name

@@ -93,7 +93,18 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
             scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative.")
             return
-    forces = contact.limit_force, contact.onset_force
+    if not contact.law.is_set_valued:
+        return
+    for backward in (False, True):
+        _onset(scope, contact, values, backward)
+
+
+def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
+    """The limit of stick beside the slip force from which it is left, in one direction."""
+    what = f"contact {contact.name}"
+    if backward and contact.law.slip_backward is None and contact.law.stick_backward is None:
+        return
+    forces = contact.limit_force(backward), contact.onset_force(backward)
     if not all(force.names <= values.keys() for force in forces):
         return
     limit, onset = (_value(scope, force, values) for force in forces)

@@ -1,18 +1,22 @@
-"""A frictional contact: relative velocity, normal load and a law become the modes slip+, slip- and stick."""
+"""A frictional contact: relative velocity, normal load and a law become automata, and the states of the law."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.expr.evaluate import dependency_order
-from hybridsim.model.component import Component, Guard, Mode, Surface
+from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.declared import Declared
 from hybridsim.model.frozen_map import FrozenMap
-from hybridsim.model.law import NORMAL, SPEED, FrictionLaw
+from hybridsim.model.law import LOAD_RATE, NORMAL, SPEED, FrictionLaw
+
+if TYPE_CHECKING:
+    from hybridsim.model.quantities import State
 
 
 @dataclass(frozen=True)
@@ -29,11 +33,16 @@ class Contact(Declared):
     law : a `FrictionLaw`, or the name of one that comes with the package.
     arguments : law parameter to number or expression over the model's names; what is not given has the law's
         default.
+    opens : the contact lifts off where the load would become negative: there is no force until it is back. An automaton
+        of the modes ``closed`` and ``open``, named ``f_N`` in a contact f, as is the load that it leaves.
+    start, nominal : of states of the law, by their names there, instead of what the law says.
 
     Examples
     --------
     >>> Contact("f", velocity="v", normal="N", law="coulomb", arguments={"mu": 0.5}).component().modes[0].set
     {'f': Expression(text='0.5*N')}
+    >>> [s.name for s in Contact("f", "v", "N", "dahl", {"mu": 0.5, "sigma": 1e4}).states()]
+    ['f_z']
     """
 
     name: str
@@ -41,11 +50,15 @@ class Contact(Declared):
     normal: Expression
     law: FrictionLaw
     arguments: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    opens: bool = False
+    start: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    nominal: Mapping[str, float] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
         self._texts("name")
         self._expressions("velocity", "normal")
-        self._maps("arguments")
+        self._maps("arguments", "start")
+        object.__setattr__(self, "nominal", FrozenMap(self.nominal))
         law: object = self.law
         if isinstance(law, str):
             from hybridsim.model.library import load_law
@@ -55,11 +68,11 @@ class Contact(Declared):
             raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
 
     def component(self, constants: Collection[str] = ()) -> Component:
-        """The automaton: three modes on the surface velocity = 0.
+        """The automaton of the contact's own name; with a set-valued law three modes on the surface velocity = 0.
 
             slip+ : velocity >= 0,  f = +slip(v = velocity)
-            slip- : velocity <= 0,  f = -slip(v = -velocity)
-            stick : velocity = 0,   -stick <= f <= stick,  f solved for
+            slip- : velocity <= 0,  f = -slip_backward(v = -velocity)
+            stick : velocity = 0,   -stick_backward <= f <= stick,  f solved for
 
         Parameters
         ----------
@@ -70,32 +83,94 @@ class Contact(Declared):
         ------
         ModelError for an argument that the law does not have, or one that is missing.
         """
-        varies = bool(self.normal.names - set(constants))
+        return next(part for part in self.components(constants) if part.name == self.name)
+
+    def components(
+        self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
+    ) -> tuple[Component, ...]:
+        """All the automata that the contact becomes: its own, those of copies, of lift-off and of tables.
+
+        Parameters
+        ----------
+        load_rate : gives the rate of a load that varies, for a law that asks for it.
+        """
+        varies = self._varies(constants)
         if varies not in self._expanded:
-            self._expanded[varies] = self._component(varies)
+            self._expanded[varies] = tuple(self._components(varies, load_rate))
         return self._expanded[varies]
 
+    def states(
+        self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
+    ) -> tuple[State, ...]:
+        """The states that the law brings into the model."""
+        from hybridsim.model.law_with_states import states_of
+
+        return states_of(self, self.values(self._varies(constants), load_rate)) if self.law.states else ()
+
+    def _varies(self, constants: Collection[str]) -> bool:
+        return bool(self.normal.names - set(constants))
+
     @cached_property
-    def _expanded(self) -> dict[bool, Component]:
-        """What `component` has found: copies of a model with other values have the same contacts."""
+    def _expanded(self) -> dict[bool, tuple[Component, ...]]:
+        """What `components` has found: copies of a model with other values have the same contacts."""
         return {}
 
-    def _component(self, varies: bool) -> Component:
+    def _components(self, varies: bool, load_rate: Callable[[], Expression] | None) -> Iterator[Component]:
+        from hybridsim.model.law_with_states import components_of
+
+        values = self.values(varies, load_rate)
+        loaded: tuple[Guard, ...] = ()
+        if varies and not self.opens:
+            message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
+            loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
+        if self.law.is_set_valued:
+            yield self._set_valued(loaded)
+        else:
+            yield from components_of(self, values, loaded)
+        if self.opens:
+            yield self._lifting(values)
+        for table in self.law.tables:
+            argument = substitute(table.over, {**values, SPEED: self._argument_speed()})
+            from_zero = table.over.text == SPEED and self.law.is_set_valued
+            yield table.component(self.variable(table.name), argument, from_zero)
+
+    def variable(self, name: str) -> str:
+        """Name in the model of what the law calls so: of a state, of a table, of the load that lift-off leaves."""
+        return f"{self.name}_{name}"
+
+    def _argument_speed(self) -> Expression:
+        """What a table is read at: the speed, as the modes of a set-valued law give it, or the velocity."""
+        return parse(self.variable(SPEED)) if self.law.is_set_valued else self.velocity
+
+    def _lifting(self, values: Mapping[str, Expression]) -> Component:
+        """Two modes that set the load: as it is, and none."""
+        name, place = self.variable(NORMAL), self.place
+        away = Guard("load", self.normal, (Choice("open"),), place=place)
+        back = Guard("load", self._form("-load", load=self.normal), (Choice("closed"),), place=place)
+        closed, opened = {name: self.normal}, {name: parse(0)}
+        if LOAD_RATE in values:
+            closed[self.variable(LOAD_RATE)] = values[LOAD_RATE]
+            opened[self.variable(LOAD_RATE)] = parse(0)
+        modes = (Mode("closed", (away,), set=closed), Mode("open", (back,), set=opened))
+        return Component(name, modes, initial="closed", place=place)
+
+    def _set_valued(self, loaded: tuple[Guard, ...]) -> Component:
         force = parse(self.name, self.place)
         backward = self._form("-v", v=self.velocity)
         forward_slip = self.slip_force(self.velocity)
-        backward_slip = self._form("-f", f=self.slip_force(backward))
-        at_rest, limit = self.onset_force, self.limit_force
-        loaded: tuple[Guard, ...] = ()
-        if varies:
-            message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
-            loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
+        backward_slip = self._form("-f", f=self.slip_force(backward, backward=True))
+        at_rest, backward_at_rest = self.onset_force(), self.onset_force(backward=True)
+        limit, backward_limit = self.limit_force(), self.limit_force(backward=True)
         upper = self._form("limit - f", limit=limit, f=force)
-        lower = self._form("limit + f", limit=limit, f=force)
+        lower = self._form("limit + f", limit=backward_limit, f=force)
+        forward_set, backward_set, stick_set = {self.name: forward_slip}, {self.name: backward_slip}, {}
+        if any(SPEED in table.over.names for table in self.law.tables):
+            speed = self.variable(SPEED)
+            forward_set[speed], backward_set[speed], stick_set[speed] = self.velocity, backward, parse(0)
         modes = (
-            Mode("slip+", (Guard("velocity", self.velocity), *loaded), set={self.name: forward_slip}),
-            Mode("slip-", (Guard("velocity", backward), *loaded), set={self.name: backward_slip}),
-            Mode("stick", (Guard("upper", upper), Guard("lower", lower), *loaded)),
+            Mode("slip+", (Guard("velocity", self.velocity), *loaded), set=forward_set),
+            Mode("slip-", (Guard("velocity", backward), *loaded), set=backward_set),
+            Mode("stick", (Guard("upper", upper), Guard("lower", lower), *loaded), set=stick_set),
         )
         surface = Surface(
             function=self.velocity,
@@ -104,30 +179,49 @@ class Contact(Declared):
             below="slip-",
             hold="stick",
             jump_above=self._form("limit - slip", limit=limit, slip=at_rest),
-            jump_below=self._form("slip - limit", limit=limit, slip=at_rest),
+            jump_below=self._form("slip - limit", limit=backward_limit, slip=backward_at_rest),
         )
         return Component(self.name, modes, surface=surface, place=self.place)
 
-    @cached_property
-    def onset_force(self) -> Expression:
+    def onset_force(self, backward: bool = False) -> Expression:
         """Magnitude of the force at the onset of slip, over the model's names."""
-        return self.slip_force(parse(0))
+        slip = (self.law.slip_backward if backward else None) or self.law.slip
+        return self._at_rest(f"onset{backward}", slip, {SPEED: parse(0)})
 
-    def slip_force(self, speed: Expression) -> Expression:
+    def slip_force(self, speed: Expression, *, backward: bool = False) -> Expression:
         """Magnitude of the force when sliding at a speed >= 0, over the model's names."""
-        return substitute(self._form("slip", slip=self.law.slip), {SPEED: speed, **self._values()})
+        slip = (self.law.slip_backward if backward else None) or self.law.slip
+        assert slip is not None  # a set-valued law has it
+        return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
+
+    def limit_force(self, backward: bool = False) -> Expression:
+        """The most that stick can carry, over the model's names."""
+        stick = (self.law.stick_backward if backward else None) or self.law.stick
+        return self._at_rest(f"limit{backward}", stick, {})
+
+    def _at_rest(self, which: str, force: Expression | None, names: dict[str, Expression]) -> Expression:
+        """A force of a set-valued law where the speed is zero and tables over it have a number; worked out once."""
+        assert force is not None
+        if which not in self._forces:
+            names |= self.values()
+            for table in self.law.tables:
+                if table.over.text == SPEED:
+                    names[table.name] = parse(table.value(0.0))
+            self._forces[which] = substitute(self._form("force", force=force), names)
+        return self._forces[which]
 
     @cached_property
-    def limit_force(self) -> Expression:
-        """The most that stick can carry, over the model's names."""
-        return substitute(self._form("stick", stick=self.law.stick), self._values())
+    def _forces(self) -> dict[str, Expression]:
+        return {}
 
     def _form(self, template: str, **parts: Expression) -> Expression:
         """An expression built from parts, placed where the contact stands."""
         return substitute(parse(template, self.velocity.place or self.place), parts)
 
-    def _values(self) -> dict[str, Expression]:
-        """Normal load and law parameters as expressions over the model's names."""
+    def values(
+        self, varies: bool = True, load_rate: Callable[[], Expression] | None = None
+    ) -> dict[str, Expression]:
+        """What the law's names stand for, the speed and its states left out, as expressions over the model's."""
         law = self.law
         for name, value in self.arguments.items():
             if name not in law.parameters:
@@ -149,4 +243,8 @@ class Contact(Declared):
         values: dict[str, Expression] = dict(self.arguments)
         for name in dependency_order(defaults, f"defaults of the law '{law.name}'"):
             values[name] = substitute(defaults[name], values)
-        return {NORMAL: self.normal, **values}
+        values |= {table.name: parse(self.variable(table.name)) for table in law.tables}
+        if load_rate is not None and any(LOAD_RATE in e.names for _, e in law.expressions()):
+            values[LOAD_RATE] = load_rate() if varies else parse(0)
+        load = parse(self.variable(NORMAL), self.normal.place) if self.opens else self.normal
+        return {NORMAL: load, **values}

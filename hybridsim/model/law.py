@@ -1,49 +1,123 @@
-"""A friction law: how large the force is in slip, and how much stick can carry."""
+"""A friction law: the force as a function of velocity, load and, where it remembers, of states of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from hybridsim.expr import Expression
+from hybridsim.model.component import Mode
 from hybridsim.model.declared import Declared, as_tuple
 from hybridsim.model.frozen_map import FrozenMap
+from hybridsim.model.law_table import LawTable
+from hybridsim.model.quantities import State
 
 SPEED = "v"
 NORMAL = "N"
+LOAD_RATE = "dN"
+INDEX = "i"
+FORCE = "force"
 
 
 @dataclass(frozen=True)
 class FrictionLaw(Declared):
-    """Magnitude of the friction force as a declaration.
+    """The friction force as a declaration, in one of two forms.
 
-        slip :  |f| = slip(v, N),  v >= 0 the magnitude of the relative velocity
-        stick:  |f| <= stick(N)
+    Set-valued, with a mode of its own for rest; v >= 0 is the magnitude of the relative velocity:
+
+        slip :  |f| = slip(v, N),   forward and backward alike unless ``slip_backward`` is given
+        stick:  -stick_backward(N) <= f <= stick(N)
+
+    Single-valued, with states of its own or none; v is the relative velocity with its sign:
+
+        f = force(v, N, z),   z' = der(v, N, z)
 
     Parameters
     ----------
-    slip : expression of ``v``, ``N`` (normal load) and the law's own parameters.
-    stick : expression of ``N`` and the law's own parameters.
+    slip, stick : expressions of ``v`` (slip alone), ``N`` (normal load) and the law's own parameters.
     parameters : name to default (a number or an expression of the others); a default of None, or a plain
         sequence of names, makes them arguments that every contact has to give.
+    slip_backward, stick_backward : where they differ from the forward ones; both are magnitudes.
+    force : expression of ``v``, ``N``, ``dN`` (rate of the load), parameters, states and definitions.
+    states : `State` objects; in a contact f the state z is called ``f_z``.
+    definitions : named parts of the other expressions.
+    modes, initial : an automaton of the law: modes with guards, rates ``der`` of the states and, with ``set``, a
+        ``force`` of their own.
+    copies : parameter that says how many copies of the law act in parallel, each with its own states and modes;
+        the force is the sum, the index of a copy is ``i`` = 1, 2, ...
+    tables : named functions of one argument, given by points.
 
     Examples
     --------
     >>> FrictionLaw("coulomb", slip="mu*N", stick="mu*N", parameters=["mu"]).parameters
     {'mu': None}
+    >>> z = State("z", 0, "v - k/(mu*N)*abs(v)*z")
+    >>> FrictionLaw("dahl", parameters=["mu", "k"], states=[z], force="k*z").is_set_valued
+    False
     """
 
     name: str
-    slip: Expression
-    stick: Expression
+    # None where the law gives a force, and nowhere else; most readers have to do with set-valued laws alone
+    slip: Expression = None  # type: ignore[assignment]
+    stick: Expression = None  # type: ignore[assignment]
     parameters: Mapping[str, Expression | None] = field(default_factory=FrozenMap)
     title: str = ""
     source: str = ""
+    slip_backward: Expression | None = None
+    stick_backward: Expression | None = None
+    force: Expression | None = None
+    states: tuple[State, ...] = ()
+    definitions: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    modes: tuple[Mode, ...] = ()
+    initial: str | None = None
+    copies: str | None = None
+    tables: tuple[LawTable, ...] = ()
 
     def __post_init__(self) -> None:
-        self._texts("name")
-        self._expressions("slip", "stick")
+        self._texts("name", "initial", "copies")
+        self._expressions("slip", "stick", "slip_backward", "stick_backward", "force")
         given: object = self.parameters
         if not isinstance(given, Mapping):
             object.__setattr__(self, "parameters", dict.fromkeys(as_tuple(given)))
-        self._maps("parameters")
+        self._maps("parameters", "definitions")
+        self._parts("states", State)
+        self._parts("modes", Mode)
+        self._parts("tables", LawTable)
+        if self.initial is None and len(self.modes) == 1:
+            object.__setattr__(self, "initial", self.modes[0].name)
+        given_forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
+        if self.force is None and len(given_forms) < 2:
+            raise self._fault(
+                "it gives neither slip and stick nor a force",
+                "give slip and stick (magnitudes), or force (with its sign)",
+            )
+        if self.force is not None and given_forms:
+            raise self._fault("it gives both slip or stick and a force", "give slip and stick, or force")
+
+    @property
+    def is_set_valued(self) -> bool:
+        """Whether rest is a mode with a range of forces, to be solved for."""
+        return self.force is None
+
+    def expressions(self) -> Iterator[tuple[str, Expression]]:
+        """Every expression of the law with the words for where it stands, defaults of parameters left out."""
+        for name in ("slip", "stick", "slip_backward", "stick_backward", "force"):
+            if (value := getattr(self, name)) is not None:
+                yield name, value
+        for name, value in self.definitions.items():
+            yield f"definition {name}", value
+        for table in self.tables:
+            yield f"table {table.name}, over", table.over
+        for state in self.states:
+            yield f"state {state.name}, start", state.start
+            yield f"state {state.name}, der", state.der
+        for mode in self.modes:
+            for name, value in (*mode.der.items(), *mode.set.items()):
+                yield f"mode {mode.name}, {name}", value
+            for guard in mode.guards:
+                yield f"mode {mode.name}, guard {guard.name}", guard.expr
+                for choice in guard.then:
+                    if choice.when is not None:
+                        yield f"mode {mode.name}, guard {guard.name}, when", choice.when
+                    for name, value in choice.reset.items():
+                        yield f"mode {mode.name}, guard {guard.name}, reset of {name}", value

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from numbers import Real
 from typing import Any
 
 from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, resolve
-from hybridsim.model.component import Component
+from hybridsim.model.component import Component, Corner
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared, as_tuple
 from hybridsim.model.inputs import Input
+from hybridsim.model.law_with_states import ContactState
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.schedule import Schedule
@@ -100,6 +101,25 @@ class Model(Declared):
             remedy = "give a mapping from names to expressions, or pairs of the two"
             raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
+        object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
+
+    def _with_those_of_laws(self) -> Iterable[State]:
+        """The states, those that laws of contacts bring among them, as the contacts have them now."""
+        brought: dict[str, State] = {}
+        for contact in self.contacts:
+            try:
+                states = self._brought_by(contact)
+            except ModelError:
+                continue  # `validate` reports it
+            brought |= {state.name: state for state in states}
+        for state in self.states:
+            yield brought.pop(state.name, state) if isinstance(state, ContactState) else state
+        yield from brought.values()
+
+    def _load_rate(self, contact: Contact) -> Expression:
+        from hybridsim.model.rate import rate_along
+
+        return rate_along(self, contact.normal, f"the normal load of contact {contact.name}")
 
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:
@@ -145,6 +165,7 @@ class Model(Declared):
         """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
         _known(changes, names, "state", self.name)
+        contacts = tuple(self._started(contact, changes) for contact in self.contacts)
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
             return tuple(
@@ -152,7 +173,7 @@ class Model(Declared):
                 for part in parts
             )
 
-        return self._valued(states=changed(self.states), discrete=changed(self.discrete))
+        return self._valued(states=changed(self.states), discrete=changed(self.discrete), contacts=contacts)
 
     def with_values_of(self, other: Model) -> Model:
         """A copy with the values of a model that has the same parameters, states and discrete states."""
@@ -175,6 +196,18 @@ class Model(Declared):
         if name not in self._common:
             self._common[name] = make()
         return self._common[name]
+
+    def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
+        """The contact with new initial values of states that its law brings."""
+        own = {name for name in changes if name.startswith(contact.variable(""))}
+        if not (own and contact.law.states):
+            return contact
+        own &= {state.name for state in self._brought_by(contact)}
+        start = {name.removeprefix(contact.variable("")): parse(changes[name]) for name in sorted(own)}
+        return replace(contact, start={**contact.start, **start})
+
+    def _brought_by(self, contact: Contact) -> tuple[State, ...]:
+        return contact.states(self.constant_names(), partial(self._load_rate, contact))
 
     def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
         """A copy in which every contact has a single-valued force, for a look at what that costs.
@@ -224,13 +257,18 @@ class Model(Declared):
         return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
-        """All automata: the contacts expanded, then the components, each in order of declaration."""
+        """All automata: the contacts expanded, then the components, in order of declaration; corners last."""
         components: tuple[Component, ...] = self.once("components", self._components)
         return components
 
     def _components(self) -> tuple[Component, ...]:
-        constants = self.constant_names()
-        return (*(contact.component(constants) for contact in self.contacts), *self.components)
+        parts = [part for contact in self.contacts for part in self.components_of(contact)]
+        parts += self.components
+        return tuple(sorted(parts, key=lambda part: isinstance(part, Corner)))
+
+    def components_of(self, contact: Contact) -> tuple[Component, ...]:
+        """The automata that one of its contacts becomes."""
+        return contact.components(self.constant_names(), partial(self._load_rate, contact))
 
     def constant_names(self) -> frozenset[str]:
         """Names that cannot change during a run: parameters, and definitions over these alone."""

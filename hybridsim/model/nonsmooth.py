@@ -58,7 +58,7 @@ def _expressions(model: Model) -> Iterator[Expression]:
     yield from (state.der for state in model.states)
     yield from (expr for _, expr in model.definitions)
     for contact in model.contacts:
-        yield from (contact.velocity, contact.normal, contact.law.slip, contact.law.stick)
+        yield from (contact.velocity, contact.normal, *(expr for _, expr in contact.law.expressions()))
         yield from (value for value in contact.law.parameters.values() if value is not None)
         yield from contact.arguments.values()
     for component in model.components:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from hybridsim.model.component import Choice, Component, Guard, Mode
 from hybridsim.model.contact import Contact
 from hybridsim.model.law import SPEED
 from hybridsim.model.quantities import Parameter
+from hybridsim.model.rate import inlined, rate_along
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -28,8 +29,8 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
         raise UsageError(
             f"there is no regularisation {kind!r}", remedy=nearest(kind, KINDS, kind="regularisations")
         )
-    if not model.contacts:
-        raise UsageError(f"the model '{model.name}' has no contact to regularise")
+    if not any(contact.law.is_set_valued for contact in model.contacts):
+        raise UsageError(f"the model '{model.name}' has no contact with a set-valued law to regularise")
     name = _free_name(model, "v0")
     width = Parameter(name, parse(v0))
     changed = replace(model, parameters=(*model.parameters, width))
@@ -38,7 +39,11 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
         raise UsageError(f"v0 is {value!r}", remedy="give a velocity above zero")
     build: Callable[[Model, Contact, str], Component]
     build = _karnopp if kind == "karnopp" else lambda m, contact, w: _smooth(m, contact, w, kind)
-    components = tuple(build(changed, contact, name) for contact in model.contacts)
+    components = tuple(
+        build(changed, contact, name) if contact.law.is_set_valued and part.name == contact.name else part
+        for contact in model.contacts
+        for part in model.components_of(contact)
+    )
     gone = {contact.name for contact in model.contacts}
     outputs = tuple(
         replace(
@@ -48,7 +53,9 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
     )
     definitions = model.definitions
     if kind == "karnopp":
-        definitions += tuple((_holding(c.name), _holding_force(model, c)) for c in model.contacts)
+        definitions += tuple(
+            (_holding(c.name), _holding_force(model, c)) for c in model.contacts if c.law.is_set_valued
+        )
     return replace(
         changed,
         contacts=(),
@@ -71,7 +78,18 @@ def _free_name(model: Model, wish: str) -> str:
 def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
     """One mode, f = slip(|v|) g(v/v0) with g odd and rising from -1 to 1."""
     _refuse_static(model, contact, kind)
-    speed = _form("abs(velocity)", velocity=contact.velocity) if SPEED in contact.law.slip.names else parse(0)
+    if contact.law.slip_backward is not None:
+        raise UsageError(
+            f"contact {contact.name}: its law '{contact.law.name}' is not the same forward and backward; "
+            f"'{kind}' knows one magnitude",
+            remedy="use 'karnopp'",
+        )
+    slip = contact.law.slip
+    speed = (
+        _form("abs(velocity)", velocity=contact.velocity)
+        if slip is not None and SPEED in slip.names
+        else parse(0)
+    )
     force = _form(_SMOOTH[kind], slip=contact.slip_force(speed), velocity=contact.velocity, v0=parse(v0))
     return Component(
         contact.name,
@@ -105,16 +123,18 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     left the band.
     """
     name, velocity, loaded = contact.name, contact.velocity, _loaded(model, contact)
-    held, limit, width = parse(_holding(name)), contact.limit_force, parse(v0)
+    held, limit, width = parse(_holding(name)), contact.limit_force(), parse(v0)
     backward = _form("-velocity", velocity=velocity)
     parts = {"velocity": velocity, "v0": width, "held": held, "limit": limit}
-    up, down = _form("held > limit", **parts), _form("-held > limit", **parts)
+    backward_limit = contact.limit_force(backward=True)
+    backward_parts = {**parts, "limit": backward_limit}
+    up, down = _form("held > limit", **parts), _form("-held > limit", **backward_parts)
     stop = _stopping(model, contact)
     into_band = (Choice("break+", up, stop), Choice("break-", down, stop), Choice("stick", None, stop))
     out_up = Guard("fast", _form("v0 - velocity", **parts), (Choice("slip+"),))
     out_down = Guard("fast-backward", _form("v0 + velocity", **parts), (Choice("slip-"),))
     forward_force = contact.slip_force(velocity)
-    backward_force = _form("-f", f=contact.slip_force(backward))
+    backward_force = _form("-f", f=contact.slip_force(backward, backward=True))
     modes = (
         Mode(
             "slip+",
@@ -130,7 +150,7 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
             "stick",
             (
                 Guard("upper", _form("limit - held", **parts), (Choice("break+"),)),
-                Guard("lower", _form("limit + held", **parts), (Choice("break-"),)),
+                Guard("lower", _form("limit + held", **backward_parts), (Choice("break-"),)),
                 out_up,
                 out_down,
                 *loaded,
@@ -144,8 +164,13 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
         ),
         Mode(
             "break-",
-            (Guard("held", _form("-held - limit", **parts), (Choice("stick"),)), out_up, out_down, *loaded),
-            set={name: _form("-limit", **parts)},
+            (
+                Guard("held", _form("-held - limit", **backward_parts), (Choice("stick"),)),
+                out_up,
+                out_down,
+                *loaded,
+            ),
+            set={name: _form("-limit", **backward_parts)},
         ),
     )
     return Component(name, modes, initial="stick", place=contact.place)
@@ -164,8 +189,7 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
     """
     from hybridsim.expr.slope import slope
 
-    definitions = dict(model.definitions)
-    velocity = _inlined(contact.velocity, definitions)
+    velocity = inlined(contact.velocity, dict(model.definitions))
     inputs = velocity.names & {i.name for i in model.inputs}
     if inputs:
         raise UsageError(
@@ -173,12 +197,7 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
             f"'karnopp' would need",
             remedy="use 'tanh' or 'arctan'",
         )
-    rate = slope(velocity, "t")
-    for state in model.states:
-        part = slope(velocity, state.name)
-        if part.text != "0":
-            der = _inlined(state.der, definitions)
-            rate = _form("rate + part*der", rate=rate, part=part, der=der)
+    rate = rate_along(model, velocity, f"the velocity of contact {contact.name}")
     others = rate.names & {c.name for c in model.contacts if c is not contact}
     if others:
         raise UsageError(
@@ -195,12 +214,6 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
         )
     free = substitute(rate, {contact.name: parse(0)})
     return _form("-free/effect", free=free, effect=effect)
-
-
-def _inlined(expr: Expression, definitions: Mapping[str, Expression]) -> Expression:
-    while used := expr.names & definitions.keys():
-        expr = substitute(expr, {name: definitions[name] for name in used})
-    return expr
 
 
 def _stopping(model: Model, contact: Contact) -> dict[str, Expression]:

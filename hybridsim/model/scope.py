@@ -26,10 +26,9 @@ class Scope:
 
     def _expanded(self) -> Iterator[Component]:
         """The components that could be built; a contact that could not is reported."""
-        constants = self.model.constant_names()
         for contact in self.model.contacts:
             try:
-                yield contact.component(constants)
+                yield from self.model.components_of(contact)
             except ModelError as fault:
                 self.errors.append(fault)
         yield from self.model.components
@@ -57,6 +56,11 @@ class Scope:
             yield "definition", name, Declared(place=expr.place)
         for contact in model.contacts:
             yield "contact force", contact.name, contact
+        brought = {contact.name for contact in model.contacts}
+        for component in self.components[: len(self.components) - len(model.components)]:
+            for name in component.variables:
+                if name not in brought:
+                    yield f"variable of contact {component.name}", name, component
         for component in model.components:
             for name in component.variables:
                 yield f"variable of component {component.name}", name, component

@@ -34,11 +34,12 @@ def _component(name: str, table: Table, place: Place) -> Component:
                 f"two initial modes, '{named or marked[0]}' and '{mode}'", remedy, "modes", mode, "initial"
             )
     surface = _surface(table)
-    modes = [_mode(mode, part) for mode, part in tables.items()]
+    modes = [read_mode(mode, part) for mode, part in tables.items()]
     return Component(name, tuple(modes), named or (marked[0] if marked else None), surface, place=place)
 
 
-def _mode(name: str, table: Table) -> Mode:
+def read_mode(name: str, table: Table) -> Mode:
+    """One entry of a table of modes."""
     table.only("guards", "der", "set", "initial")
     guards = tuple(
         _guard(guard, part) for guard, part in table.entries("guards", f"mode {name}, guard", "expr")

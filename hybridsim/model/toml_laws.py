@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from hybridsim.errors import nearest
-from hybridsim.expr import Expression
-from hybridsim.model.law import FrictionLaw
+from hybridsim.errors import UsageError, nearest
+from hybridsim.expr import Expression, parse
+from hybridsim.model.law import SPEED, FrictionLaw
+from hybridsim.model.law_table import LawTable
+from hybridsim.model.quantities import State
+from hybridsim.model.toml_automata import read_mode
 from hybridsim.model.toml_table import Table
 
-_OWN = ("name", "slip", "stick", "parameters", "title", "source")
+KEYS = (
+    "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial", "copies",
+    "tables", "parameters", "title", "source",
+)  # fmt: skip
+_OWN = ("name", *KEYS)
+_BRINGS = ("slip", "stick", "force")
 
 
 def read_laws(root: Table) -> dict[str, FrictionLaw]:
     """The laws that the file declares, by name."""
     found = {}
     for name, table in root.entries("laws", "law"):
-        table.only("slip", "stick", "parameters", "title", "source")
-        found[name] = _law(name, table, {})
+        table.only(*KEYS)
+        law = _law(name, table, {})
+        if law is not None:
+            found[name] = law
     return found
 
 
@@ -27,7 +38,7 @@ def read_law_of_contact(
     """Law and arguments of a contact; None, with the fault noted, where there is none of that name.
 
     ``law = { name = "coulomb", mu = "mu" }`` names one of the file or of the package; with ``slip`` and
-    ``stick`` the law is brought along, and every other key is a parameter of it with its value.
+    ``stick``, or with ``force``, the law is brought along, and every other key is a parameter of it with its value.
     """
     if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }.'):
         return None
@@ -36,9 +47,10 @@ def read_law_of_contact(
         return None
     arguments = {key: table.parsed(value, key) for key, value in table.data.items() if key not in _OWN}
     name = table.text("name")
-    if "slip" in table.data or "stick" in table.data:
-        return _law(name or str(contact.path[-1]), table, arguments), arguments
-    for key in ("parameters", "title", "source"):
+    if any(key in table.data for key in _BRINGS):
+        own = _law(name or str(contact.path[-1]), table, arguments)
+        return None if own is None else (own, arguments)
+    for key in KEYS:
         if key in table.data:
             table.fail(f"'{key}' belongs to the declaration of a law", f"write it in [laws.{name}].", key)
     if not table.require("name", 'write law = { name = "coulomb", mu = 0.5 }.'):
@@ -58,9 +70,7 @@ def _packaged(name: str) -> FrictionLaw | None:
     return load_law(name) if name in list_laws() else None
 
 
-def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionLaw:
-    slip = table.needed("slip", 'write slip = "force over v >= 0, N and parameters".')
-    stick = table.needed("stick", 'write stick = "limit over N and parameters".')
+def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionLaw | None:
     given: Any = table.data.get("parameters", {})
     parameters: dict[str, Expression | None] = {}
     if isinstance(given, list):
@@ -70,9 +80,57 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
         parameters.update(table.expressions("parameters"))
     for argument in arguments:
         parameters.setdefault(argument, None)
-    return FrictionLaw(
-        name, slip, stick, parameters, table.text("title"), table.text("source"), place=table.place
-    )
+    force = table.expression("force")
+    slip: Any = table.expression("slip")  # None only beside a force, as FrictionLaw sees to
+    stick: Any = table.expression("stick")
+    if force is None:
+        slip = table.needed("slip", 'write slip = "force over v >= 0, N and parameters", or force = "...".')
+        stick = table.needed("stick", 'write stick = "limit over N and parameters".')
+    modes = dict(table.entries("modes", "mode"))
+    marked = [mode for mode, part in modes.items() if part.flag("initial")]
+    texts = {key: table.text(key) for key in ("initial", "copies") if key in table.data}
+    try:
+        return FrictionLaw(
+            name,
+            slip,
+            stick,
+            parameters,
+            table.text("title"),
+            table.text("source"),
+            slip_backward=table.expression("slip_backward"),
+            stick_backward=table.expression("stick_backward"),
+            force=force,
+            states=tuple(_states(table)),
+            definitions=table.expressions("definitions"),
+            modes=tuple(read_mode(mode, part) for mode, part in modes.items()),
+            initial=texts.get("initial", marked[0] if marked else None),
+            copies=texts.get("copies"),
+            tables=tuple(_tables(table)),
+            place=table.place,
+        )
+    except UsageError as fault:
+        table.fail(fault.message.partition(": ")[2], f"{fault.remedy}.")
+        return None
+
+
+def _states(law: Table) -> Iterator[State]:
+    for name, table in law.entries("states", f"{law.kind}, state", "der"):
+        table.only("start", "der", "unit", "nominal")
+        start = table.expression("start") or parse(0)
+        der = table.needed("der", 'write der = "..." over v, N, parameters and states of the law.')
+        yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
+
+
+def _tables(law: Table) -> Iterator[LawTable]:
+    for name, table in law.entries("tables", f"{law.kind}, table"):
+        table.only("at", "values", "over")
+        for key in ("at", "values"):
+            table.require(key, f"write {key} = [0, ...].")
+        over = table.expression("over") or parse(SPEED)
+        try:
+            yield LawTable(name, table.numbers("at"), table.numbers("values"), over, place=table.place)
+        except UsageError as fault:
+            table.fail(fault.message.partition(": ")[2], f"{fault.remedy}.")
 
 
 def _listed(table: Table, item: Any, index: int) -> dict[str, Expression | None]:

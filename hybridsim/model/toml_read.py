@@ -130,12 +130,21 @@ def _discrete(root: Table) -> Iterable[Discrete]:
 
 def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
     for name, table in root.entries("contacts", "contact"):
-        table.only("velocity", "normal", "law")
+        table.only("velocity", "normal", "law", "opens", "start", "nominal")
         velocity = table.needed("velocity", 'write velocity = "the relative velocity".')
         normal = table.needed("normal", 'write normal = "the normal load".')
         law = read_law_of_contact(table, laws)
         if law is not None:
-            yield Contact(name, velocity, normal, *law, place=table.place)
+            yield Contact(
+                name,
+                velocity,
+                normal,
+                *law,
+                table.flag("opens"),
+                table.expressions("start"),
+                table.reals("nominal"),
+                place=table.place,
+            )
 
 
 def _monitors(root: Table) -> Iterable[Monitor]:

@@ -83,6 +83,21 @@ class Table:
             return None
         return float(value)
 
+    def reals(self, key: str) -> dict[str, float]:
+        """A table of numbers under a key; empty where it is absent."""
+        found = self._typed(key, dict, "a table of numbers", {})
+        table = Table(self.source, (*self.path, key), found, f"{self.kind}, {key}")
+        return {name: value for name in found if (value := table.real(name)) is not None}
+
+    def numbers(self, key: str) -> tuple[float, ...]:
+        """A list of numbers under a key; empty, and reported, where it is none."""
+        found = self._typed(key, list, "a list of numbers", [])
+        wrong = [value for value in found if isinstance(value, bool) or not isinstance(value, (int, float))]
+        if wrong:
+            self.fail(f"'{key}' holds {_shown(wrong[0])}", "it must be a list of numbers.", key)
+            return ()
+        return tuple(float(value) for value in found)
+
     def expression(self, key: str, remedy: str | None = None) -> Expression | None:
         """The expression under a key; None where it is absent, which is a fault if a remedy is given."""
         if key not in self.data:

@@ -13,6 +13,7 @@ from hybridsim.model.component import Component, Guard
 from hybridsim.model.contact import Contact
 from hybridsim.model.inputs import Input
 from hybridsim.model.law import FrictionLaw
+from hybridsim.model.law_with_states import ContactState
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Output
 from hybridsim.model.schedule import Schedule
@@ -44,6 +45,7 @@ def _lines(model: Model) -> Iterator[str]:
         {
             s.name: {"start": s.start, "unit": s.unit, "nominal": s.nominal, "der": s.der}
             for s in model.states
+            if not isinstance(s, ContactState)
         },
     )
     yield from _section("discrete", {d.name: _short("start", d.start, unit=d.unit) for d in model.discrete})
@@ -93,12 +95,24 @@ def _law(law: FrictionLaw) -> dict[str, Any]:
     parameters: Any = law.parameters
     if None in law.parameters.values():
         parameters = [name if value is None else {name: value} for name, value in law.parameters.items()]
+    fields = (
+        "title", "source", "slip", "slip_backward", "stick", "stick_backward", "force", "definitions", "copies",
+        "initial",
+    )  # fmt: skip
+    states = {
+        s.name: {"start": s.start, "unit": s.unit, "nominal": s.nominal, "der": s.der} for s in law.states
+    }
+    tables = {t.name: {"at": t.at, "values": t.values, "over": t.over} for t in law.tables}
+    modes = {
+        mode.name: {"set": mode.set, "der": mode.der, "guards": {g.name: _guard(g) for g in mode.guards}}
+        for mode in law.modes
+    }
     return {
-        "title": law.title,
-        "source": law.source,
         "parameters": parameters,
-        "slip": law.slip,
-        "stick": law.stick,
+        **{name: getattr(law, name) for name in fields},
+        "states": states,
+        "tables": tables,
+        "modes": modes,
     }
 
 
@@ -106,7 +120,8 @@ def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any
     law: dict[str, Any] = {"name": contact.law.name}
     if laws[contact.law.name] != contact.law:  # a second law of the same name goes along with its contact
         law |= _law(contact.law)
-    return {"velocity": contact.velocity, "normal": contact.normal, "law": {**law, **contact.arguments}}
+    fields = ("velocity", "normal", "opens", "start", "nominal")
+    return {**{name: getattr(contact, name) for name in fields}, "law": {**law, **contact.arguments}}
 
 
 def _component(component: Component) -> Iterator[str]:

@@ -40,8 +40,8 @@ def test_laws_load_and_are_sound(name: str) -> None:
     law = hs.load_law(name)
     assert law.name == name and law.title and law.source
     assert set(law.parameters.values()) == {None}, "a value of friction is never assumed"
-    given = {"mu": 0.3, "mu_s": 0.5, "mu_k": 0.3, "v_s": 0.1}
-    contact = hs.Contact("f", "v", 2, law, {p: given[p] for p in law.parameters})
+    given = {"mu": 0.3, "mu_s": 0.5, "mu_k": 0.3, "v_s": 0.1, "n": 3, "share": 0.7}
+    contact = hs.Contact("f", "v", 2, law, {p: given.get(p, 1.5) for p in law.parameters})
     hs.Model("m", [hs.State("v", 1, "-f")], contacts=[contact]).validate()
 
 

@@ -61,3 +61,5 @@ def need_contacts(model: Model) -> None:
     """Rungs are about friction: without a contact there is nothing to drop."""
     if not model.contacts:
         raise DoesNotApply("the model has no contact")
+    if not all(contact.law.is_set_valued for contact in model.contacts):
+        raise DoesNotApply("the law of a contact gives a force of its own, without stick")
