@@ -49,11 +49,14 @@ def no_stops(r: float, zeta: float, f: float) -> NoStops:
     decay = np.exp(-zeta * s)
     free = decay * ((b * kappa - a * zeta) * np.cos(kappa * s) - (a * kappa + b * zeta) * np.sin(kappa * s))
     velocity = f * free - R * r * np.sin(r * s + psi)
-    # both ends are zeros of the velocity: divided by them, its sign at the ends is that of the accelerations there
+    # both ends are zeros of the velocity: divided by them, it goes on to the acceleration at the turning point over r
     shape = velocity / np.sin(r * s)
+    at_turning = (f * (-2.0 * zeta * turning - a) - R * r * r * math.cos(psi)) / r
     top = int(np.argmax(shape))
-    highest = float(shape[top])
-    if 0 < top < len(s) - 1:  # the parabola through the largest sample and its neighbours
+    highest = max(float(shape[top]), at_turning)
+    if (
+        0 < top < len(s) - 1 and shape[top] > at_turning
+    ):  # the parabola through the largest sample and its neighbours
         left, middle, right = shape[top - 1 : top + 2]
         bend = left - 2.0 * middle + right
         highest = float(middle - (right - left) ** 2 / (8.0 * bend)) if bend < 0.0 else highest

@@ -107,6 +107,7 @@ def read(found: Maps, quantity: str, without: str, with_: str) -> dict[str, Any]
         "maximum": float(crest[top]),
         "at": (float(found.ratios[top]), float(found.r[columns[top]])),
         "where the paper has its maximum": float(deviation[place]),
+        "spread of the periods without stick there": float(found.spread(quantity, without)[place]),
         "near the threshold": float(np.median(deviation[0])),
         "beyond resonance": float(deviation[np.ix_(on, found.r > 1.0)].max()),
     }
