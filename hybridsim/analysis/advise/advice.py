@@ -32,8 +32,8 @@ class Advice:
     ----------
     model, quantity, tol : what was asked.
     value : of the full model; nan for a region.
-    ladder : a `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and ``seconds`` of
-        a step are not numbers, ``error`` is the largest of the region and ``why`` counts points.
+    ladder : a `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and ``seconds``
+        of a step are not numbers, ``error`` is the largest of the region and ``why`` counts points.
     certificates : what theory says without a run.
     settings : integrator settings for the full model, tried: the quickest adequate one first.
     spread : what given ranges of parameters do to the quantity.
@@ -143,8 +143,8 @@ def _remarks(advice: Advice) -> list[str]:
         found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:
         found.append(
-            f"{simplest.name} is simpler but not quicker: {_time(simplest.seconds)} against {_time(full.seconds)} of the "
-            "full model"
+            f"{simplest.name} is simpler but not quicker: {_time(simplest.seconds)} against "
+            f"{_time(full.seconds)} of the full model"
         )
     spread = advice.spread
     if spread is not None and spread.relative > advice.tol:

@@ -31,6 +31,7 @@ def advise(
     tol: float = 0.01,
     *,
     over: Mapping[str, Sequence[Any]] | None = None,
+    mode: str = "grid",
     uncertain: Mapping[str, tuple[float, float]] | None = None,
     t_span: tuple[float, float] | None = None,
     params: Mapping[str, Any] | None = None,
@@ -55,7 +56,7 @@ def advise(
         of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
     tol : largest relative error. Where the full model's value is zero, a rung is adequate if it gives zero too; what is
         below 1e-6 of tol beside the largest value of the same quantity counts as zero.
-    over : values of parameters as in `sweep`: a map of the simplest adequate rung.
+    over, mode : values of parameters as in `sweep`: a map of the simplest adequate rung.
     uncertain : ranges of parameters, {"mu": (0.28, 0.32)}: is the tolerance finer than what they leave open?
     t_span : of the run that is asked about; without it the question is about the steady motion.
     rungs : names of those to try; all unless given: at-rest, no-friction, viscous, no-stop, constant-mu-at-rest,
@@ -97,7 +98,7 @@ def advise(
     if over is not None:
         if ranges is not None:
             raise UsageError("over and uncertain are both given", remedy="ask about ranges at one point")
-        options = {"workers": workers, "progress": progress}
+        options = {"mode": mode, "workers": workers, "progress": progress}
         region, ladder = over_region(seen, over, chosen, question, tol, width, options)
         return Advice(
             model,

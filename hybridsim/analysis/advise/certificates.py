@@ -53,8 +53,8 @@ def _never_stops(model: Model) -> list[Certificate]:
         return []
     s = form.found.system
     text = (
-        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): the steady motion is Den Hartog's, and no "
-        "other is"
+        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): the steady motion is Den Hartog's, "
+        "and no other is"
     )
     return [Certificate(text, NoStop.name, motion, steady_only=True)]
 
@@ -81,13 +81,17 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
         return None
     if any(monitor.action != "record" for monitor in model.monitors):
         return None
+    if not model.contacts[0].law.is_set_valued or model.contacts[0].opens:
+        return None
     contact, values, start = model.contacts[0], model.parameter_values(), model.start_values()
     definitions = dict(model.definitions)
     unknowns = {*start, contact.name, *(i.name for i in model.inputs)}
+    if contact.law.stick_backward is not None:
+        return None
     try:
         slide = affine(contact.velocity, unknowns, values, definitions)
         rates = {s.name: affine(s.der, unknowns, values, definitions) for s in model.states}
-        limit = affine(contact.limit_force, unknowns, values, definitions)
+        limit = affine(contact.limit_force(), unknowns, values, definitions)
     except NotAffine:
         return None
     if (

@@ -203,7 +203,7 @@ def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
 
 def stuck(solution: Solution, contact: str) -> float:
     """Part of a run that a contact spends in stick; 0 for one that has lost that mode."""
-    spent = sum(i.t1 - i.t0 for i in solution.modes[contact] if i.mode == _STICK)
+    spent = sum(i.t1 - i.t0 for i in solution.modes.get(contact, ()) if i.mode == _STICK)
     return float(spent / (solution.t_end - solution.t_start))
 
 

@@ -27,6 +27,7 @@ _FAMILIES: tuple[tuple[str, str], ...] = (
 )
 _SHOOTING = "steady_state"
 _FEWEST, _MOST = 8, 1000  # periods of settling
+_NEUTRAL = 1.0 - 1e-6  # a multiplier from there on stands for what stays
 _SHARE = 0.01  # of the tolerance: what settling may leave over
 _RUN_STEPS = 100  # periods that a run without a period is taken to have, for fixed steps
 
@@ -145,16 +146,11 @@ def _settling(question: Question, motion: Any, tol: float) -> _Settling:
     period = (
         motion.period if math.isfinite(motion.period) else motion.solution.t_end - motion.solution.t_start
     )
-    if motion.kind == "equilibrium":
-        return _Settling(question, (0.0, _FEWEST * period), period, period)
-    try:
-        slowest = float(max(abs(motion.multipliers), default=0.0))
-    except HybridsimError:
-        slowest = 1.0
+    slowest = 0.0 if motion.kind == "equilibrium" else float(max(abs(motion.multipliers), default=0.0))
     if slowest <= 0.0:
         count = _FEWEST
-    elif slowest >= 1.0:
-        count = _MOST
+    elif slowest >= _NEUTRAL:
+        count = max(motion.periods, _FEWEST)  # nothing decays, so that it was reached by following alone
     else:
         count = min(max(math.ceil(math.log(_SHARE * tol) / math.log(slowest)), _FEWEST), _MOST)
     return _Settling(question, (0.0, count * period), period, period)

@@ -28,7 +28,7 @@ def table(advice: Advice) -> str:
 
 def _conclusion(advice: Advice) -> str:
     if advice.region is not None:
-        return f"over {' x '.join(f'{len(v)} {n}' for n, v in advice.region.axes.items())}"
+        return f"over {advice.region.status.size} points of {', '.join(advice.region.axes)}"
     simplest, setting = advice.simplest, advice.integrator
     how = f"; run the full model by {setting.title}" if setting is not None else ""
     if simplest.verdict == FULL:

@@ -15,6 +15,8 @@ _MEAN = "mean_speed"
 
 def _need_velocity_law(model: Model) -> None:
     need_contacts(model)
+    if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
+        raise DoesNotApply("the law of a contact is a table, or not the same forward and backward")
     if not any(SPEED in contact.law.slip.names for contact in model.contacts):
         raise DoesNotApply("no friction force depends on the speed")
 
@@ -58,5 +60,7 @@ def _constant(contact: Contact, speed: str, parameter: str | None = None) -> Con
     force = substitute(law.slip, {SPEED: parse(speed)})
     parameters = dict(law.parameters) | ({speed: None} if parameter else {})
     arguments = dict(contact.arguments) | ({speed: parse(parameter)} if parameter else {})
-    fixed = replace(law, name=f"{law.name}, constant", slip=force, stick=force, parameters=parameters)
+    fixed = replace(
+        law, name=f"{law.name}, constant", slip=force, stick=force, stick_backward=None, parameters=parameters
+    )
     return with_law(replace(contact, arguments=arguments), fixed)

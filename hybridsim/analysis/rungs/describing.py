@@ -22,6 +22,8 @@ class FirstHarmonic:
     def __init__(self, model: Model, contact: Contact) -> None:
         if contact.normal.names - model.constant_names():
             raise DoesNotApply(f"the normal load of contact {contact.name} varies")
+        if contact.law.slip_backward is not None or contact.law.stick_backward is not None:
+            raise DoesNotApply(f"the friction of contact {contact.name} is not the same forward and backward")
         self._values = model.parameter_values()
         self._speed = _unused(set(self._values), "speed")
         self._slip = inlined(model, contact.slip_force(parse(self._speed)))

@@ -10,8 +10,15 @@ from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parame
 
 
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
-    """The model with a component of one mode for each contact, which sets its force to an expression."""
-    components = tuple(Component(c.name, (Mode(mode, set={c.name: forces[c.name]}),)) for c in model.contacts)
+    """The model with a component of one mode for each contact, which sets its force to an expression.
+
+    Other automata of a contact, of lift-off, stay.
+    """
+    components = tuple(
+        Component(c.name, (Mode(mode, set={c.name: forces[c.name]}),)) if part.name == c.name else part
+        for c in model.contacts
+        for part in model.components_of(c)
+    )
     outputs = tuple(
         replace(output, modes={p: e for p, e in output.modes.items() if p.split(".")[0] not in forces})
         for output in model.outputs
@@ -27,7 +34,7 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
 
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:
     """The contact with another law, without the parameters that this does not use."""
-    used = set(law.slip.names | law.stick.names)
+    used = {name for _, expression in law.expressions() for name in expression.names}
     while more := {n for u in used if (e := law.parameters.get(u)) is not None for n in e.names} - used:
         used |= more
     parameters = {name: value for name, value in law.parameters.items() if name in used}

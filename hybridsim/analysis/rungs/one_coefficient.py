@@ -25,6 +25,8 @@ class OneCoefficient(Rung):
         """The model with the limit of stick lowered to the force of slow sliding."""
         model = scene.model
         need_contacts(model)
+        if any(contact.law.tables for contact in model.contacts):
+            raise DoesNotApply("the law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
             raise DoesNotApply("no contact holds more at rest than it slides with")
@@ -36,17 +38,23 @@ class OneCoefficient(Rung):
 
 
 def _lowered(contact: Contact) -> Contact:
-    at_rest = substitute(contact.law.slip, {SPEED: parse(0)})
-    return with_law(contact, replace(contact.law, name=f"{contact.law.name}, mu_s := mu_k", stick=at_rest))
+    law = contact.law
+    forward, backward = (
+        None if slip is None else substitute(slip, {SPEED: parse(0)})
+        for slip in (law.slip, law.slip_backward)
+    )
+    name = f"{law.name}, mu_s := mu_k"
+    return with_law(contact, replace(law, name=name, stick=forward, stick_backward=backward))  # type: ignore[arg-type]
 
 
 def _jumps(model: Model, contact: Contact) -> bool:
     surface = contact.component(model.constant_names()).surface
     assert surface is not None  # every contact has one
-    jump, values, draw = inlined(model, surface.jump_above), model.parameter_values(), random.Random(0)
-    for _ in range(_TRIALS):
-        others = {name: draw.uniform(0.5, 1.5) for name in sorted(jump.names - values.keys())}
-        size = evaluate(jump, {**values, **others})
-        if abs(size) > 1e-12 * max(abs(v) for v in (1.0, *values.values())):
-            return True
+    values, draw = model.parameter_values(), random.Random(0)
+    for jump in (inlined(model, surface.jump_above), inlined(model, surface.jump_below)):
+        for _ in range(_TRIALS):
+            others = {name: draw.uniform(0.5, 1.5) for name in sorted(jump.names - values.keys())}
+            size = evaluate(jump, {**values, **others})
+            if abs(size) > 1e-12 * max(abs(v) for v in (1.0, *values.values())):
+                return True
     return False
