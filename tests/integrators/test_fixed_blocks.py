@@ -55,7 +55,9 @@ def test_modes_tile_the_run(name: str, options: dict[str, Any]) -> None:
     assert np.isin(changes, solution.t[1:][np.diff(solution.t) == 0.0]).all()
     assert solution.t[0] == 0.0
     assert solution.t[-1] == solution.t_end
-    np.testing.assert_array_equal(solution(solution.t[::17]), solution.y[:, ::17])
+    apart = ~np.isin(solution.t, changes)
+    # a time is a sum of two doubles inside and one outside: v changes by up to 100 m/s^2 over its last digit
+    np.testing.assert_allclose(solution(solution.t[apart]), solution.y[:, apart], rtol=1e-9, atol=1e-14)
 
 
 def test_events_alone_and_nothing() -> None:
