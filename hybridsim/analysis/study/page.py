@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,7 @@ _CAPTIONS = {
     "figure 13": "Nothing sticks here: all columns are the same.",
     "text": "First order in the step: in the limit nothing is left, since the motion with stick is the limit.",
 }
+_WIDTH = 120
 _PAIR = "Read as: method without stick; reading of the method with stick."
 
 
@@ -54,7 +56,14 @@ def page(study: Study, image: Callable[[str], str]) -> str:
         _race(study, image("timed-map")),
         _how(study),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(_wrapped(block) for part in parts for block in part.split("\n\n")) + "\n"
+
+
+def _wrapped(block: str) -> str:
+    """A paragraph in lines of one length; headings, tables and pictures as they are."""
+    if block.startswith(("#", "|", "!")):
+        return block
+    return textwrap.fill(" ".join(block.split()), _WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def _head(study: Study, claims: tuple[Claim, ...]) -> str:

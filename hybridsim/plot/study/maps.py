@@ -11,7 +11,7 @@ from hybridsim.analysis.study.race import Race
 from hybridsim.analysis.study.truth import MODELS, Truth
 from hybridsim.plot import style
 from hybridsim.plot.study.deviations import edges
-from hybridsim.plot.study.motions import column_title
+from hybridsim.plot.study.motions import column_title, plain_log
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,7 +118,7 @@ def timed_map(race: Race) -> Figure:
         axes.plot([ms, ms], [low, high], color=colour, linewidth=1.2)
         axes.plot([ms], [low], style.MARKERS[k], color=colour, markersize=7, label=label)
         axes.plot([ms], [high], "_", color=colour, markersize=10)
-    axes.set_xscale("log")
+    plain_log(axes.xaxis)
     axes.set_yscale("log")
     axes.set_xlabel("time of a point, all threads together [ms]", fontsize=9)
     axes.set_ylabel("relative error of A: median to largest", fontsize=9)

@@ -10,6 +10,7 @@ from hybridsim.plot import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from hybridsim.analysis.study.response import Response
@@ -25,6 +26,16 @@ def column_title(name: str) -> str:
     if name.startswith("v "):
         return f"with stick, {name.split(',')[0]}"
     return _TITLES.get(name, name)
+
+
+def plain_log(axis: Axis) -> None:
+    """A logarithmic axis with ticks at 1, 2, 5, 10, 20, ..., in plain numbers."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axis.axes.set_xscale("log")
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter("{x:g}")
 
 
 def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Figure:

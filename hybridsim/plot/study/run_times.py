@@ -8,7 +8,7 @@ from hybridsim.analysis.study.convergence import CASES
 from hybridsim.analysis.study.run_times import EPS, WITH, RunTimes
 from hybridsim.analysis.study.settings import SIGNS
 from hybridsim.plot import style
-from hybridsim.plot.study.motions import column_title
+from hybridsim.plot.study.motions import column_title, plain_log
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +64,7 @@ def stick_cost(times: RunTimes) -> Figure:
     axes.plot(base, places, "|", color=style.FAINT, markersize=12, label="paper: +225 % on sign by step")
     axes.set_yticks(places, labels=list(CASES))
     axes.invert_yaxis()
-    axes.set_xscale("log")
+    plain_log(axes.xaxis)
     axes.set_xlabel(f"time of {times.periods} periods [ms]", fontsize=9)
     style.dress(axes)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
