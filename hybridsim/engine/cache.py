@@ -44,6 +44,15 @@ def _usable(folder: Path) -> Path:
     return temporary
 
 
+def write_whole(path: Path, content: bytes) -> None:
+    """Write in one move, so that another process never reads half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    os.replace(temporary, path)
+
+
 @cache
 def engine_key() -> str:
     """Hash of the engine's sources and of the versions that shape its machine code.

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from hybridsim.engine.cache import kernel_folder
@@ -29,6 +30,8 @@ if ENABLED:
     from llvmlite import ir
     from numba import types
     from numba.extending import intrinsic
+
+    from hybridsim.engine.machine_code import compile_text, machine_name
 
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
@@ -70,13 +73,11 @@ if ENABLED:
         """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
         return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
 
-    def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
-        """Compile one generated function; return its address and the object that keeps it alive."""
-        compiled = _with_cache_folder(
-            str(kernel_folder() / "models"),
-            lambda: numba.cfunc(SIGNATURE, cache=True, error_model="numpy")(function),
-        )
-        return compiled.address, compiled
+    def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
+        """Compile one function of a generated module; return its address and the object that keeps it alive."""
+        path = Path(module.__file__)
+        kept = path.with_name(f"{path.stem}.{name}.{machine_name()}.o")
+        return compile_text(path.read_text(encoding="utf-8"), name, kept)
 
     @intrinsic
     def call(typingctx: Any, function: Any, t: Any, x: Any, p: Any, z: Any, out: Any) -> Any:
@@ -105,8 +106,9 @@ else:
 
     inlined = allocating_kernel = polynomial_kernel = kernel
 
-    def compile_model_function(function: Callable[..., int]) -> tuple[Any, Any]:
+    def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""
+        function = getattr(module, name)
 
         def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
             try:

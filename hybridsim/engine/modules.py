@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.engine.cache import model_folder
+from hybridsim.engine.cache import model_folder, write_whole
 
 if TYPE_CHECKING:
     from hybridsim.engine.python_code import PythonCode
@@ -53,7 +51,7 @@ class Compiled:
         if name not in self._kept:
             from hybridsim.engine.jit import compile_model_function
 
-            self._kept[name] = compile_model_function(getattr(self.module, name))
+            self._kept[name] = compile_model_function(self.module, name)
         return self._kept[name][0]
 
 
@@ -104,7 +102,7 @@ def _load(model: Model, name: str) -> Compiled:
         from hybridsim.engine.emit import emit
 
         start = time.perf_counter()
-        _write(path, emit(model))
+        write_whole(path, emit(model).encode())
         seconds = time.perf_counter() - start
     try:
         return Compiled(_import(name, path), seconds)
@@ -113,7 +111,7 @@ def _load(model: Model, name: str) -> Compiled:
     ):  # a damaged file may raise anything; written anew, it tells whether the fault is its own
         from hybridsim.engine.emit import emit
 
-        _write(path, emit(model))
+        write_whole(path, emit(model).encode())
         return Compiled(_import(name, path), seconds)
 
 
@@ -127,12 +125,3 @@ def _import(name: str, path: Path) -> ModuleType:
     if not hasattr(module, "DATA"):
         raise ImportError(f"{path} is not whole")
     return module
-
-
-def _write(path: Path, text: str) -> None:
-    """Write in one move, so that another process never reads half a module."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".py")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(temporary, path)
