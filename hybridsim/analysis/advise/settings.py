@@ -29,7 +29,7 @@ _SHOOTING = "steady_state"
 _FEWEST, _MOST = 8, 1000  # periods of settling
 _NEUTRAL = 1.0 - 1e-6  # a multiplier from there on stands for what stays
 _SHARE = 0.01  # of the tolerance: what settling may leave over
-_RUN_STEPS = 100  # periods that a run without a period is taken to have, for fixed steps
+_RUN_STEPS = 10  # periods that a run asked about is taken to have, for fixed steps
 
 
 @dataclass(frozen=True)
@@ -111,14 +111,9 @@ def settings(
                     progress(f"{name} {value:g}" if option else name)
                 one = _measured(name, options, partial(_twice, settling, model, name, options), full, tol)
                 found.append(one)
-                if one.is_adequate or one.value is None or one.seconds > _dear(found):
+                if one.is_adequate or one.value is None:
                     break
     return tuple(sorted(found, key=lambda s: (not s.is_adequate, math.isnan(s.seconds), s.seconds)))
-
-
-def _dear(found: list[Setting]) -> float:
-    """Seconds beyond which tighter settings of a family are not tried: they cannot be the cheapest by far."""
-    return max(1.0, 100.0 * min((s.seconds for s in found if s.is_adequate), default=math.inf))
 
 
 def _twice(settling: _Settling, model: Model, name: str, options: Mapping[str, Any]) -> Answer:

@@ -1,0 +1,271 @@
+"""Advice against brute force: simpler models written by hand, in plain runs settled long."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from analysis.advice_by_hand import (
+    amplitude,
+    equivalent_damper,
+    first_harmonic,
+    last,
+    simplest,
+    smooth,
+    top,
+)
+
+import hybridsim as hs
+from hybridsim.errors import SimulationError, UsageError
+
+
+def check(advice: hs.Advice, values: dict[str, float], full: float) -> None:
+    """The same values by hand, the same errors, the same simplest rung."""
+    assert advice.value == pytest.approx(full, rel=1e-6, abs=1e-15)
+    errors = {
+        name: abs(v - full) / abs(full) if full else (0.0 if v == 0 else math.inf)
+        for name, v in values.items()
+    }
+    assert advice.simplest.name == simplest(errors, advice.tol)
+    for name, error in errors.items():
+        step = advice[name]
+        if step.value is not None:
+            assert step.error == pytest.approx(error, rel=1e-3, abs=1e-6), name
+    for step in advice.ladder:
+        if step.value is not None and step.name not in ("no-stop", "full model"):
+            assert step.name in values
+
+
+def dfcs(F0: float, r: float) -> hs.Model:
+    return hs.load("dfcs").with_(F0=F0, omega=f"{r}*sqrt(k/m)")
+
+
+def oscillator_by_hand(model: hs.Model, force: float, w: float, periods: int, slip: Any, text: str) -> Any:
+    """Values of the rungs of an oscillator with friction `text`, even in v, and the full amplitude."""
+    p, T = model.parameter_values(), 2.0 * math.pi / w
+    span = periods * T
+    full = amplitude(model, "x", span, T)
+    fastest = np.abs(last(model, "v", span, T))
+    v0 = 0.01 * top(fastest)
+    damper = equivalent_damper(first_harmonic(slip), force, p["m"], p["c"], p["k"], w)
+    moving = {
+        "no-friction": smooth(model, "0*v"),
+        "tanh": smooth(model, f"{text}*tanh(v/v0)", v0=v0),
+        "arctan": smooth(model, f"{text}*2/pi*atan(v/v0)", v0=v0),
+        "karnopp": model.regularized("karnopp", v0=v0),
+    }
+    if damper is not None:
+        moving["viscous"] = smooth(model, "c_eq*v", c_eq=damper)
+    return {"at-rest": 0.0, **{n: amplitude(m, "x", span, T) for n, m in moving.items()}}, full, fastest
+
+
+COULOMB = ("mu*N", lambda v: np.full_like(v, 20.0))
+
+
+@pytest.mark.parametrize(
+    ("F0", "r", "tol", "periods", "name"),
+    [
+        (2000.0, 1.0, 0.02, 200, "no-friction"),  # resonance far from sticking
+        (400.0, 1.0, 0.02, 200, "viscous"),
+        (100.0, 0.6, 0.01, 110, "no-stop"),
+        (22.0, 0.64, 0.01, 110, "karnopp"),  # F0/N = 0.55: stick matters most
+        (22.0, 0.64, 1e-4, 110, "full model"),
+    ],
+)
+def test_reference_model(F0: float, r: float, tol: float, periods: int, name: str) -> None:
+    model = dfcs(F0, r)
+    w = model.parameter_values()["omega"]
+    values, full, fastest = oscillator_by_hand(model, F0, w, periods, COULOMB[1], COULOMB[0])
+    if (fastest == 0.0).sum() < 10:  # no stretch of stick: the closed form has to hold
+        values["no-stop"] = full
+    found = hs.advise(model, "amplitude.x", tol, integrators=False)
+    check(found, values, full)
+    assert found.simplest.name == name
+    assert (found["no-stop"].verdict == "adequate") == ("no-stop" in values)
+
+
+def test_below_the_threshold_nothing_moves() -> None:
+    model = dfcs(15.0, 0.6)
+    T = 2.0 * math.pi / model.parameter_values()["omega"]
+    assert amplitude(model, "x", 50 * T, T) == 0.0
+    found = hs.advise(model, "amplitude.x", integrators=False)
+    assert found.simplest.name == "at-rest" and found.value == 0.0
+    assert found["no-friction"].error == math.inf
+    assert "nothing moves: the load of at most 15" in found.certificates[0]
+    # at the threshold itself, and not above it
+    assert hs.advise(dfcs(20.0, 0.6), "amplitude.x", rungs=["at-rest"], integrators=False).certificates
+    assert not hs.advise(dfcs(21.0, 0.6), "amplitude.x", rungs=["at-rest"], integrators=False).certificates
+
+
+def test_belt_has_a_limit_cycle_by_its_law_alone() -> None:
+    model, span, kept = hs.load("belt"), 240.0, 24.0
+    full = amplitude(model, "x", span, kept)
+    law = "Fs/(1 + delta*abs(v - v_belt))"
+    v0 = 0.01 * top(np.abs(last(model, "v_rel", span, kept)))
+    values = {
+        "at-rest": 0.0,
+        "no-friction": 0.0,
+        "tanh": amplitude(smooth(model, f"{law}*tanh((v - v_belt)/v0)", v0=v0), "x", span, kept),
+        "arctan": amplitude(smooth(model, f"{law}*2/pi*atan((v - v_belt)/v0)", v0=v0), "x", span, kept),
+        "karnopp": amplitude(model.regularized("karnopp", v0=v0), "x", span, kept),
+    }
+    found = hs.advise(model, "amplitude.x", 0.05, integrators=False)
+    check(found, values, full)
+    assert found.simplest.name == "karnopp"
+    for name in ("constant-mu-at-rest", "constant-mu-mean"):
+        assert "no limit cycle" in found[name].why
+    assert found["viscous"].verdict == "does not apply"
+
+
+def test_stribeck_with_a_negative_slope() -> None:
+    model = hs.load("dfcs-stribeck")
+    p = model.parameter_values()
+
+    def slip(v: np.ndarray) -> np.ndarray:
+        return p["N"] * (p["mu_k"] + (p["mu_s"] - p["mu_k"]) * np.exp(-((v / p["v_s"]) ** 2)))
+
+    text = "N*(mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2))"
+    values, full, fastest = oscillator_by_hand(model, 30.0, p["omega"], 110, slip, text)
+    slow, T = fastest[fastest > 0.0], 2.0 * math.pi / p["omega"]
+    mean = float(slip(np.array([slow.mean()]))[0]) / p["N"]
+    for name, mu in (("constant-mu-at-rest", p["mu_s"]), ("constant-mu-mean", mean)):
+        constant = hs.load("dfcs").with_(mu=mu)
+        values[name] = amplitude(constant, "x", 110 * T, T)
+    found = hs.advise(model, "amplitude.x", 0.02, integrators=False)
+    check(found, values, full)
+    assert found.simplest.name == "tanh"
+
+
+def test_free_decay_to_a_stop_position() -> None:
+    model = hs.load("free-decay")
+    v0 = 0.01 * top(np.abs(last(model, "v", 20.0, 20.0)))
+    by_hand = {
+        "no-friction": smooth(model, "0*v"),
+        "tanh": smooth(model, "mu*N*tanh(v/v0)", v0=v0),
+        "arctan": smooth(model, "mu*N*2/pi*atan(v/v0)", v0=v0),
+        "karnopp": model.regularized("karnopp", v0=v0),
+    }
+    values = {"at-rest": 10.5, **{name: float(last(m, "x", 20.0, 0.1)[-1]) for name, m in by_hand.items()}}
+    found = hs.advise(model, "final.x", 0.01, t_span=(0, 20), integrators=False)
+    check(found, values, -0.5)
+    assert found.simplest.name == "full model"
+    assert "no simpler model" in found.remarks[0]
+
+
+def test_square_wave() -> None:
+    model = hs.load("square-wave")
+    w = 2.0 * math.pi / 1.2
+    slip = (lambda v: np.full_like(v, 3.0), "mu*N")
+    values, full, _ = oscillator_by_hand(model, 5.0 * 4.0 / math.pi, w, 60, *slip)
+    found = hs.advise(model, "amplitude.x", 0.01, integrators=False)
+    check(found, values, full)
+    assert found.simplest.name == "tanh"
+
+
+def test_static_and_kinetic() -> None:
+    model, span, kept = hs.load("static-kinetic"), 60.0, 10.0
+    full = amplitude(model, "e", span, kept)
+    v0 = 0.01 * top(np.abs(last(model, "v", span, kept)))
+    values = {"at-rest": 0.0, "karnopp": amplitude(model.regularized("karnopp", v0=v0), "e", span, kept)}
+    found = hs.advise(model, "amplitude.e", 0.01, integrators=False)
+    check(found, values, full)
+    assert found.simplest.name == "full model"
+    assert "no limit cycle" in found["mu_s=mu_k"].why
+    assert "holds more at rest" in found["tanh"].why
+
+
+def test_settings_are_measured() -> None:
+    found = hs.advise(dfcs(22.0, 0.64), "amplitude.x", 0.01, rungs=["no-friction"])
+    best = found.integrator
+    assert best is not None and best.is_adequate and best.error <= 0.01
+    tried = {setting.title: setting for setting in found.settings}
+    assert not tried["rk4-sign steps=75"].is_adequate and tried["rk4-sign steps=1200"].is_adequate
+    assert not tried["rk4-dichotomy steps=1200"].is_adequate
+    adequate = [s.seconds for s in found.settings if s.is_adequate]
+    assert adequate == sorted(adequate) and best.seconds == adequate[0]
+    for setting in found.settings:  # the value is what it says, and is_adequate is what its error says
+        assert setting.value is not None
+        assert setting.error == pytest.approx(abs(setting.value - found.value) / abs(found.value), rel=1e-9)
+        assert setting.is_adequate == (setting.error <= 0.01)
+
+
+def test_a_tolerance_finer_than_what_is_known() -> None:
+    model, ranges = dfcs(100.0, 0.6), {"mu": (0.4, 0.6)}
+    found = hs.advise(model, "amplitude.x", 0.01, uncertain=ranges, integrators=False, rungs=["no-friction"])
+    T = 2.0 * math.pi / model.parameter_values()["omega"]
+    ends = [amplitude(model.with_(mu=mu), "x", 110 * T, T) for mu in (0.4, 0.5, 0.6)]
+    assert found.spread is not None
+    assert (found.spread.low, found.spread.high) == pytest.approx((min(ends), max(ends)), rel=1e-6)
+    assert not any("finer" in remark for remark in found.remarks)
+    finer = hs.advise(model, "amplitude.x", 1e-3, uncertain=ranges, integrators=False, rungs=["viscous"])
+    assert any("more model is not more truth" in remark for remark in finer.remarks)
+
+
+def test_a_region_says_the_same_as_each_point() -> None:
+    loads, rates = [15.0, 22.0, 60.0, 400.0], ["0.3*sqrt(k/m)", "sqrt(k/m)"]
+    found = hs.advise("dfcs", "amplitude.x", 0.01, over={"F0": loads, "omega": rates})
+    assert found.map.shape == (4, 2) and found.region is not None
+    for i, F0 in enumerate(loads):
+        for j, omega in enumerate(rates):
+            model = hs.load("dfcs").with_(F0=F0, omega=omega)
+            assert hs.advise(model, "amplitude.x", 0.01, integrators=False).simplest.name == found.map[i, j]
+    assert found.simplest.name == "full model" and "everywhere" in found.remarks[0]
+    assert json.loads(found.to_json())["region"]["values"]["simplest"] == found.map.tolist()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "exact"),
+    [
+        ("dissipated.f", lambda s: s.dissipated["f"]),
+        ("stick_fraction.f", lambda s: s.stick_fraction["f"]),
+        ("harmonic.x.3", lambda s: abs(s.harmonic("x", 3))),
+        ("energy.v", lambda s: s.energy["v"]),
+        ("maximum.f", lambda s: s.maximum["f"]),
+        (lambda s: s.amplitude["x"] / s.amplitude["v"], lambda s: s.amplitude["x"] / s.amplitude["v"]),
+    ],
+)
+def test_quantities(quantity: Any, exact: Any) -> None:
+    steady = hs.steady_state("dfcs")
+    found = hs.advise("dfcs", quantity, integrators=False, rungs=["no-friction", "tanh"])
+    assert found.value == pytest.approx(exact(steady), rel=1e-6)
+    assert found["no-friction"].value is not None
+
+
+def test_event_times_are_of_models_with_events() -> None:
+    found = hs.advise("free-decay", "event_time.f.3", t_span=(0, 20), integrators=False)
+    assert found.value == pytest.approx(3.0 * math.pi, rel=1e-12)
+    assert "0 events" in found["no-friction"].why and found.simplest.name == "full model"
+
+
+def test_a_linear_model_has_nothing_to_drop() -> None:
+    model = hs.Model("line", [hs.State("x", 0, "v"), hs.State("v", 0, "sin(t) - v - 4*x")])
+    found = hs.advise(model, "amplitude.x")
+    assert "linear" in found.certificates[0] and found.simplest.name == "full model"
+    assert found.value == pytest.approx(1.0 / math.hypot(3.0, 1.0), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"quantity": "amplitud.x"}, "amplitude"),
+        ({"quantity": "amplitude.y"}, "amplitude.y"),
+        ({"quantity": "final.x"}, "t_span"),
+        ({"quantity": "stick_fraction.x"}, "stick_fraction.x"),
+        ({"quantity": "amplitude.x", "tol": 2.0}, "tol"),
+        ({"quantity": "amplitude.x", "rungs": ["frictionless"]}, "no-friction"),
+        ({"quantity": "amplitude.x", "uncertain": {"mu": 0.3}}, "mu"),
+        ({"quantity": "amplitude.x", "uncertain": {"mu": (0.3, 0.2)}}, "low < high"),
+        ({"quantity": "amplitude.x.2"}, "amplitude.x"),
+    ],
+)
+def test_what_is_refused(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        hs.advise("dfcs", **arguments)
+
+
+def test_a_full_model_without_an_answer_is_an_error() -> None:
+    with pytest.raises(SimulationError, match="does not oscillate"):
+        hs.advise("free-decay", "period", integrators=False)
