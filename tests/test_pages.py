@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -65,3 +66,20 @@ def test_models_shown_are_models(page: Path) -> None:
 def test_links_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
     assert [target for target in targets if "://" not in target and not (page.parent / target).exists()] == []
+
+
+def test_the_page_on_own_laws_runs_and_keeps_them_short(tmp_path: Path) -> None:
+    """Both declarations are below 30 lines and run; the Python form is the same model."""
+    page = ROOT / "docs" / "how-to" / "own-law.md"
+    solutions = []
+    for text in blocks(page, "toml"):
+        assert len(text.splitlines()) < 30
+        model = hs.Model.from_toml(text)
+        solutions.append(hs.simulate(model, (0, model.duration_value() or 1)))
+    assert [sol.status for sol in solutions] == ["finished", "finished"]
+    (code,) = blocks(page, "python")
+    script = tmp_path / "shown.py"
+    script.write_text(code.replace("fading.png", (tmp_path / "fading.png").as_posix()), encoding="utf-8")
+    sol = runpy.run_path(str(script))["sol"]
+    assert (tmp_path / "fading.png").stat().st_size > 10_000
+    assert sol(12.0) == pytest.approx(solutions[1](12.0), rel=1e-9)

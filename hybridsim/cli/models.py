@@ -1,4 +1,4 @@
-"""`hybridsim models`: the models that can be run by name."""
+"""`hybridsim models`: the models that can be run by name, or the friction laws that a contact can name."""
 
 from __future__ import annotations
 
@@ -16,17 +16,43 @@ def add_to(commands: Any) -> None:
         help="list the models that come with hybridsim",
         description="List the models that can be run by name.",
     )
+    parser.add_argument("--laws", action="store_true", help="list the friction laws instead")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List name and title of every model."""
+    """List name and title of every model, or of every law with its parameters."""
     import hybridsim
 
+    if args.laws:
+        _laws(args.json)
+        return 0
     found = hybridsim.list_models()
     if args.json:
         print_json([{"name": info.name, "title": info.title} for info in found])
     else:
         print_table(("MODEL", "WHAT IT IS"), [(info.name, info.title) for info in found])
     return 0
+
+
+def _laws(json: bool) -> None:
+    from hybridsim.model import list_laws, load_law
+
+    laws = [load_law(name) for name in list_laws()]
+    if json:
+        print_json(
+            [
+                {
+                    "name": law.name,
+                    "title": law.title,
+                    "source": law.source,
+                    "parameters": list(law.parameters),
+                    "states": [state.name for state in law.states],
+                }
+                for law in laws
+            ]
+        )
+    else:
+        rows = [(law.name, law.title, ", ".join(law.parameters)) for law in laws]
+        print_table(("LAW", "WHAT IT IS", "PARAMETERS"), rows)

@@ -2,6 +2,7 @@
 
 from hybridsim.plot.advice import advice
 from hybridsim.plot.branch import branch
+from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
@@ -17,6 +18,7 @@ __all__ = [
     "TimeHistoryAxes",
     "advice",
     "branch",
+    "friction_law",
     "friction_loop",
     "phase_portrait",
     "regularisation",

@@ -1,0 +1,98 @@
+"""A friction law: force against velocity, and against displacement where the law remembers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.errors import UsageError
+from hybridsim.expr import evaluate, parse
+from hybridsim.model import Contact, FrictionLaw, Model, Output, State, load_law
+from hybridsim.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_POINTS = 2000  # over a period; a loop of Iwan's model has a hundred corners at most
+
+
+def friction_law(
+    law: FrictionLaw | str,
+    arguments: Mapping[str, float] | None = None,
+    *,
+    speed: float,
+    normal: float = 1.0,
+    amplitude: float = 1.0,
+    mean: float = 0.0,
+    integrator: str = "auto",
+) -> list[Axes]:
+    """Draw what a law does: one axes, or two where it has states.
+
+    A set-valued law is drawn as the curve that it is, with its range at rest. Any other is driven by the velocity
+    mean + speed*cos(speed/amplitude*t), and drawn over the second period; with states also against the
+    displacement, the mean motion left out.
+
+    Parameters
+    ----------
+    law : a law, or the name of one that comes with the package.
+    arguments : values of its parameters.
+    speed : largest velocity (about the mean).
+    """
+    found = load_law(law) if isinstance(law, str) else law
+    if not speed > 0 or not amplitude > 0:
+        raise UsageError(f"speed is {speed!r}, amplitude is {amplitude!r}", remedy="give numbers above zero")
+    given = {name: parse(value) for name, value in (arguments or {}).items()}
+    contact = Contact("f", parse("v"), parse(normal), found, given)
+    panels = 1 + bool(found.states)
+    figure = style.figure(0.6 + 3.4 * panels, 2.8)
+    axes = list(np.atleast_1d(figure.subplots(1, panels, sharey=True)))
+    if found.is_set_valued:
+        _curve(axes[0], contact, speed)
+    else:
+        _driven(axes, contact, speed, amplitude, mean, integrator)
+    axes[0].set_xlabel("velocity")
+    axes[0].set_ylabel("friction force")
+    for each in axes:
+        style.dress(each)
+    style.head(axes[0], found.title or found.name)
+    return axes
+
+
+def _curve(axes: Axes, contact: Contact, speed: float) -> None:
+    limits = evaluate(contact.limit_force(), {}), -evaluate(contact.limit_force(backward=True), {})
+    speeds = speed * np.linspace(0.0, 1.0, _POINTS)
+    for sign, colour in ((1, style.PALETTE[0]), (-1, style.PALETTE[1])):
+        force = [sign * slip_force(contact, v, backward=sign < 0) for v in speeds]
+        axes.plot(sign * speeds, force, color=colour, linewidth=1.6)
+    axes.plot([0, 0], limits, color=style.INK, linewidth=3.0, solid_capstyle="butt")
+
+
+def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> float:
+    """Magnitude of the slip force of a contact whose values are all numbers; tables included."""
+    names = {table.name: table.value(speed) for table in contact.law.tables}
+    slip = (contact.law.slip_backward if backward else None) or contact.law.slip
+    values = {name: evaluate(e, {}) for name, e in contact.values().items() if name not in names}
+    return evaluate(slip, {**values, **names, "v": speed})
+
+
+def _driven(
+    axes: list[Axes], contact: Contact, speed: float, amplitude: float, mean: float, integrator: str
+) -> None:
+    from hybridsim.simulate import simulate
+
+    rate = speed / amplitude
+    velocity = parse(f"{mean!r} + {speed!r}*cos({rate!r}*t)")
+    driven = Contact("f", velocity, contact.normal, contact.law, contact.arguments)
+    displacement = State("x", parse(0), parse(f"{speed!r}*cos({rate!r}*t)"), nominal=amplitude)
+    model = Model("driven", (displacement,), contacts=(driven,), outputs=(Output("f", parse("f")),))
+    period = 2 * pi / rate
+    solution = simulate(model, (0.0, 2 * period), integrator=integrator, rtol=1e-8)
+    t = np.linspace(period, 2 * period, _POINTS)
+    force = solution.output("f", t)
+    axes[0].plot(mean + speed * np.cos(rate * t), force, color=style.PALETTE[0], linewidth=1.4)
+    if len(axes) > 1:
+        axes[1].plot(amplitude * np.sin(rate * t), force, color=style.PALETTE[0], linewidth=1.4)
+        axes[1].set_xlabel("displacement")

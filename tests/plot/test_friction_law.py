@@ -1,0 +1,31 @@
+"""The picture of a law shows the law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.plot import friction_law
+
+
+def test_a_set_valued_law_is_a_curve_and_a_range_at_rest() -> None:
+    arguments = {"mu_forward": 0.5, "mu_backward": 0.3}
+    (axes,) = friction_law("asymmetric", arguments, speed=2, normal=10)
+    forward, backward, rest = (line.get_xydata() for line in axes.get_lines())
+    assert forward[-1] == pytest.approx([2, 5])
+    assert backward[-1] == pytest.approx([-2, -3])
+    assert rest[:, 1] == pytest.approx([5, -3])
+
+
+def test_a_law_with_states_is_a_loop_as_well() -> None:
+    """The area of a Jenkins loop is 4 F_c (A - F_c/k)."""
+    _, loop = friction_law("jenkins", {"mu": 0.5, "k": 4}, speed=1, amplitude=2)
+    x, f = loop.get_lines()[0].get_xydata().T
+    area = 0.5 * np.abs(np.sum(x * np.roll(f, -1) - f * np.roll(x, -1)))
+    assert area == pytest.approx(4 * 0.5 * (2 - 0.5 / 4), rel=1e-4)
+
+
+def test_a_picture_needs_a_speed() -> None:
+    with pytest.raises(hs.UsageError, match="speed is 0"):
+        friction_law("coulomb", {"mu": 0.5}, speed=0)
