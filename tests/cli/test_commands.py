@@ -195,6 +195,16 @@ def test_models(hybridsim: Callable) -> None:
     assert all(name in out for name in names)
 
 
+def test_laws(hybridsim: Callable) -> None:
+    code, out, _ = hybridsim("models", "--laws")
+    assert code == 0
+    _, listed, _ = hybridsim("models", "--laws", "--json")
+    laws = {info["name"]: info for info in json.loads(listed)}
+    assert all(name in out for name in laws)
+    assert laws["lugre"]["states"] == ["z"]
+    assert laws["coulomb"]["parameters"] == ["mu"]
+
+
 def test_integrators(hybridsim: Callable) -> None:
     code, out, _ = hybridsim("integrators")
     assert code == 0
