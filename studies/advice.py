@@ -176,13 +176,13 @@ def page(
         "",
         f"`python studies/advice.py` draws {count} points of the reference model's map, F0/N in [0.5, 1.5] and r in "
         f"[0.05, 2], asks `advise` for the steady amplitude of x within {100 * TOL:g} %, and finds the simplest "
-        "adequate rung once more by brute force: the full motion in closed form from rest until the free vibration is below "
-        "rounding, formulas without friction and with equivalent viscous damping, and plain runs of the regularised "
+        "adequate rung once more by brute force: the full motion in closed form from rest until the free vibration is "
+        "below rounding, formulas without friction and with equivalent viscous damping, plain runs of the regularised "
         "models, settled as long.",
         "",
-        f"The two differ at **{len(wrong) + len(near)}** points; at {len(near)} of these an error lies within 0.01 % of "
-        f"the tolerance. Amplitudes of the full model differ by {worst:.1e} at most; brute force repeats from period to "
-        f"period to {drift:.1e}. The advice took {spent:.0f} s on one thread, brute force {brute:.0f} s.",
+        f"The two differ at **{len(wrong) + len(near)}** points; at {len(near)} of these an error lies within 0.01 % "
+        f"of the tolerance. Amplitudes of the full model differ by {worst:.1e} at most; brute force repeats from period "
+        f"to period to {drift:.1e}. The advice took {spent:.0f} s on one thread, brute force {brute:.0f} s.",
         "",
         "| simplest within 1 % | points |",
         "| --- | --- |",
