@@ -57,7 +57,7 @@ class Race:
             "map": {"F0/N": RATIO_SPAN, "r": R_SPAN, "points": [self.side, self.side]},
             "settling": f"{PERIODS} periods from rest",
             **{name: entry.to_plain() for name, entry in self.entries.items()},
-            "times faster than the published method": {
+            "time over that of exact": {
                 name: entry.seconds / base for name, entry in self.entries.items() if name != "exact"
             },
         }

@@ -59,6 +59,7 @@ class Truth:
             "largest deviation of the closed form where it holds": float(np.nanmax(off[self.holds & moving])),
             "most stops per period": int(self.stops.max()),
             "largest stick fraction of a moving body": float(self.stick[moving].max()),
+            "median residual of periodicity": float(np.median(self.residual)),
             "largest residual of periodicity": float(self.residual.max()),
             "share of the moving points where a model's amplitude is within 1 %": within,
             "stick fraction below which the closed form without stops is within 1 %": self.harmless(0.01),

@@ -39,7 +39,8 @@ def interval_cost(times: RunTimes) -> Figure:
         axes.invert_xaxis()
         axes.set_xlabel("zero-velocity interval eps_v [m/s]", fontsize=9)
         style.dress(axes)
-    left.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.78))
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
