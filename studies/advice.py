@@ -180,9 +180,10 @@ def page(
         "below rounding, formulas without friction and with equivalent viscous damping, plain runs of the regularised "
         "models, settled as long.",
         "",
-        f"The two differ at **{len(wrong) + len(near)}** points; at {len(near)} of these an error lies within 0.01 % "
-        f"of the tolerance. Amplitudes of the full model differ by {worst:.1e} at most; brute force repeats from period "
-        f"to period to {drift:.1e}. The advice took {spent:.0f} s on one thread, brute force {brute:.0f} s.",
+        f"The two differ at **{len(wrong) + len(near)}** points; at {len(near)} of these an error lies within "
+        f"0.01 % of the tolerance. Amplitudes of the full model differ by {worst:.1e} at most; brute force "
+        f"repeats from period to period to {drift:.1e}. The advice took {spent:.0f} s, brute "
+        f"force {brute:.0f} s, each on one thread.",
         "",
         "| simplest within 1 % | points |",
         "| --- | --- |",
