@@ -202,3 +202,19 @@ def test_elasto_plastic_does_not_drift_where_lugre_does(integrator: str) -> None
         drift[law] = float(sol(60 * pi)[0] - sol(30 * pi)[0])
     assert abs(drift["elasto-plastic"]) < 1e-8
     assert drift["lugre"] > 1e-3
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_jenkins_in_a_contact_that_opens(integrator: str) -> None:
+    """A steady pull under N = 10 (1 + 2 sin t): F = mu N in slip, none while open, and mu N again."""
+    contact = hs.Contact("f", "1", "10 + 20*sin(t)", "jenkins", {"mu": 0.5, "k": 100}, opens=True)
+    model = hs.Model("lifting", [hs.State("x", 0, "1")], contacts=[contact], outputs={"f": "f"})
+    sol = run(model, 2 * pi, integrator)
+    assert [(e.component, e.target) for e in sol.events] == [
+        ("f", "slip+"),
+        ("f_N", "open"),
+        ("f_N", "closed"),
+    ]
+    assert [e.t for e in sol.events][1:] == pytest.approx([7 * pi / 6, 11 * pi / 6], rel=1e-8)
+    for t in (1.0, 3.0, 3.8, 5.0, 5.9, 6.2):
+        assert sol.output("f", t) == pytest.approx(0.5 * max(10 + 20 * np.sin(t), 0), abs=1e-7)
