@@ -1,7 +1,7 @@
 """What type checkers see of the package: the same names, imported at once."""
 
-from hybridsim.analysis import Branch as Branch
 from hybridsim.analysis import Advice as Advice
+from hybridsim.analysis import Branch as Branch
 from hybridsim.analysis import Comparison as Comparison
 from hybridsim.analysis import Equilibrium as Equilibrium
 from hybridsim.analysis import Linearization as Linearization
@@ -9,8 +9,8 @@ from hybridsim.analysis import Sensitivities as Sensitivities
 from hybridsim.analysis import SteadyState as SteadyState
 from hybridsim.analysis import SuiteComparison as SuiteComparison
 from hybridsim.analysis import Sweep as Sweep
-from hybridsim.analysis import bifurcation as bifurcation
 from hybridsim.analysis import advise as advise
+from hybridsim.analysis import bifurcation as bifurcation
 from hybridsim.analysis import compare as compare
 from hybridsim.analysis import compare_suite as compare_suite
 from hybridsim.analysis import continuation as continuation

@@ -12,8 +12,8 @@ from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, swe
 from hybridsim.analysis.variations import Sensitivities, sensitivities
 
 __all__ = [
-    "Branch",
     "Advice",
+    "Branch",
     "Comparison",
     "Equilibrium",
     "Linearization",
@@ -22,13 +22,13 @@ __all__ = [
     "SteadyState",
     "SuiteComparison",
     "Sweep",
-    "bifurcation",
     "advise",
+    "bifurcation",
     "compare",
     "compare_suite",
-    "frequency_response",
     "continuation",
     "equilibria",
+    "frequency_response",
     "linearize",
     "sensitivities",
     "steady_state",

@@ -24,7 +24,7 @@ of parameters; in a row A,B,C it is evaluated at every point.
 examples:
   hybridsim sweep dfcs F0=20:40:11 omega=400:900:26 --measure amplitude.x,stick_fraction.f
   hybridsim sweep dfcs 'omega=0.2*sqrt(k/m):1.5*sqrt(k/m):66' N=20,30,40 --over omega
-  hybridsim sweep belt V=0.05:0.2:16 --measure final --t-end 50
+  hybridsim sweep belt v_belt=0.05:0.2:16 --measure final --t-end 50
 """
 _MOST_DRAWN = 2  # parameters of a picture
 

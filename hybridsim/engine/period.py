@@ -13,21 +13,43 @@ if TYPE_CHECKING:
 
 # Ratios of periods that differ from a whole number by less than this are whole: parameters carry rounding.
 _COMMENSURATE = 1e-9
+_MOST = 64  # times the longest period: what repeats later does not repeat
 
 
 def system_period(system: System) -> float | None:
     """Period of everything that varies in time in a known way: the longest, if the others divide it; else None."""
+    periods = forcing_periods(system)
+    return _multiple_of_all(periods, 1) if periods else None
+
+
+def common_period(system: System) -> float | None:
+    """After how long all forcing, inputs and clocks repeat: the least multiple of the longest period, or None."""
+    periods = forcing_periods(system)
+    if periods is None:
+        return None
+    values = system.values
+    periods += [evaluate(c.period, values) for c in system.model.schedules if c.period is not None]
+    return _multiple_of_all(periods, _MOST) if periods else None
+
+
+def forcing_periods(system: System) -> list[float] | None:
+    """The period of each sine of time and of each input; None where one of them has none."""
     values = system.values
     periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
     for declared in system.model.inputs:
         if declared.kind != "wave" or declared.period is None:
             return None
         periods.append(evaluate(declared.period, values))
-    if not periods:
-        return None
+    return periods
+
+
+def _multiple_of_all(periods: list[float], most: int) -> float | None:
     longest = max(periods)
-    ratios = [longest / period for period in periods]
-    return longest if all(abs(r - round(r)) <= _COMMENSURATE * r for r in ratios) else None
+    for k in range(1, most + 1):
+        ratios = [k * longest / period for period in periods]
+        if all(abs(r - round(r)) <= _COMMENSURATE * r for r in ratios):
+            return k * longest
+    return None
 
 
 def forcing_period(model: Model) -> float | None:

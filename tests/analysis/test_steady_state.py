@@ -45,7 +45,7 @@ def test_the_belt_has_its_known_period() -> None:
     found = hs.steady_state("belt")
     assert found.kind == "periodic"
     assert abs(found.period / 12.00103129483058 - 1.0) < 1e-10
-    assert found.word == ("stick", "slip-")
+    assert sorted(found.word) == ["slip-", "stick"]
 
 
 def test_energy_balance_over_a_period() -> None:

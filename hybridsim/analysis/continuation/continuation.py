@@ -18,6 +18,7 @@ from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.steady.shooting import Orbit, multipliers
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.errors import HybridsimError, UsageError, nearest
 
@@ -114,7 +115,8 @@ def continuation(
     first = follower.close(start._closed, value)
     if first is None:
         raise UsageError(
-            f"the orbit at {parameter} = {value:g} does not close by Newton's method: {start.message}"
+            f"the orbit at {parameter} = {value:g} cannot be followed: {follower.fault or start.message}",
+            remedy="sweep it with hs.bifurcation",
         )
     sides = []
     for number, sign in enumerate((-1.0, 1.0)):
@@ -146,7 +148,10 @@ class _Follower:
         scale = np.where(largest > 0.0, largest, 1.0)
         # start of the orbit, its period where that is free, the parameter
         self.unit = np.concatenate([scale, [orbit.period] if is_free else [], [bounds[1] - bounds[0]]])
-        self.section = 0
+        self.fault = ""  # what stood in the way last
+        first = solution._segments[0]
+        rates = np.abs(rates_of(solution._system, float(first.s[0]), first.x[0], first.p, first.z))
+        self.section = int(np.argmax(rates / scale[: len(rates)])) if len(rates) else 0
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
         """Points from the first one on, the parameter falling (sign -1) or rising at first; and why it ended."""
@@ -169,13 +174,23 @@ class _Follower:
                 continue
             value = there.point.parameter
             if not self.bounds[0] <= value <= self.bounds[1]:
-                return found, "the bound was reached"
+                return found + self._at_bound(here.point, there.point), "the bound was reached"
             found.append(there.point)
             tangent = self._tangent(there, tangent)
             here = there
             if count <= _FEW:
                 step = min(step * _MORE, _LARGEST)
         return found, f"{self.max_points} points"
+
+    def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
+        """The orbit at the bound between two points, if Newton's method finds it."""
+        bound = self.bounds[0] if outside.parameter < self.bounds[0] else self.bounds[1]
+        share = (bound - inside.parameter) / (outside.parameter - inside.parameter)
+        a, b = self._unknowns(inside), self._unknowns(outside)
+        across = np.zeros(len(a))
+        across[-1] = 1.0
+        found, _ = self._correct(inside, a + share * (b - a), across)
+        return [] if found is None else [found.point]
 
     def _unknowns(self, point: BranchPoint) -> np.ndarray:
         """Start, period and parameter in units of their own."""
@@ -236,11 +251,12 @@ class _Follower:
             if end.z != start.z:
                 return None
             found = sensitivities(solution, (self.parameter,), starts_follow=False)
-        except HybridsimError:
+        except HybridsimError as fault:
+            self.fault = fault.message
             return None
         last = solution._segments[-1]
         rates = np.zeros(count)
-        rates[:n] = solution._system.flow(float(last.s[-1]), last.x[-1], last.p, last.z)
+        rates[:n] = rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
         columns = [found.by_start - np.eye(count)]
         columns += [rates[:, None]] if self.is_free else []
         columns += [(found.by_parameter[:, 0] + rates * growth)[:, None]]
@@ -261,11 +277,11 @@ class _Follower:
 
     def _forced(self, value: float) -> tuple[float, float]:
         """The period of the forcing, and its derivative by the parameter."""
-        from hybridsim.engine.period import system_period
+        from hybridsim.engine.period import common_period
         from hybridsim.engine.recent import system_of
 
         def period(at: float) -> float:
-            found = system_period(system_of(self.model.with_(**{self.parameter: at})))
+            found = common_period(system_of(self.model.with_(**{self.parameter: at})))
             if found is None:
                 raise UsageError(f"the forcing has no period at {self.parameter} = {at:g}")
             return self.multiple * found

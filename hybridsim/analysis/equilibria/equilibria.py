@@ -51,12 +51,12 @@ class Equilibrium:
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Rest and steady sliding of a model that is not driven in time, in every vector of modes that lasts there.
+    """Rest and steady sliding of a model that is not driven in time, one for each vector of modes that lasts there.
 
-    In each vector of modes Newton's method finds where all rates vanish; points that violate a guard are left out. Where
-    contacts stick the points form a set: the least and greatest value of each state over it come from linear programs,
-    repeated about their solutions where the model is not linear. For a nonlinear flow it is the equilibrium that is
-    found from the model's start, and there may be others.
+    In each vector of modes Newton's method finds where all rates vanish; points that violate a guard are left out.
+    Where contacts stick the points form a set: the least and greatest value of each state over it come from linear
+    programs, repeated about their solutions where the model is not linear. There it is what is found from the model's
+    start, and there may be others.
 
     Errors
     ------
@@ -73,6 +73,11 @@ def equilibria(
     from hybridsim.engine.recent import system_of
 
     system = system_of(model)
+    if model.schedules:
+        raise UsageError(
+            f"model {model.name} has {model.schedules[0].name}, which changes it at its times: nothing rests",
+            remedy="see hs.steady_state",
+        )
     if is_driven(system):
         raise UsageError(
             f"model {model.name} is driven in time: nothing rests",
@@ -106,7 +111,8 @@ def _in_modes(field: Field) -> Equilibrium | None:
         if bounds is None:
             return None
         low, high = bounds
-        middle = np.where(np.isfinite(low + high), 0.5 * (low + high), x)
+        bounded = np.isfinite(low) & np.isfinite(high)
+        middle = np.where(bounded, 0.5 * (np.where(bounded, low, 0.0) + np.where(bounded, high, 0.0)), x)
         x = _nearest_inside(field, middle, x)
     else:
         low = high = x

@@ -54,7 +54,12 @@ class Field:
 def is_driven(system: System) -> bool:
     """Whether the equations depend on time."""
     tape = system.code.data["tape"]
-    return tape is None or tape["time"] >= 0 or bool(system.model.inputs)
+    if tape is None:
+        raise UsageError(
+            f"model {system.model.name} is made of Python functions, of which derivatives are not known",
+            remedy="write it in expressions",
+        )
+    return tape["time"] >= 0 or bool(system.model.inputs)
 
 
 def modes_of(system: System, mode: Mapping[str, str] | str | None) -> np.ndarray:
@@ -67,6 +72,8 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> np.ndarray
                 remedy="give a mapping from components to modes",
             )
         mode = {declared[0].name: mode}
+    if not (mode is None or isinstance(mode, Mapping)):
+        raise UsageError(f"mode is {mode!r}", remedy="give a mapping from components to modes")
     given: dict[str, Any] = dict(mode or {})
     names = [a.name for a in declared]
     for name in given:

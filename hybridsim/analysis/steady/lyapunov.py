@@ -19,20 +19,25 @@ _PERIODS = 5  # in each
 _SMALLEST = 1e-280  # a change that stick has made nothing of
 
 
-def largest_exponent(motion: Motion, start: Point, period: float) -> float:
-    """Mean rate of growth of a change, per unit of time, over some hundred periods; -inf where it dies out."""
+def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
+    """Mean rates of growth of a change over a first and a second hundred and fifty periods; -inf where it dies out.
+
+    Exponential growth has the same rate in both; what grows like a power of time has not.
+    """
     n, d = len(start.x), len(start.discrete)
     change = np.ones(n + d) / math.sqrt(n + d)
     parameters = np.zeros((len(motion.model.parameters), 1))
-    total, point = 0.0, start
+    logarithms, point = [], start
     for _ in range(_STRETCHES):
         solution = motion.run(point, _PERIODS * period)
         carried = Carrier(solution).carry(Directions(change[:n, None], change[n:, None], parameters))
         change = np.concatenate([carried.x[:, 0], carried.discrete[:, 0]])
         size = float(np.linalg.norm(change))
         if size < _SMALLEST:
-            return -math.inf
-        total += math.log(size)
+            return -math.inf, -math.inf
+        logarithms.append(math.log(size))
         change /= size
         point = point_at_end(solution)
-    return total / (_STRETCHES * _PERIODS * period)
+    half = _STRETCHES // 2
+    rates = [sum(part) / (half * _PERIODS * period) for part in (logarithms[:half], logarithms[half:])]
+    return rates[0], rates[1]

@@ -28,6 +28,10 @@ class Grazing(NamedTuple):
     relative: float
 
 
+class UnknownName(UsageError, KeyError):
+    """A measure is asked of something that is not there."""
+
+
 class ByName(Mapping[str, float]):
     """A measure of each quantity, worked out when it is asked for."""
 
@@ -36,9 +40,9 @@ class ByName(Mapping[str, float]):
 
     def __getitem__(self, name: str) -> float:
         if name not in self._names:
-            raise UsageError(
+            raise UnknownName(
                 f"the steady state has no {self._kind} {name!r}",
-                remedy=nearest(name, self._names, kind=self._kind),
+                remedy=nearest(str(name), self._names, kind=self._kind),
             )
         return self._measure(name)
 
@@ -114,9 +118,9 @@ class Measures:
         if name not in self._names:
             raise UsageError(
                 f"the steady state has no quantity {name!r}",
-                remedy=nearest(name, self._names, kind="quantities"),
+                remedy=nearest(str(name), self._names, kind="quantities"),
             )
-        if k < 0:
+        if not isinstance(k, int) or k < 0:
             raise UsageError(f"k is {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ...")
         return self._orbit.harmonic(name, 2.0 * math.pi * k / self._orbit.duration)
 

@@ -157,13 +157,14 @@ class Sampler:
         self.segments = solution._segments
         self.quantities = tuple(q for q in system.quantities if " in " not in q)
         self.discrete = tuple(d.name for d in system.model.discrete)
+        self.guards = system.guard_count if system.has_tape else 0
         contacts = [system.automata[c].name for c in system.surface_of]
         self.names = (
             *system.names,
             *self.quantities,
             *self.discrete,
             *(f"velocity of {name}" for name in contacts),
-            *(f"guard {g}" for g in range(system.guard_count)),
+            *(f"guard {g}" for g in range(self.guards)),
         )
 
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -179,10 +180,13 @@ class Sampler:
     def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         system, segment = self.system, self.segments[i]
         named = self.solution._quantities((*self.quantities, *self.discrete), segment, s, x)
+        columns = [np.reshape(named, (-1, len(s))).T]
+        if not system.has_tape:  # of Python functions: no contacts, and guards that are no series
+            return columns[0]
         surfaces = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
         guards = system.rows("guards", system.guard_count, s, x, segment.p, segment.z)
         guards[:, ~system.active(segment.z)] = np.inf
-        return np.concatenate([np.reshape(named, (-1, len(s))).T, surfaces, guards], axis=1)
+        return np.concatenate([*columns, surfaces, guards], axis=1)
 
 
 def orbit_of(solution: Solution) -> Orbit:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
 from hybridsim.analysis.steady.orbit import orbit_of
-from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.variations.sizes import ranges
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
@@ -27,7 +27,7 @@ class Passings:
     ----------
     times : (K,), from the beginning of the run.
     values : (K, n + d), states and discrete states just before each passing.
-    scale : (n + d,), largest size of each along the run.
+    scale : (n + d,), what a change of each is measured by; see `scale_of`.
     last : the motion at the last one.
     rests : whether nothing moves any more.
     state : the state that keeps its value from passing to passing, without forcing.
@@ -42,6 +42,8 @@ class Passings:
 
     def residual(self, multiple: int) -> float:
         """The largest change of a state over so many passings up to the last, relative to its scale."""
+        if self.rests:
+            return 0.0
         if len(self.values) <= multiple:
             return float("inf")
         return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
@@ -80,6 +82,15 @@ class Passings:
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )
 
+    def drifts(self) -> bool:
+        """Whether a state moves on as much in each quarter of the passings, the same way."""
+        quarter = (len(self.values) - 1) // 4
+        if quarter < 2:
+            return False
+        moves = np.diff(self.values[::-quarter][:5], axis=0)
+        i = int(np.argmax(np.abs(moves[0]) / np.where(self.scale > 0.0, self.scale, 1.0)))
+        return bool(np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]))
+
     def nearest(self) -> int:
         """After how many passings the motion comes closest to repeating: the fewest that are about as good."""
         most = min(LONGEST_WORD, (len(self.values) - 1) // 2)
@@ -87,6 +98,7 @@ class Passings:
         return 1 + next(i for i, r in enumerate(residuals) if r <= _ABOUT * min(residuals))
 
 
+_STEADY = 0.1  # of a drift: what it may change by
 _ABOUT = 10.0
 
 
@@ -96,13 +108,20 @@ def relative(change: np.ndarray, scale: np.ndarray) -> float:
     return float(parts.max(initial=0.0))
 
 
-def scale_of(solution: Solution) -> np.ndarray:
-    """Largest size of each state and discrete state along a run, or what was kept of it (n + d,)."""
-    values = sizes(solution)
-    if not solution._system.layout.discrete:
-        return values
-    discrete = [np.abs(g.p[solution._system.layout.discrete_slice]) for g in solution._segments]
-    return np.concatenate([values, np.max(discrete, axis=0)])
+def scale_of(solution: Solution, since: float) -> np.ndarray:
+    """What a change of each state and discrete state is measured by (n + d,): half of its range late in a run.
+
+    It is at least a thousandth of the largest size: a state far from zero that hardly moves has no more digits.
+    """
+    low, high = ranges(solution, since)
+    if solution._system.layout.discrete:
+        index = np.flatnonzero(solution._ends > since)
+        held = np.array([solution._segments[int(i)].p[solution._system.layout.discrete_slice] for i in index])
+        low, high = np.append(low, held.min(axis=0)), np.append(high, held.max(axis=0))
+    return np.maximum(0.5 * (high - low), _DIGITS * np.maximum(np.abs(low), np.abs(high)))
+
+
+_DIGITS = 1e-3
 
 
 def forced_passings(motion: Motion, start: Point | None, period: float, count: int) -> Passings:
@@ -116,13 +135,14 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
         index, _ = solution._places(times, "-")
         discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
         values = np.concatenate([values, discrete], axis=1)
-    return Passings(times, values, scale_of(solution), point_at_end(solution))
+    late = solution.t_end - max(1, count // 4) * period
+    return Passings(times, values, scale_of(solution, late), point_at_end(solution))
 
 
 def free_passings(motion: Motion, start: Point | None, duration: float) -> Passings:
     """At every rise of the state that moves most through the middle of its range, in the later half of a run."""
     solution = motion.run(start, duration)
-    n, scale = len(motion.names), scale_of(solution)
+    n, scale = len(motion.names), scale_of(solution, 0.0)
     late = motion.run(point_at(solution, 0.5 * duration), 0.5 * duration)
     orbit = orbit_of(late)
     low, high = (side[:n] for side in orbit.extremes)
@@ -134,7 +154,7 @@ def free_passings(motion: Motion, start: Point | None, duration: float) -> Passi
     times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
     points = [point_at(late, t) for t in times]
     values = np.array([p.values for p in points]).reshape(len(points), len(scale))
-    return Passings(times, values, scale_of(late), points[-1] if points else end, state=j)
+    return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
 
 
 _RESTS = 1e-12  # no state moves by more, relative to its largest size

@@ -9,6 +9,7 @@ import numpy as np
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.errors import HybridsimError
 
 _STEPS = 12
@@ -69,7 +70,7 @@ def shoot(
         rates = None
         if section is not None:
             last = solution._segments[-1]
-            rates = solution._system.flow(float(last.s[-1]), last.x[-1], last.p, last.z)
+            rates = rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
         move, longer = _newton(matrix, change, scale, section, rates)
         best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
         # what is left of the error is the step itself

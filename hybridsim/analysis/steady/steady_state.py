@@ -8,11 +8,13 @@ from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hybridsim import arguments
-from hybridsim.analysis.steady.lyapunov import largest_exponent
-from hybridsim.analysis.steady.motion import Motion
+from hybridsim.analysis.steady.lyapunov import largest_exponents
+from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
-from hybridsim.analysis.steady.settling import Passings, forced_passings, free_passings
+from hybridsim.analysis.steady.settling import Passings, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
@@ -28,6 +30,8 @@ _DURATION = 100.0  # of a first run without forcing, where the model has none of
 _FEWEST = 4  # passings that say something
 _WAIT = 256  # periods that are run in the time of a few Newton steps
 _MARGIN = 1.1  # on how many are expected to be needed
+_GROWS = 1.2  # times what it was: a state that has no end of growing
+_COMMENSURATE = 1e-9
 _TIGHTER = 1e-2  # the runs' tolerance, in units of that of the steady state
 _NEUTRAL = 1e-3  # an exponent below that, per period, is nought
 PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
@@ -91,18 +95,19 @@ def steady_state(
     ('periodic', ('stick', 'slip+', 'stick', 'slip-'), 2.0)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.period import system_period
+    from hybridsim.engine.period import common_period
     from hybridsim.engine.recent import system_of
 
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
         raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance between 0 and 1, such as 1e-10")
     system = system_of(model)
+    _refuse_what_ends(system, period is not None)
+    own = common_period(system)
     if period is None:
-        period = system_period(system) or _clock_period(system)
-    elif not (arguments.number(period, "period") > 0.0 and math.isfinite(period)):
-        raise UsageError(f"period is {period!r}", remedy="give a time above zero")
-    _refuse_records(model)
+        period = own
+    else:
+        _check_period(model, arguments.number(period, "period"), own)
     method = {
         "integrator": integrator,
         "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
@@ -110,6 +115,9 @@ def steady_state(
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     if period is None and _is_driven(system):
         return _found(motion, QUASI, None, message="the frequencies of the forcing have no common period")
+    for name, count in (("settle", settle), ("max_periods", max_periods)):
+        if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+            raise UsageError(f"{name} is {count!r}", remedy="give a whole number of periods")
     search = _Search(motion, period, tol, settle, max_periods, arguments.callback(progress))
     return search.run()
 
@@ -127,15 +135,17 @@ class _Search:
         progress: Callable[[float], None] | None,
     ) -> None:
         self.motion, self.period, self.tol = motion, period, tol
-        self.settle, self.max_periods = max(int(settle), _FEWEST), int(max_periods)
+        self.settle, self.max_periods = max(settle, _FEWEST), max_periods
         self.progress = progress
         self.newton_steps, self.periods = 0, 0
         self.duration = motion.model.duration_value() or _DURATION
+        self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
         self.expected = 0  # periods that the motion is expected to need until it has settled
 
     def run(self) -> SteadyState:
         passings = self._follow(None)
         while True:
+            self.earlier, self.scale = self.scale, passings.scale
             if passings.rests:
                 return _found(self.motion, EQUILIBRIUM, self._orbit(passings, 1), periods=self.periods)
             orbit = self._closed(passings)
@@ -199,6 +209,7 @@ class _Search:
         return Orbit(passings.last, period, multiple, passings.residual(multiple))
 
     def _periodic(self, orbit: Orbit) -> SteadyState:
+        orbit = self._shortest(orbit)
         multiple = orbit.multiple
         what = "" if multiple == 1 else f" of {multiple} periods of the forcing" if self.period else ""
         message = f"periodic motion{what}; residual {orbit.residual:.1e}"
@@ -206,14 +217,33 @@ class _Search:
             self.motion, PERIODIC, orbit, self.period is None, self.newton_steps, self.periods, message
         )
 
+    def _shortest(self, orbit: Orbit) -> Orbit:
+        """The orbit with the least period: one that closes after a divisor of its multiple is taken for what it is."""
+        for divisor in range(1, orbit.multiple):
+            if orbit.multiple % divisor:
+                continue
+            period = orbit.period * divisor / orbit.multiple
+            end = point_at_end(self.motion.run(orbit.start, period))
+            change = relative(end.values - orbit.start.values, self.scale)
+            if end.z == orbit.start.z and change <= max(self.tol, 10.0 * orbit.residual):
+                return replace(orbit, period=period, multiple=divisor, residual=change)
+        return orbit
+
     def _other(self, passings: Passings) -> SteadyState:
         """A motion that does not repeat: told apart by its largest Lyapunov exponent."""
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
-        exponent = largest_exponent(self.motion, passings.last, base)
-        per_period = exponent * base
-        kind = CHAOTIC if per_period > _NEUTRAL else QUASI if per_period > -_NEUTRAL else UNSETTLED
+        first, second = largest_exponents(self.motion, passings.last, base)
+        exponent = 0.5 * (first + second)
+        grows = (passings.scale > _GROWS * self.earlier).any() or passings.drifts()
+        if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not grows:
+            kind = CHAOTIC
+        elif abs(exponent) * base <= _NEUTRAL and not grows:
+            kind = QUASI
+        else:
+            kind = UNSETTLED
         message = (
             f"{kind} after {self.periods} periods: largest Lyapunov exponent {exponent:.3g} per unit of time"
+            + (", and a state goes on moving away" if grows else "")
         )
         found = _found(self.motion, kind, replace(self._orbit(passings, 1), residual=passings.residual(1)))
         found.lyapunov, found.message, found.periods = exponent, message, self.periods
@@ -240,16 +270,41 @@ def _is_driven(system: System) -> bool:
     return any(rate != 0.0 for rate in system.rates) or bool(system.model.inputs)
 
 
-def _clock_period(system: System) -> float | None:
-    """The longest period of the model's clocks, which a run has to begin in step with."""
-    declared = [c.period for c in system.model.schedules if c.period is not None]
-    return max((evaluate(period, system.values) for period in declared), default=None)
+def _check_period(model: Model, period: float, own: float | None) -> None:
+    if not (period > 0.0 and math.isfinite(period)):
+        raise UsageError(f"period is {period!r}", remedy="give a time above zero")
+    if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
+        raise UsageError(
+            f"period is {period!r}, and model {model.name} is driven with the period {own!r}",
+            remedy="leave it out, or give a whole multiple",
+        )
 
 
-def _refuse_records(model: Model) -> None:
+def _refuse_what_ends(system: System, is_period_given: bool) -> None:
+    """Refuse what happens once, or changes for ever: from then on there is another model."""
+    model = system.model
     for declared in model.inputs:
         if declared.kind != "wave":
             raise UsageError(
                 f"model {model.name} is driven by {declared.name}, a {declared.kind}: there is no steady state",
                 remedy="give a periodic input",
             )
+    for clock in model.schedules:
+        if clock.period is None or clock.count is not None:
+            raise UsageError(
+                f"{clock.name} of model {model.name} comes to an end: there is no steady state before",
+                remedy="leave it out, or let it tick for ever",
+            )
+        start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
+        if start >= evaluate(clock.period, system.values):
+            raise UsageError(
+                f"{clock.name} of model {model.name} begins after its first period",
+                remedy="let it start within one period",
+            )
+    tape = system.code.data["tape"]
+    plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])
+    if plain and not is_period_given:
+        raise UsageError(
+            f"model {model.name} depends on t itself, not on the sine of an angle: it need not repeat",
+            remedy="give its period=, if it does",
+        )

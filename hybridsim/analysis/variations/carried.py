@@ -11,6 +11,7 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.solution import Solution
 
+_ALIKE = 1e-7  # events at one instant are one event if their times change alike to that part
+_AT_ZERO = 1e-9  # of a guard's terms
 _TANGENTIAL = (
     1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
 )
@@ -83,29 +86,47 @@ class Carrier:
         Y, Yd = directions.x.copy(), directions.discrete.copy()
         times: list[tuple[float, np.ndarray]] = []
         stretches = list(self._stretches())
-        Y = self._projected(stretches[0][0], Y, Yd, directions.parameters)
+        Y, Yd = self._started(stretches[0][0], Y, Yd, directions.parameters)
         for (segment, happened), (following, _) in zip(stretches, [*stretches[1:], (None, ())], strict=True):
             Y = self._over(segment, Y, Yd, directions.parameters)
             if following is None:
                 break
             Y, Yd, shift = self._through(segment, happened, following, Y, Yd, directions.parameters)
-            if happened:
+            if any(one.kind != "corner" for one in happened):
                 times.append((float(following.start), shift))
         return Carried(Y, Yd, times)
 
     def _stretches(self) -> Iterator[tuple[Segment, tuple[Occurrence, ...]]]:
         """Segments, each with what happened at its end and changed modes or states."""
-        segments = list(self.solution._segments)
         waiting = [o for o in self.solution._trajectory.occurrences if o.kind != "near-grazing"]
         at = 0
-        for segment in segments:
-            end, happened = segment.end, []
-            while at < len(waiting) and waiting[at].instant.minus(end) < 0.0:
+        for segment in self.solution._segments:
+            end = segment.end
+            rounding = 4.0 * math.ulp(
+                float(end)
+            )  # an event and the end of its segment are one instant but for that
+            while at < len(waiting) and waiting[at].instant.minus(end) < -rounding:
                 at += 1
-            while at < len(waiting) and waiting[at].instant.minus(end) == 0.0:
-                happened.append(waiting[at])
+            first = at
+            while at < len(waiting) and waiting[at].instant.minus(end) <= rounding:
                 at += 1
-            yield segment, tuple(happened)
+            yield segment, tuple(waiting[first:at])
+
+    def _started(
+        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives behind what happened at the first instant itself."""
+        happened = at_start(self.solution)
+        scheduled = [one for one in happened if one.kind == "scheduled"]
+        if scheduled and self._scheduled_shift(scheduled, G).any():
+            raise UsageError(
+                f"{scheduled[0].component} happens at the start of the run, and its time depends on what is changed",
+                remedy="begin the run a little earlier or later",
+            )
+        nothing = np.zeros(Y.shape[1])
+        for one in happened:
+            Y, Yd = self._after_reset(segment, one, float(segment.s[0]), Y, Yd, G, nothing)
+        return self._projected(segment, Y, Yd, G), Yd
 
     def _refuse_inputs(self, G: np.ndarray) -> None:
         """Derivatives of an input's shape by its parameters are not known."""
@@ -172,11 +193,11 @@ class Carrier:
         system, s = self.system, float(segment.s[-1])
         x = segment.x[-1]
         shift = self._shift(segment, happened, s, x, Y, Yd, G)
-        before = system.flow(s, x, segment.p, segment.z)
+        before = rates_of(system, s, x, segment.p, segment.z)
         Y = Y + np.outer(before, shift)
         for one in happened:
             Y, Yd = self._after_reset(segment, one, s, Y, Yd, G, shift)
-        after = system.flow(float(following.s[0]), following.x[0], following.p, following.z)
+        after = rates_of(system, float(following.s[0]), following.x[0], following.p, following.z)
         Y = Y - np.outer(after, shift)
         return self._projected(following, Y, Yd, G), Yd, shift
 
@@ -190,25 +211,62 @@ class Carrier:
         Yd: np.ndarray,
         G: np.ndarray,
     ) -> np.ndarray:
-        """Derivatives of the time of what happened (M,)."""
-        system, n = self.system, self.system.n
+        """Derivatives of the time of what happened (M,): of everything that came about by itself, the same."""
         scheduled = [o for o in happened if o.kind == "scheduled"]
-        if scheduled or not happened:
-            return self._scheduled_shift(scheduled, G)
-        number, is_monitor = self._function(happened[0], segment.z)
+        if not happened:
+            return np.zeros(G.shape[1])
+        shifts = [self._scheduled_shift([o], G) for o in scheduled]
+        for one in happened:
+            if one.kind == "monitor" or one.guard:
+                shift = self._located_shift(segment, one, s, x, Y, Yd, G, is_first=not shifts)
+                shifts += [] if shift is None else [shift]
+        largest = max(np.abs(shift).max(initial=0.0) for shift in shifts)
+        if any((np.abs(shift - shifts[0]) > _ALIKE * largest).any() for shift in shifts):
+            raise UsageError(
+                f"several events at t = {float(happened[0].instant):.9g} move apart when the run is changed: "
+                f"{', '.join(sorted({o.component for o in happened}))}; there is no derivative",
+                remedy="take other parameters, or a run that ends before",
+            )
+        return shifts[0]
+
+    def _located_shift(
+        self,
+        segment: Segment,
+        one: Occurrence,
+        s: float,
+        x: np.ndarray,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+        is_first: bool,
+    ) -> np.ndarray | None:
+        """Of an event at a zero of a guard or monitor; None for one that followed from another."""
+        system, n = self.system, self.system.n
+        if one.kind != "monitor" and one.source != self._mode(one, segment.z):
+            return None
+        number, is_monitor = self._function(one, segment.z)
         tape = TangentTape(system, segment.z, *(((), (number,)) if is_monitor else ((number,), ())))
         found = tape(np.array([s]), x[None, :], segment.p, self._seeds(segment))
         row = found.slopes[0, n]
         terms = np.append(row[:n] * found.values[0, :n], row[n])
+        size = np.abs(row[:n]) @ self._scale
+        if not is_first and abs(found.values[0, n]) > _AT_ZERO * size:
+            return None
         rate = terms.sum()
         if not abs(rate) > _TANGENTIAL * np.abs(terms).sum():
+            if not is_first:
+                return None
             raise UsageError(
-                f"{happened[0].component} has an event at t = {float(happened[0].instant):.9g} at which its guard does "
+                f"{one.component} has an event at t = {float(one.instant):.9g} at which its guard does "
                 "not fall: the time of such an event has no derivatives",
                 remedy="take other parameters, or a run that ends before",
             )
         change = row[:n] @ Y + row[n + 1 :] @ np.concatenate([Yd, G])
         return -change / rate
+
+    def _mode(self, one: Occurrence, z: np.ndarray) -> str:
+        c = [a.name for a in self.system.automata].index(one.component)
+        return self.system.automata[c].modes[z[c]]
 
     def _function(self, occurrence: Occurrence, z: np.ndarray) -> tuple[int, bool]:
         """Number of the guard or monitor that made something happen."""
@@ -230,10 +288,10 @@ class Carrier:
         values, t = self.system.values, float(scheduled[0].instant)
         if declared.start is None or declared.period is None:
             single = min(declared.times, key=lambda e: abs(evaluate(e, values) - t))
-            return expression_slope(single, values, slopes)
+            return expression_slope(single, values, slopes, G.shape[1])
         k = round((t - evaluate(declared.start, values)) / evaluate(declared.period, values))
-        by_start = expression_slope(declared.start, values, slopes)
-        return by_start + k * expression_slope(declared.period, values, slopes)
+        by_start = expression_slope(declared.start, values, slopes, G.shape[1])
+        return by_start + k * expression_slope(declared.period, values, slopes, G.shape[1])
 
     def _after_reset(
         self,
@@ -251,6 +309,8 @@ class Carrier:
         if key not in system.resets:
             return Y, Yd
         x, p = self._lifted(segment, one.x_minus, Y, Yd, G)
+        if one.instant.minus(segment.start) <= 0.0:  # what it set stands in p already
+            p[system.layout.discrete_slice] = with_slopes(system.discrete_start, Yd)
         out = [*x, *p[system.layout.discrete_slice]]
         self._reset(Dual(s, shift), x, p, np.array([*segment.z, system.resets[key][0]]), out)
         slopes = values_and_slopes(out, Y.shape[1])[1]
@@ -298,3 +358,26 @@ class Carrier:
         out: list[Any] = [0.0] * system.n
         self._project(float(segment.s[k]), x, p, segment.z, out)
         return values_and_slopes(out, Y.shape[1])[1]
+
+
+def at_start(solution: Solution) -> list[Occurrence]:
+    """What happened at the first instant of a run."""
+    first = solution._segments[0].start
+    found = []
+    for one in solution._trajectory.occurrences:
+        if one.instant.minus(first) > 0.0:
+            break
+        found.append(one)
+    return found
+
+
+def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
+    rates = system.flow(s, x, p, z)
+    if not any(z[c] == system.automata[c].hold for c in system.pins):
+        return rates
+    out: list[Any] = [0.0] * system.n
+    module: Any = system.code.module
+    lifted = with_slopes(x, rates[:, None])
+    differentiated(module.project)(Dual(s, np.ones(1)), lifted, [float(v) for v in p], z, out)
+    return values_and_slopes(out, 1)[1][:, 0]

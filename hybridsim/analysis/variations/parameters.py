@@ -28,7 +28,7 @@ def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
         done.add(name)
         for other in sorted(declared[name].names):
             visit(other)
-        slopes[name] = expression_slope(declared[name], values, slopes)
+        slopes[name] = expression_slope(declared[name], values, slopes, len(chosen))
         if name in chosen:
             slopes[name] = slopes[name] + np.eye(len(chosen))[list(chosen).index(name)]
 
@@ -41,15 +41,15 @@ def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: 
     """d(initial values)/d(chosen parameters), (len(expressions), C)."""
     slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
     values = model.parameter_values()
-    rows = [expression_slope(e, values, slopes) for e in expressions]
+    rows = [expression_slope(e, values, slopes, by_parameter.shape[1]) for e in expressions]
     return np.array(rows).reshape(len(rows), by_parameter.shape[1])
 
 
 def expression_slope(
-    expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray]
+    expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray], width: int
 ) -> np.ndarray:
-    """d(expression of parameters)/d(chosen parameters), by the chain rule."""
-    total = np.zeros(len(next(iter(slopes.values()))) if slopes else 0)
+    """d(expression of parameters)/d(chosen parameters), (width,), by the chain rule."""
+    total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():
             total = total + evaluate(slope(expression, name), values) * slopes[name]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.analysis.variations.carried import Carrier, Directions
+from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.errors import UsageError, nearest
 
@@ -26,7 +26,7 @@ class Sensitivities:
     by_start : (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix.
     by_parameter : (n + d, P), d(state at the end)/d(parameter); starts that are declared over parameters move along,
         and so do parameters that are declared over others.
-    times : (E,) of all events between the segments of the run, transitions and scheduled ones.
+    times : (E,) of the instants inside the run at which modes or states changed; several events may share one.
     times_by_start, times_by_parameter : (E, n + d), (E, P), derivatives of these times.
     """
 
@@ -66,6 +66,8 @@ def sensitivities(
     >>> hs.sensitivities(sol, ["mu"]).by_parameter.shape
     (2, 1)
     """
+    if not hasattr(solution, "_segments"):
+        raise UsageError(f"solution is {solution!r}", remedy="give what hs.simulate returns")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     for name in parameters or ():
@@ -79,15 +81,16 @@ def sensitivities(
     n, d, P = system.n, system.layout.discrete, len(chosen)
     by_parameter = value_slopes(model, chosen)
     starts = start_slopes([s.start for s in model.states], model, by_parameter)
-    first = solution._segments[0].x[0]
+    happened = at_start(solution)
+    first = happened[0].x_minus if happened else solution._segments[0].x[0]
     declared = system.start_state({})
     starts[first != declared] = 0.0
-    at_start = start_slopes([s.start for s in model.discrete], model, by_parameter)
+    discrete_starts = start_slopes([s.start for s in model.discrete], model, by_parameter)
     if not starts_follow:
-        starts[:], at_start[:] = 0.0, 0.0
+        starts[:], discrete_starts[:] = 0.0, 0.0
     directions = Directions(
         np.concatenate([np.eye(n), np.zeros((n, d)), starts], axis=1),
-        np.concatenate([np.zeros((d, n)), np.eye(d), at_start], axis=1),
+        np.concatenate([np.zeros((d, n)), np.eye(d), discrete_starts], axis=1),
         np.concatenate([np.zeros((len(names), n + d)), by_parameter], axis=1),
     )
     carried = Carrier(solution).carry(directions)

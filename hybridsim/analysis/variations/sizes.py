@@ -9,14 +9,20 @@ import numpy as np
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-_SHARES = np.array([0.25, 0.5, 0.75])  # of each step, beside its ends
+_POINTS = 513  # equally spaced, beside the ends of all steps
 
 
 def sizes(solution: Solution) -> np.ndarray:
-    """Largest absolute value (n,) of each state, at the ends of all steps and inside them."""
+    """Largest absolute value (n,) of each state along a run."""
+    low, high = ranges(solution)
+    return np.maximum(np.abs(low), np.abs(high))
+
+
+def ranges(solution: Solution, since: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest value (n,) of each state along a run, or its part after a time."""
+    begin = max(since, solution.t_start)
+    sampled = solution(np.linspace(begin, solution.t_end, _POINTS)).T
     index, s, x = solution._segments.knots()
-    within = (index[1:] == index[:-1]) & (s[1:] != s[:-1])
-    first, lengths = s[:-1][within], np.diff(s)[within]
-    points = (first[:, None] + lengths[:, None] * _SHARES).ravel()
-    inside = solution._segments.states(np.repeat(index[:-1][within], len(_SHARES)), points)
-    return np.abs(np.concatenate([x, inside])).max(axis=0)
+    origins = solution._segments.origins()[index]
+    every = np.concatenate([sampled, x[origins[:, 0] + (s + origins[:, 1]) >= begin]])
+    return every.min(axis=0), every.max(axis=0)

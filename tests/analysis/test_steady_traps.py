@@ -1,0 +1,164 @@
+"""Motions that only look as if they repeated, events that look like one: each was once taken for what it is not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.errors import HybridsimError, UsageError
+
+
+def model(states: str, parameters: str = "", rest: str = "") -> hs.Model:
+    return hs.Model.from_toml(
+        f'schema = 1\nname = "trap"\n[parameters]\n{parameters}\n[states]\n{states}\n{rest}\n'
+    )
+
+
+OSCILLATOR = 'x = {{ start = {x0}, der = "v" }}\nv = {{ start = 0, der = "{der}" }}'
+SHAKEN = """[contacts.f]
+velocity = "v - 0.13*t"
+normal = "9.81"
+law = { name = "coulomb", mu = "mu" }"""
+
+
+def by_differences(changed: object, run: object, value: float, h: float = 1e-5) -> np.ndarray:
+    ends = [run(changed(value + k * h)).y[:, -1] for k in (2, 1, -1, -2)]  # type: ignore[operator]
+    return (8.0 * (ends[1] - ends[2]) - (ends[0] - ends[3])) / (12.0 * h)
+
+
+def test_a_held_state_moves_with_its_base() -> None:
+    """At the breakaway from an accelerating base the rate just before is that of the base, not zero."""
+    declared = model(OSCILLATOR.format(x0=0, der="-k*x - f"), "k = 4\nmu = 0.3", SHAKEN)
+
+    def run(changed: hs.Model) -> hs.Solution:
+        return hs.simulate(changed, (0.0, 4.0), rtol=1e-12)
+
+    found = hs.sensitivities(run(declared), ["mu"]).by_parameter[:, 0]
+    assert found == pytest.approx(by_differences(lambda mu: declared.with_(mu=mu), run, 0.3), rel=1e-7)
+
+
+def test_a_tick_that_ends_a_segment_but_for_the_last_bit() -> None:
+    clock = (
+        '[discrete]\nu = { start = "3*p" }\n[clocks.s]\nperiod = "T"\noffset = 0.15\nset.u = "x/2 + p*u*T"'
+    )
+    declared = model('x = { start = "p", der = "u - x" }', "p = 2\nT = 0.3", clock)
+
+    def run(changed: hs.Model) -> hs.Solution:
+        return hs.simulate(changed, (0.0, 1.0), rtol=1e-12)
+
+    found = hs.sensitivities(run(declared), ["p", "T"])
+    assert found.times == pytest.approx([0.15, 0.45, 0.75])
+    for j, (name, value) in enumerate((("p", 2.0), ("T", 0.3))):
+        expected = by_differences(lambda v, name=name: declared.with_(**{name: v}), run, value)
+        assert found.by_parameter[0, j] == pytest.approx(expected[0], rel=1e-7)
+
+
+def test_what_happens_at_the_start() -> None:
+    """x is tripled at once, then decays: d(end)/d(start) = d(end)/dp = 3/e."""
+    declared = model(
+        'x = { start = "p", der = "-x" }', "p = 2", '[schedules.s]\ntimes = [0]\nreset.x = "3*x"'
+    )
+    found = hs.sensitivities(hs.simulate(declared, (0.0, 1.0)), ["p"])
+    assert found.by_start[0, 0] == pytest.approx(3.0 / math.e, rel=1e-12)
+    assert found.by_parameter[0, 0] == pytest.approx(3.0 / math.e, rel=1e-12)
+
+
+def test_two_events_that_part_have_no_derivative() -> None:
+    rest = """[schedules.s]
+times = ["a"]
+reset.y = "y + 2"
+[monitors.k]
+expr = "x - c/3"
+direction = "up"
+action = "reset"
+reset.x = "x + 1\""""
+    declared = model('x = { start = 0, der = "1" }\ny = { start = 0, der = "x" }', "a = 1\nc = 3", rest)
+    with pytest.raises(UsageError, match="move apart"):
+        hs.sensitivities(hs.simulate(declared, (0.0, 1.5)), ["a"])
+
+
+@pytest.mark.parametrize(
+    ("states", "rest", "said"),
+    [
+        ('x = { start = 0, der = "-x + exp(-0.01*t)*sin(t)" }', "", "depends on t"),
+        ('x = { start = 0, der = "-x + 0.1*t" }', "", "depends on t"),
+        (
+            'x = { start = 0, der = "-x + sin(t)" }',
+            '[schedules.s]\ntimes = [1.0]\nreset.x = "x + 1"',
+            "comes to an end",
+        ),
+    ],
+)
+def test_what_ends_or_grows_is_refused(states: str, rest: str, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        hs.steady_state(model(states, "", rest))
+
+
+def test_a_period_that_is_not_the_forcings_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"0\.0148"):
+        hs.steady_state("dfcs", period=0.01)
+
+
+@pytest.mark.parametrize("w0", [1.0 / 2.0, 1.0 / 3.0])
+def test_one_period_is_not_two_or_three(w0: float) -> None:
+    """The transient turns by a half or a third a period: it looks nearer after two or three."""
+    found = hs.steady_state(
+        model(OSCILLATOR.format(x0=0, der="-2*z*w0*v - w0**2*x + sin(t)"), f"z = 0.002\nw0 = {w0!r}")
+    )
+    assert found.multiple == 1
+    exact = 1.0 / math.hypot(w0 * w0 - 1.0, 2.0 * 0.002 * w0)
+    assert found.amplitude["x"] == pytest.approx(exact, rel=1e-10)
+
+
+def test_a_long_transient_is_no_scale() -> None:
+    found = hs.steady_state(model(OSCILLATOR.format(x0="1e8", der="-0.2*v - x + sin(2*t)")))
+    assert found.amplitude["x"] == pytest.approx(1.0 / math.hypot(3.0, 0.4), rel=1e-10)
+
+
+def test_periods_with_a_common_multiple() -> None:
+    found = hs.steady_state(model('x = { start = 0, der = "-x + sin(2*t) + sin(3*t)" }'))
+    assert found.period == pytest.approx(2.0 * math.pi, rel=1e-14)
+
+
+@pytest.mark.parametrize("der", ["sin(t)", "-x + sin(t)"])
+def test_growth_is_not_chaos(der: str) -> None:
+    found = hs.steady_state(model(OSCILLATOR.format(x0=0, der=der)), max_periods=128)
+    assert found.kind == "not settled"
+
+
+def test_a_slow_drift_is_not_periodic() -> None:
+    declared = model('x = { start = 1e6, der = "1e-7 + v" }\nv = { start = 0, der = "-v + sin(t)" }')
+    assert hs.steady_state(declared, max_periods=128).kind == "not settled"
+
+
+def test_a_clock_needs_no_parameters() -> None:
+    clock = '[discrete]\nu = { start = 0 }\n[clocks.c]\nperiod = 1\nset.u = "-0.5*x"'
+    found = hs.steady_state(model('x = { start = 1, der = "-x + u" }', "", clock))
+    assert found.success
+
+
+def test_a_limit_cycle_is_followed_both_ways() -> None:
+    branch = hs.continuation(
+        model(OSCILLATOR.format(x0=2, der="a*(1 - x**2)*v - x"), "a = 1"), "a", (0.5, 1.5)
+    )
+    assert (branch.parameter.min(), branch.parameter.max()) == (0.5, 1.5)
+    assert branch.special == ()
+    assert (np.diff(branch.parameter) > 0.0).all()
+
+
+def test_rest_between_ticks_is_no_equilibrium() -> None:
+    clock = '[discrete]\nu = { start = 1 }\n[clocks.c]\nperiod = 1\nset.u = "-x"'
+    with pytest.raises(UsageError, match="nothing rests"):
+        hs.equilibria(model('x = { start = 1, der = "u - x" }', "", clock))
+
+
+def test_a_mapping_of_measures_is_a_mapping() -> None:
+    found = hs.steady_state("dfcs")
+    assert "q" not in found.amplitude
+    assert found.amplitude.get("q", 0.0) == 0.0
+    for wrong in ("a", 1.5, -1):
+        with pytest.raises(HybridsimError):
+            found.harmonic("x", wrong)  # type: ignore[arg-type]
