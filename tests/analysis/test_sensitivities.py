@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,7 @@ def differences(model: hs.Model, name: str, run: object) -> np.ndarray:
         rows = [ends(run(model.with_(**{name: value + k * h}))) for k in (2, 1, -1, -2)]  # type: ignore[operator]
         if len({len(row) for row in rows}) == 1:
             found.append((8.0 * (rows[1] - rows[2]) - (rows[0] - rows[3])) / (12.0 * h))
-    gaps = [np.abs(a - b).max() for a, b in zip(found, found[1:], strict=False)]
+    gaps = [np.abs(a - b).max() for a, b in pairwise(found)]
     return found[int(np.argmin(gaps)) + 1]
 
 
