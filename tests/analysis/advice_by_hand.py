@@ -48,7 +48,7 @@ def amplitude(model: hs.Model, name: str, span: float, kept: float) -> float:
 def equivalent_damper(
     first: Callable[[float], float], force: float, m: float, c: float, k: float, w: float
 ) -> float | None:
-    """c_eq of an oscillator (c > 0) under a sine by halving: first(V) is the first harmonic of friction at velocity V cos."""
+    """c_eq of an oscillator (c > 0) under a sine, by halving; first(V): the first harmonic of friction at V cos."""
 
     def velocity(extra: float) -> float:
         return w * force / math.hypot(k - m * w * w, (c + extra) * w)
