@@ -73,7 +73,7 @@ COULOMB = ("mu*N", lambda v: np.full_like(v, 20.0))
         (400.0, 1.0, 0.02, 200, "viscous"),
         (100.0, 0.6, 0.01, 110, "no-stop"),
         (22.0, 0.64, 0.01, 110, "karnopp"),  # F0/N = 0.55: stick matters most
-        (22.0, 0.64, 1e-4, 110, "full model"),
+        pytest.param(22.0, 0.64, 1e-4, 110, "full model", marks=pytest.mark.slow),
     ],
 )
 def test_reference_model(F0: float, r: float, tol: float, periods: int, name: str) -> None:
