@@ -15,9 +15,9 @@ from hybridsim.model.smoothing import smoothed
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
-# Seconds to compile a model's six functions: a fixed part and a part for each operation in them, fitted to the packaged
-# models and to chains of up to 30 contacts (33 s where all cores were busy); good to a factor of three.
-_SECONDS, _SECONDS_PER_OPERATION = 0.3, 0.008
+# Seconds to compile a model's functions: a fixed part and a part for each operation in them, fitted to the packaged
+# models and to chains of up to 20 contacts (1.0 s); good to a factor of three.
+_SECONDS, _SECONDS_PER_OPERATION = 0.06, 0.0009
 
 
 @dataclass(frozen=True)
