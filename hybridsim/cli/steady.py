@@ -105,9 +105,10 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
     for contact, share in record["stick_fraction"].items():
         lines.append(
             f"  {contact:<12} {100.0 * share:.4g} % of the period in stick, "
-            f"{record['stops_per_period'][contact]:g} stops, work {record['dissipated'][contact]:.6g}"
+            f"{record['stops_per_period'][contact]:g} stops a period, work {record['dissipated'][contact]:.6g}"
         )
     sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
+    lines.append(f"  stable       {'yes' if found.stable else 'no'}")
     lines.append(
         f"  multipliers  |{sizes}|" if sizes else "  multipliers  none beside the one along the motion"
     )
