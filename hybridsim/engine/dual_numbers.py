@@ -78,7 +78,7 @@ class Dual:
     def __eq__(self, other: object) -> bool:
         return bool(self.value == _parts(other)[0])
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]  # as Python has it: == without a hash
 
 
 def _parts(other: Any) -> tuple[float, Any]:

@@ -118,7 +118,7 @@ class Translator(ast.NodeVisitor):
 
     def _element(self, node: ast.Subscript) -> Any:
         index = self.visit(node.slice)
-        return self.builder.gep(self.arrays[node.value.id], [index])  # type: ignore[attr-defined]
+        return self.builder.gep(self.arrays[node.value.id], [index])  # type: ignore[attr-defined]  # a name
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
         """An element of a state, parameter or mode array."""
@@ -207,7 +207,7 @@ class Translator(ast.NodeVisitor):
 
     def visit_Call(self, node: ast.Call) -> Any:
         """A function of mathematics."""
-        name = node.func.id  # type: ignore[attr-defined]
+        name = node.func.id  # type: ignore[attr-defined]  # a name
         values = [self.number(argument) for argument in node.args]
         if name in ("min", "max"):  # as Python has it: the first of equals, and of a NaN
             a, b = values

@@ -71,7 +71,7 @@ class SteadyState(Measures):
         return self.kind
 
     @cached_property
-    def solution(self) -> Solution:  # type: ignore[override]
+    def solution(self) -> Solution:  # type: ignore[override]  # made when asked for
         """One period from the section on; of a motion without one a stretch of it."""
         if self._closed is None:
             raise UsageError(f"there is no stretch of this motion: {self.message}")
