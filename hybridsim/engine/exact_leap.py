@@ -16,6 +16,7 @@ from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
+    errors_of_time,
     first_zero,
     first_zero_of_wave,
     functions_of_time,
@@ -175,7 +176,7 @@ def exact_leap(
             return FULL, n_segments
         if not is_known:
             set_origin(place, rates, clock[0], clock[1], p)
-            functions_of_time(lin, 0.0, 0.0, p, work.factors, work.w, work.w_error)
+            functions_of_time(lin, 0.0, p, work.factors, work.w)
         to_modal(lin, k, x, work.w, c)
         fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, hints, room.starts, terms, v)
         if fired == _OPEN:
@@ -184,10 +185,7 @@ def exact_leap(
             return STOPPED, n_segments
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
-        for i in range(n):
-            scale[i] = 0.0
-        state_sizes(lin, k, c, scale)
-        state_sizes(lin, k, v, scale)
+        state_sizes(lin, k, c, v, scale)
         if holding(automata, z):
             call(functions.project, s, y, p, z, y1)
             put(y1, y)
@@ -215,11 +213,11 @@ def exact_leap(
         clock[0], clock[1] = moved_on(high, low, s)
         set_origin(place, rates, clock[0], clock[1], p)
         s_error = 2.0 * 2.0**-52 * s
-        functions_of_time(lin, 0.0, s_error, p, work.factors, work.w, work.w_error)
+        functions_of_time(lin, 0.0, p, work.factors, work.w)
         value, slope = _value_and_slope(lin, k, fired, y, work.w)
         if abs(value) > s_error * abs(slope) and slope != 0.0 and math.isfinite(value / slope):
             s_error = abs(value / slope)
-            functions_of_time(lin, 0.0, s_error, p, work.factors, work.w, work.w_error)
+        errors_of_time(lin, 0.0, s_error, p, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
         event = Before(0.0, s_error, y, y_error, p, z)
@@ -240,9 +238,9 @@ def _value_and_slope(lin: Any, k: int, g: int, x: Any, w: Any) -> tuple[float, f
     """A guard and its rate at y = (x, w)."""
     n, value, slope = x.shape[0], 0.0, 0.0
     for m in range(n):
-        value += lin.series[k, g, m, 0] * x[m]
-        slope += lin.series[k, g, m, 1] * x[m]
+        value += lin.series[k, g, 0, m] * x[m]
+        slope += lin.series[k, g, 1, m] * x[m]
     for m in range(w.shape[0]):
-        value += lin.series[k, g, n + m, 0] * w[m]
-        slope += lin.series[k, g, n + m, 1] * w[m]
+        value += lin.series[k, g, 0, n + m] * w[m]
+        slope += lin.series[k, g, 1, n + m] * w[m]
     return value, slope

@@ -20,26 +20,26 @@ _ROUNDINGS = (
 def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
     """Of rows (K, G, m), functions of y with y' = A y: Taylor coefficients, and what rounding makes of each entry.
 
-    rows are used up; A (K, m, m); series, roundings (K, G, m, ORDER + 1).
+    rows are used up; A (K, m, m); series, roundings (K, G, ORDER + 1, m).
     """
     modes, guards, size = rows.shape
     for k in range(modes):
         for g in range(guards):
             row = rows[k, g]
             for m in range(size):
-                series[k, g, m, 0] = row[m]
-                roundings[k, g, m, 0] = abs(row[m])
+                series[k, g, 0, m] = row[m]
+                roundings[k, g, 0, m] = abs(row[m])
             for order in range(ORDER):
                 for m in range(size):
                     total = bound = 0.0
                     for i in range(size):
-                        total += series[k, g, i, order] * A[k, i, m]
-                        bound += roundings[k, g, i, order] * abs(A[k, i, m])
-                    series[k, g, m, order + 1] = total / (order + 1)
-                    roundings[k, g, m, order + 1] = bound / (order + 1)
+                        total += series[k, g, order, i] * A[k, i, m]
+                        bound += roundings[k, g, order, i] * abs(A[k, i, m])
+                    series[k, g, order + 1, m] = total / (order + 1)
+                    roundings[k, g, order + 1, m] = bound / (order + 1)
             for m in range(size):
                 for order in range(ORDER + 1):
-                    roundings[k, g, m, order] *= (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
+                    roundings[k, g, order, m] *= (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
-from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.jit import allocating_kernel, inlined, kernel, polynomial_kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_guards import FARTHEST, TERMS
@@ -37,9 +37,36 @@ def size_of(z: complex) -> float:
 
 
 @inlined
-def functions_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, w: Any, w_error: Any) -> None:
-    """Monomials at local time s with bounds of their errors. factors: room for (2 A, 2) values and relative errors."""
+def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
+    """Monomials at local time s. factors: room for (2 A, 2) values of atoms, and what bounds their errors."""
     for a in range(lin.kinds.shape[0]):
+        angle = lin.offsets[a]
+        for i in range(lin.term_start[a], lin.term_start[a + 1]):
+            angle += lin.weights[i] * p[lin.sources[i]]
+        if lin.kinds[a] == TIME:
+            factors[2 * a, 0] = s
+            continue
+        angle += lin.rates[a] * s
+        if lin.kinds[a] == ANGLE:
+            factors[2 * a, 0], factors[2 * a + 1, 0] = math.sin(angle), math.cos(angle)
+        elif lin.kinds[a] == GROWTH:
+            factors[2 * a, 0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises beyond
+        else:
+            factors[2 * a, 0] = angle
+    for m in range(w.shape[0]):
+        value = 1.0
+        for i in range(lin.factor_start[m], lin.factor_start[m + 1]):
+            value *= factors[lin.factors[i], 0]
+        w[m] = value
+
+
+@inlined
+def errors_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, w_error: Any) -> None:
+    """Bounds of the errors of `functions_of_time`, whose values `factors` holds, at a local time good to s_error."""
+    for a in range(lin.kinds.shape[0]):
+        if lin.kinds[a] == TIME:
+            factors[2 * a, 1] = s_error
+            continue
         angle, error = lin.offsets[a], UNIT * abs(lin.offsets[a])
         for i in range(lin.term_start[a], lin.term_start[a + 1]):
             source = lin.sources[i]
@@ -49,24 +76,20 @@ def functions_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, 
             error += (2.0 * UNIT if is_phase else 0.0) * abs(term)
             if lin.weights[i] != 1.0 or i > lin.term_start[a]:
                 error += 2.0 * UNIT * abs(term)
-        if lin.kinds[a] == TIME:
-            factors[2 * a, 0], factors[2 * a, 1] = s, s_error
-            continue
         if lin.rates[a] != 0.0:
             turned = lin.rates[a] * s
             angle += turned
             error += abs(lin.rates[a]) * s_error + UNIT * (abs(turned) + abs(angle))
+        value = factors[2 * a, 0]
         if lin.kinds[a] == ANGLE:
-            sine, cosine = math.sin(angle), math.cos(angle)
-            factors[2 * a, 0], factors[2 * a + 1, 0] = sine, cosine
-            factors[2 * a, 1] = abs(cosine) * error + 0.5 * error * error + 2.0 * UNIT * abs(sine)
-            factors[2 * a + 1, 1] = abs(sine) * error + 0.5 * error * error + 2.0 * UNIT * abs(cosine)
+            other = factors[2 * a + 1, 0]
+            factors[2 * a, 1] = abs(other) * error + 0.5 * error * error + 2.0 * UNIT * abs(value)
+            factors[2 * a + 1, 1] = abs(value) * error + 0.5 * error * error + 2.0 * UNIT * abs(other)
         elif lin.kinds[a] == GROWTH:
-            value = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises where it overflows
-            factors[2 * a, 0], factors[2 * a, 1] = value, value * (error + 2.0 * UNIT)
+            factors[2 * a, 1] = value * (error + 2.0 * UNIT)
         else:
-            factors[2 * a, 0], factors[2 * a, 1] = angle, error
-    for m in range(w.shape[0]):
+            factors[2 * a, 1] = error
+    for m in range(w_error.shape[0]):
         value, error = 1.0, 0.0
         for i in range(lin.factor_start[m], lin.factor_start[m + 1]):
             v, e = factors[lin.factors[i], 0], factors[lin.factors[i], 1]
@@ -74,30 +97,41 @@ def functions_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, 
             value *= v
             if i > lin.factor_start[m]:
                 error += UNIT * abs(value)
-        w[m], w_error[m] = value, error
+        w_error[m] = error
 
 
 @inlined
-def linear_series(
-    lin: Any, tapes: Any, k: int, x: Any, x_error: Any, w: Any, w_error: Any, values: Any, bounds: Any
-) -> None:
-    """Taylor coefficients of the active guards of the modes in row k at y = (x, w), with bounds."""
-    n, count = x.shape[0], w.shape[0]
-    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        g = tapes.active[i]
-        rows, roundings = lin.series[k, g], lin.roundings[k, g]
-        # written out, for the sums to stay in registers: there are ORDER + 1 = 4 coefficients
-        v0 = v1 = v2 = v3 = e0 = e1 = e2 = e3 = 0.0
-        for m in range(n + count):
-            y, error = (x[m], x_error[m]) if m < n else (w[m - n], w_error[m - n])
-            size = abs(y) + error
-            r0, r1, r2, r3 = rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3]
-            v0, e0 = v0 + r0 * y, e0 + (abs(r0) * error + roundings[m, 0] * size)
-            v1, e1 = v1 + r1 * y, e1 + (abs(r1) * error + roundings[m, 1] * size)
-            v2, e2 = v2 + r2 * y, e2 + (abs(r2) * error + roundings[m, 2] * size)
-            v3, e3 = v3 + r3 * y, e3 + (abs(r3) * error + roundings[m, 3] * size)
-        values[g, 0], values[g, 1], values[g, 2], values[g, 3] = v0, v1, v2, v3
-        bounds[g, 0], bounds[g, 1], bounds[g, 2], bounds[g, 3] = e0, e1, e2, e3
+def linear_coefficient(
+    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, w: Any, w_error: Any
+) -> tuple[float, float]:
+    """A Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
+    n = x.shape[0]
+    value = bound = 0.0
+    for m in range(n):
+        row, size = lin.series[k, g, order, m], abs(x[m]) + x_error[m]
+        value += row * x[m]
+        bound += abs(row) * x_error[m] + lin.roundings[k, g, order, m] * size
+    for m in range(w.shape[0]):
+        row, size = lin.series[k, g, order, n + m], abs(w[m]) + w_error[m]
+        value += row * w[m]
+        bound += abs(row) * w_error[m] + lin.roundings[k, g, order, n + m] * size
+    return value, bound
+
+
+@inlined
+def linear_side(
+    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, w: Any, w_error: Any
+) -> tuple[int, int, bool]:
+    """As `hybridsim.engine.decide.side_after`, coefficient by coefficient; and whether it is a question of rounding."""
+    is_open = False
+    for order in range(decreed, ORDER + 1):
+        value, bound = linear_coefficient(lin, k, g, order, x, x_error, w, w_error)
+        if value > bound:
+            return 1, order, False
+        if value < -bound:
+            return -1, order, False
+        is_open = is_open or value != 0.0 or bound != 0.0
+    return 0, ORDER + 1, is_open
 
 
 @inlined
@@ -124,7 +158,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
             if value == 0.0:
                 out[j] = c[j]
             else:
-                size = math.exp(min(value.real * d, 709.0))
+                size = math.exp(min(value.real * d, 709.0)) if value.real != 0.0 else 1.0
                 angle = value.imag * d
                 out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
         else:
@@ -194,13 +228,16 @@ def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
 
 
 @inlined
-def state_sizes(lin: Any, k: int, c: Any, scale: Any) -> None:
-    """What the states are summed from, in size: at least so large is a rounding error relative to a unit roundoff."""
+def state_sizes(lin: Any, k: int, before: Any, after: Any, scale: Any) -> None:
+    """What the states are summed from, in size: at least so large is a rounding error relative to a unit roundoff.
+
+    before, after: modal coordinates at both ends of a segment.
+    """
     for i in range(scale.shape[0]):
         total = 0.0
         for j in range(lin.counts[k]):
-            total += size_of(lin.basis[k, i, j]) * size_of(c[j])
-        scale[i] = max(scale[i], total)
+            total += size_of(lin.basis[k, i, j]) * max(size_of(before[j]), size_of(after[j]))
+        scale[i] = total
 
 
 @inlined

@@ -27,7 +27,7 @@ class LinearTables(NamedTuple):
 
     kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factor_start (M + 1,), factors: the
     monomials, 2*atom + part. phases (2,): the sources in p that are angles known to rounding only.
-    series (K, G, n + M, 4): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
+    series (K, G, 4, n + M): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
     y of size 1. counts (K,), values (K, J), upper (K, J, J), ends (K, J): the flow in modal coordinates; basis (K, n,
     J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
     in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
@@ -83,7 +83,7 @@ def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float
     n = system.n
     flows = modals(A, horizon, TERMS)
     widest = flows.values.shape[1]
-    series, roundings = (np.empty((count, guards, size, ORDER + 1)) for _ in range(2))
+    series, roundings = (np.empty((count, guards, ORDER + 1, size)) for _ in range(2))
     guard_series(A, rows, series, roundings)
     terms = np.zeros((count, guards, widest, 2, TERMS))
     sizes, rests = np.zeros((count, guards, widest)), np.zeros((count, guards, widest))

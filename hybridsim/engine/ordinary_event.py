@@ -17,18 +17,25 @@ from hybridsim.engine.decide import (
     LEAVES,
     NONE,
     NONUNIQUE,
+    UNDECIDED,
     choose,
     decreed_zeros,
+    open_question,
     preference,
     side_after,
-    verdict_with,
 )
 from hybridsim.engine.jets import ORDER, UNIT, run_series
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.engine.linear_kernels import functions_of_time, linear_series
+from hybridsim.engine.linear_kernels import (
+    errors_of_time,
+    functions_of_time,
+    linear_coefficient,
+    linear_side,
+)
 from hybridsim.engine.packs import packed
 
 SETTLED, NOT_ORDINARY = 0, 1
+UNKNOWN = -2  # in place of a verdict
 _MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
 
 
@@ -109,16 +116,13 @@ def find_modes(modes: Any, z: Any) -> int:
 
 @inlined
 def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
-    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k.
+    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k, by the tape.
 
-    Linear modes have them as rows over states and functions of time, which the work space holds at this time; other
-    modes by the tape.
+    Linear modes have them as rows over states and functions of time, and are asked for those that decide: `sides_of`.
     """
-    values, bounds = work.values, work.bounds
-    if lin.kinds.shape[0] > 0:
-        linear_series(lin, tapes, k, x, x_error, work.w, work.w_error, values, bounds)
+    if is_linear(lin):
         return
-    V, E = work.V, work.E
+    values, bounds, V, E = work.values, work.bounds, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
     run_series(constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, V, E)
@@ -127,6 +131,35 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
         r = tapes.guards[k, g]
         for j in range(values.shape[1]):
             values[g, j], bounds[g, j] = V[r, j], E[r, j]
+
+
+@inlined
+def is_linear(lin: Any) -> bool:
+    """Whether there are tables of linear modes."""
+    return lin.kinds.shape[0] > 0
+
+
+@inlined
+def guard_side(
+    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
+) -> tuple[int, int, bool]:
+    """Sign of a guard just after, the order that decides it, and whether that is a question of rounding.
+
+    k: the row of the modes whose `guard_series` were asked for last.
+    """
+    if is_linear(lin):
+        return linear_side(lin, k, g, decreed, x, x_error, work.w, work.w_error)
+    values, bounds = work.values[g], work.bounds[g]
+    side, order = side_after(values, bounds, decreed)
+    return side, order, side == 0 and open_question(values, bounds, decreed)
+
+
+@inlined
+def size_at(lin: Any, k: int, g: int, x: Any, x_error: Any, work: Any) -> tuple[float, float]:
+    """The value of a guard and its bound."""
+    if is_linear(lin):
+        return linear_coefficient(lin, k, g, 0, x, x_error, work.w, work.w_error)
+    return work.values[g, 0], work.bounds[g, 0]
 
 
 @inlined
@@ -162,7 +195,11 @@ def is_continuous(
 @inlined
 def judge_members(
     automata: Any,
+    lin: Any,
+    k: int,
     at: Any,
+    x: Any,
+    x_error: Any,
     z: Any,
     members: Any,
     fired: int,
@@ -173,13 +210,13 @@ def judge_members(
     orders: Any,
     floors: Any,
 ) -> int:
-    """Verdict on the guards of some components in the candidate z; sides, orders and bounds of all guards' values.
+    """Verdict on the guards of some components in the candidate z, which row k is of.
 
-    is_on: the located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns
-    stay as they were.
+    sides, orders, floors: of all guards, with bounds of their values; of use unless the verdict is LEAVES. is_on: the
+    located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns stay as they
+    were.
     """
-    values, bounds, on_surface = work.values, work.bounds, work.on_surface
-    guards_of, hold = automata.guards_of, automata.hold
+    on_surface, guards_of, hold = work.on_surface, automata.guards_of, automata.hold
     verdict = FINE
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0
@@ -193,22 +230,26 @@ def judge_members(
                 continue
             is_fired = is_on and g == fired and (z[c] == at.z[c] or automata.is_corner[c])
             zeros = decreed_zeros(j == 0, on_surface[c], is_holding, is_smooth, is_fired)
-            side, order = side_after(values[g], bounds[g], zeros)
+            side, order, is_open = guard_side(lin, k, g, zeros, x, x_error, work)
+            if side < 0:
+                return LEAVES
             sides[g], orders[g] = side, order if order <= ORDER else 0
-            floors[g] = bounds[g, 0] if order > 0 else 0.0
-            verdict = verdict_with(verdict, values[g], bounds[g], zeros, side)
+            if order > 0:
+                floors[g] = size_at(lin, k, g, x, x_error, work)[1]
+            if is_open:
+                verdict = UNDECIDED
     return verdict
 
 
 @inlined
-def is_alone(tapes: Any, k: int, fired: int, work: Any) -> bool:
+def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, work: Any) -> bool:
     """Whether no other guard is zero within its bound and leaves together with the one that fired."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if g == fired:
             continue
-        is_zero = not abs(work.values[g, 0]) > work.bounds[g, 0]
-        if is_zero and side_after(work.values[g], work.bounds[g], 1)[0] < 0:
+        value, bound = size_at(lin, k, g, x, x_error, work)
+        if not abs(value) > bound and guard_side(lin, k, g, 1, x, x_error, work)[0] < 0:
             return False
     return True
 
@@ -247,7 +288,7 @@ def settle_ordinary(
     is_known = tapes.active_start[k + 1] - tapes.active_start[k] > 1
     if is_known:
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-        if not is_alone(tapes, k, fired, work):
+        if not is_alone(tapes, lin, k, fired, x, x_error, work):
             return NOT_ORDINARY, False
     c = automata.owner[fired]
     if automata.hold[c] >= 0:
@@ -269,8 +310,9 @@ def settle_ordinary(
         put(at.p, p)
         if not take_choice(functions, automata, at, fired, discrete, x, x_error, z, p, work):
             return NOT_ORDINARY, False
-        if lin.kinds.shape[0] > 0:
-            functions_of_time(lin, at.s, at.s_error, p, work.factors, work.w, work.w_error)
+        if is_linear(lin):
+            functions_of_time(lin, at.s, p, work.factors, work.w)
+            errors_of_time(lin, at.s, at.s_error, p, work.factors, work.w_error)
         continuous, is_on, vector = False, automata.is_corner[c], p
     k = find_modes(tapes.modes, z)
     if k < 0:
@@ -278,9 +320,97 @@ def settle_ordinary(
     after = Before(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
     verdict = judge_members(
-        automata, at, z, work.everything, fired, is_on, continuous, work, sides, orders, floors
-    )
+        automata, lin, k, at, x, x_error, z, work.everything, fired, is_on, continuous, work, sides, orders, floors
+    )  # fmt: skip
     return (SETTLED, continuous) if verdict == FINE else (NOT_ORDINARY, False)
+
+
+@kernel
+def judge_candidate(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    at: Any,
+    fired: int,
+    is_known: bool,
+    x: Any,
+    x_error: Any,
+    cluster: Any,
+    number: int,
+    work: Any,
+) -> int:
+    """Verdict on the modes in `work.trial`, with what goes with it in the work space's rows of that number.
+
+    UNKNOWN where these modes are not on the shelf. is_known: their guards' series are there.
+    """
+    k = find_modes(tapes.modes, work.trial)
+    if k < 0:
+        return UNKNOWN
+    if not is_known:
+        guard_series(tapes, inputs, lin, k, at, x, x_error, work)
+    continuous = is_continuous(functions, automata, at, x, work.trial, cluster, fired, work.jumps)
+    work.smooth[number] = continuous
+    return judge_members(
+        automata, lin, k, at, x, x_error, work.trial, cluster, fired, True, continuous, work,
+        work.all_sides[number], work.all_orders[number], work.all_floors[number],
+    )  # fmt: skip
+
+
+@inlined
+def decide_single(
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    at: Any,
+    fired: int,
+    is_known: bool,
+    x: Any,
+    x_error: Any,
+    z: Any,
+    cluster: Any,
+    c: int,
+    work: Any,
+) -> int:
+    """As `decide_surface`, for one component at its surface: what `choose` makes of its three modes, one by one."""
+    now, hold, trial = z[c], automata.hold[c], work.trial
+    trial[c] = now
+    verdict = judge_candidate(
+        functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, cluster, now, work
+    )
+    if verdict != LEAVES:
+        return now if verdict == FINE else -1
+    if now != hold:
+        for mode in (hold, 3 - hold - now):
+            trial[c] = mode
+            verdict = judge_candidate(
+                functions, automata, tapes, inputs, lin, at, fired, False, x, x_error, cluster, mode, work
+            )
+            if verdict == FINE:
+                z[c] = mode
+                return mode
+            if verdict != LEAVES:
+                return -1
+        return -1
+    found = -1
+    for mode in range(3):
+        if mode == hold:
+            continue
+        trial[c] = mode
+        verdict = judge_candidate(
+            functions, automata, tapes, inputs, lin, at, fired, False, x, x_error, cluster, mode, work
+        )
+        if verdict == LEAVES:
+            continue
+        if verdict != FINE or found >= 0:
+            return -1
+        found = mode
+    if found >= 0:
+        z[c] = found
+    return found
 
 
 @kernel
@@ -325,6 +455,10 @@ def decide_surface(
         x_error[pin[members[i]]] = UNIT * abs(x[pin[members[i]]])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
+    if count == 1:
+        return decide_single(
+            functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, z, cluster, members[0], work
+        )  # fmt: skip
     total = 3**count  # a surface has three modes
     for number in range(total):
         rest = number
@@ -342,18 +476,14 @@ def decide_surface(
                 continue
             for i in range(count):
                 trial[members[i]] = candidates[number, i]
-            k = find_modes(tapes.modes, trial)
-            if k < 0:
-                return -1
             is_current = rank >= (count + 1) * count
-            if not (is_current and is_known):
-                guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-            continuous = is_continuous(functions, automata, at, x, trial, cluster, fired, work.jumps)
-            sides, orders, floors = work.all_sides[number], work.all_orders[number], work.all_floors[number]
-            verdict = judge_members(
-                automata, at, trial, cluster, fired, True, continuous, work, sides, orders, floors
-            )
-            verdicts[number], work.smooth[number] = verdict, continuous
+            verdict = judge_candidate(
+                functions, automata, tapes, inputs, lin, at, fired, is_current and is_known, x, x_error, cluster,
+                number, work,
+            )  # fmt: skip
+            if verdict == UNKNOWN:
+                return -1
+            verdicts[number] = verdict
             is_found = is_found or verdict == FINE or (is_current and verdict != LEAVES)
     number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
     if number in (NONE, NONUNIQUE) or verdicts[number] != FINE:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from hybridsim.engine.jit import inlined, kernel
 
 _SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
@@ -88,7 +90,7 @@ def phase_of(high: float, low: float, rate: float, offset: float) -> float:
     angle, rest = two_sum(total, error + rest)
     if not math.isfinite(angle):
         return math.nan
-    turns = float(round(angle / _TWO_PI[0]))
+    turns = np.rint(angle / _TWO_PI[0])
     a, a_error = two_product(turns, _TWO_PI[0])
     b, b_error = two_product(turns, _TWO_PI[1])
     left, error = two_sum(angle, -a)
