@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,66 +17,79 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
-from hybridsim.integrators.rk4_kernels import (
-    BOUND,
-    FULL,
-    MONITOR,
-    NOT_FINITE,
-    SIGN,
-    rk4_step,
-    run_steps,
-    workspace,
-)
+from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE
 
 _ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
 
 
-@dataclass(frozen=True)
-class FixedStep:
-    """What both methods hand to the kernel."""
+class March(Protocol):
+    """The kernels of one method for one run.
+
+    step, halvings: length of a step, and how often it is halved to find what a guard or monitor does in it. pinned:
+    whether held states are evaluated from their constraints. has_sides_only: whether there is no third mode, and the
+    holding one marks an exact zero. counts: evaluations of rates and of guards.
+    """
 
     step: float
-    rule: int
-    every_stage: bool
-    dichotomy: bool
-    zeroed: bool
-    located: bool
-    rest_of_step: bool
-    eps: float
     halvings: int
+    pinned: bool
+    has_sides_only: bool
+    counts: np.ndarray
+
+    def run(
+        self,
+        watched: np.ndarray,
+        bound: float,
+        p: np.ndarray,
+        start: tuple[np.ndarray, np.ndarray],
+        fresh: np.ndarray,
+        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
+    ) -> tuple[int, int]:
+        """Steps from local time 0 in start = (x, z) up to the bound, or to what needs the caller.
+
+        watched: guards of components without a surface. fresh: monitors that have just fired. Row k of rows = (times,
+        states, modes) holds the start of step k and the modes it was taken in; the last row is the end. Returns (number
+        of rows, why it ended).
+        """
+        ...
+
+    def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """The state after one step of length tau."""
+        ...
+
+    def warnings(self) -> list[str]:
+        """What a user should know of the run."""
+        ...
+
+
+def surface_table(system: System) -> np.ndarray:
+    """A row for each component with a surface: its number, above, below, hold, upper and lower guard of the latter."""
+    return np.array(
+        [
+            (c, a.above, a.below, a.hold, *(a.guards[a.hold][:2]))
+            for c, a in enumerate(system.automata)
+            if a.has_surface
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 6)
 
 
 class FixedStepRun:
-    """One run with fixed steps: surface components by the zone rule in the kernel, everything else settled here."""
+    """One run with fixed steps: surface components by the rule of the kernel, everything else settled here."""
 
     def __init__(
-        self, system: System, task: Task, settings: FixedStep, progress: Callable[[float], None] | None
+        self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
     ) -> None:
-        self.system, self.task, self.settings, self.progress = system, task, settings, progress
+        self.system, self.task, self.march, self.progress = system, task, march, progress
         self.record = Trajectory(system, task.keep)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
-        self.table = np.array(
-            [
-                (c, a.above, a.below, a.hold, *(a.guards[a.hold][:2]))
-                for c, a in enumerate(system.automata)
-                if a.has_surface
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 6)
-        names = ("flow", "surfaces", "guards", "monitors", "project")
-        self.addresses = tuple(system.address(n) for n in names)
-        self.counts = np.zeros(3, dtype=np.int64)
-        located = settings.step * 2.0**-settings.halvings  # how well an event is located
+        self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
         self.accumulation = Accumulation(located, 4.0 * located)
         self.lately = self.x[None, :]  # states of the last stretch, the size of which rounding is relative to
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
-        self.law = (settings.rule, settings.every_stage, settings.eps)
-        self.work = workspace(
-            system.n, len(self.z), len(self.table), system.guard_count, len(system.monitor_names)
-        )
 
     def run(self) -> Trajectory:
         """Step to the end; what was computed is kept in any case."""
@@ -87,10 +100,10 @@ class FixedStepRun:
         except KeyboardInterrupt:
             record.status = "interrupted"
             record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
-        record.counters.rhs_evaluations, record.counters.guard_evaluations = (
-            int(self.counts[0]),
-            int(self.counts[1]),
-        )
+        counts = self.march.counts
+        record.counters.rhs_evaluations, record.counters.guard_evaluations = int(counts[0]), int(counts[1])
+        for warning in self.march.warnings():
+            record.warn(warning)
         return record
 
     def _run(self) -> None:
@@ -107,38 +120,21 @@ class FixedStepRun:
 
     def _vector(self) -> np.ndarray:
         p = self.system.vector(self.origin, self.discrete)
-        p[self.system.layout.pin_at] = 1.0 if self.settings.zeroed else 0.0
+        p[self.system.layout.pin_at] = 1.0 if self.march.pinned else 0.0
         return p
 
     def _stretch(self, appointment: Appointment | None, target: Instant) -> bool:
         """One call of the kernel and what ends it; True where the run stops."""
-        system, set_ = self.system, self.settings
+        system = self.system
         p, bound = self._vector(), target.minus(self.origin)
         times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
         modes = np.empty((_ROWS, len(self.z)), dtype=np.int64)
         numbers = (
             system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
         )
-        flags = (set_.dichotomy, set_.zeroed, set_.located, set_.rest_of_step)
         start_z = self.z.copy()
-        count, why = run_steps(
-            self.addresses,
-            (set_.step, set_.halvings),
-            self.law,
-            flags,
-            self.table,
-            numbers,
-            bound,
-            p,
-            self.x,
-            self.z,
-            self.fresh,
-            times,
-            states,
-            modes,
-            self.work,
-            self.counts,
-        )
+        rows = (times, states, modes)
+        count, why = self.march.run(numbers, bound, p, (self.x, self.z), self.fresh, rows)
         self.fresh[:] = False
         if count < _ROWS:  # a short stretch does not hold on to room for a long one
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
@@ -168,11 +164,11 @@ class FixedStepRun:
 
     def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
         """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
-        set_, x, z = self.settings, self.x, self.z
+        x, z = self.x, self.z
         watched = self._watched()
         before = self._monitors(s, x, p)
-        low, high, best = 0.0, set_.step, x
-        for _ in range(set_.halvings):
+        low, high, best = 0.0, self.march.step, x
+        for _ in range(self.march.halvings):
             tau = 0.5 * (low + high)
             trial = self._trial(s, tau, p)
             if why == MONITOR:
@@ -210,10 +206,7 @@ class FixedStepRun:
         return self.system.rows("guards", self.system.guard_count, np.array([s]), x[None, :], p, self.z)[0]
 
     def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
-        out = np.empty(self.system.n)
-        rk4_step(self.addresses, self.law, self.table, s, tau, self.x, p, self.z, out, self.work)
-        self.counts[0] += 4
-        return out
+        return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
         return self.system.rows(
@@ -254,7 +247,7 @@ class FixedStepRun:
         before = np.where(starting, self.task.z0, self.z)
         sides = np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
-        s_error = self.settings.step * 2.0**-self.settings.halvings if fired or monitors else 0.0
+        s_error = self.located if fired or monitors else 0.0
         scale = np.abs(self.lately).max(axis=0)
         x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), scale) + s_error * np.abs(
             system.flow(0.0, self.x, p, self.z)
@@ -315,7 +308,7 @@ class FixedStepRun:
         """The rows of one stretch as segments of constant modes, and the mode changes between them."""
         record = self.record
         record.counters.steps += len(s) - 1
-        if self.settings.rule == SIGN:
+        if self.march.has_sides_only:
             self._side_of_zeros(z)
         sources = np.concatenate([(before if len(record.segments) else z[0])[None], z[:-1]])
         rows, components = np.nonzero(sources != z)
@@ -327,7 +320,7 @@ class FixedStepRun:
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
         """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
-        for c, _, _, hold, *_ in self.table:
+        for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]
             if z[-1, c] == hold and len(z) > 1:

@@ -7,13 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from hybridsim.engine.period import system_period
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 from hybridsim.errors import UsageError
 from hybridsim.integrators.base import Integrator
-from hybridsim.integrators.fixed_step_run import FixedStep, FixedStepRun
+from hybridsim.integrators.fixed_step_length import fixed_step_length, refuse_longer
+from hybridsim.integrators.fixed_step_run import FixedStepRun
 from hybridsim.integrators.rk4_kernels import SIGN, ZONE
+from hybridsim.integrators.rk4_march import FixedStep, Rk4March
 
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"
 _FIXED = {
@@ -23,34 +24,6 @@ _FIXED = {
     "backward": "the zone rule of the force has no past",
     "functions": "it is a method for contacts, which are declared by expressions",
 }
-
-
-def _step(
-    system: System, step: float | None, period: float | None, steps_per_period: float, name: str
-) -> float:
-    """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
-    for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"{name}: {label} is {value!r}", remedy="give a positive number")
-    if step is not None:
-        return step
-    if period is None:
-        period = system_period(system)
-    if period is None:
-        raise UsageError(
-            f"{name} steps by a share of the forcing's period, and model {system.model.name} has no single one",
-            remedy="give step=... or period=...",
-        )
-    return period / steps_per_period
-
-
-def _refuse_longer(step: float, max_step: float, name: str) -> None:
-    """A fixed step is not shortened behind the user's back."""
-    if step > max_step:
-        raise UsageError(
-            f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
-            remedy="set step or steps_per_period",
-        )
 
 
 @dataclass(frozen=True)
@@ -111,8 +84,8 @@ class Rk4Dichotomy(Integrator):
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""
-        step = _step(system, self.step, self.period, self.steps_per_period, self.name)
-        _refuse_longer(step, task.tolerances.max_step, self.name)
+        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
+        refuse_longer(step, task.tolerances.max_step, self.name)
         settings = FixedStep(
             step,
             ZONE,
@@ -124,7 +97,7 @@ class Rk4Dichotomy(Integrator):
             self.eps_v,
             self.max_bisections,
         )
-        return FixedStepRun(system, task, settings, progress).run()
+        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
 
 
 @dataclass(frozen=True)
@@ -162,10 +135,10 @@ class Rk4Sign(Integrator):
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""
-        step = _step(system, self.step, self.period, self.steps_per_period, self.name)
-        _refuse_longer(step, task.tolerances.max_step, self.name)
+        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
+        refuse_longer(step, task.tolerances.max_step, self.name)
         settings = FixedStep(step, SIGN, self.friction == "stage", False, False, False, False, 0.0, 16)
-        return FixedStepRun(system, task, settings, progress).run()
+        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
 
 
 def _one_of(integrator: str, option: str, value: str, known: tuple[str, ...]) -> None:

@@ -29,6 +29,7 @@ _OURS = (
     "sundials:CvodeBDF",
     "published:Rk4Dichotomy",
     "published:Rk4Sign",
+    "moreau:Moreau",
 )
 
 

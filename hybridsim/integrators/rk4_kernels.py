@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, passed
 
-# why a stretch of steps ended
-BOUND, FULL, GUARD, MONITOR, NOT_FINITE = 0, 1, 2, 3, 4
 # rules that choose the modes of surface components
 ZONE, SIGN = 0, 1
 
@@ -145,15 +144,6 @@ def workspace(n: int, components: int, surfaces: int, guards: int, monitors: int
 
 
 @inlined
-def _leaves(values: Any, numbers: Any) -> bool:
-    """Whether one of the watched guards is negative."""
-    for i in range(numbers.shape[0]):
-        if numbers[i] >= 0 and values[numbers[i]] < 0.0:
-            return True
-    return False
-
-
-@inlined
 def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
     """Row of the first slipping surface component whose sign changed over the step, -1 if none."""
     for k in range(table.shape[0]):
@@ -250,7 +240,6 @@ def run_steps(
     step, halvings = settings
     rule, _, eps = law
     dichotomy, zeroed, located, rest = flags
-    monitor_count = fresh.shape[0]
     n, s, direction = x.shape[0], 0.0, 1.0 if bound >= 0.0 else -1.0
     surfaces, after, guards, monitors, monitors_after, trial, held = work[7:]
     planned, row = step, 0
@@ -276,26 +265,12 @@ def run_steps(
         planned = step
         _step(addresses, law, table, s, h, x, p, z, trial, work)
         counters[0] += 4
-        for i in range(n):
-            if not np.isfinite(trial[i]):
-                return row, NOT_FINITE
-        if watched.shape[0] > 0:
-            call(addresses[2], s + h, trial, p, z, guards)
-            counters[1] += 1
-            for i in range(watched.shape[0]):
-                if watched[i] >= 0 and np.isnan(guards[watched[i]]):
-                    return row, NOT_FINITE
-            if _leaves(guards, watched):
-                return row, GUARD
-        if monitor_count > 0:
-            call(addresses[3], s, x, p, z, monitors)
-            call(addresses[3], s + h, trial, p, z, monitors_after)
-            for k in range(monitor_count):
-                changed = (monitors[k] > 0.0) != (monitors_after[k] > 0.0)
-                if row == 1 and fresh[k]:
-                    continue
-                if monitors[k] != 0.0 and changed and monitors[k] * monitors_after[k] <= 0.0:
-                    return row, MONITOR
+        why = passed(
+            (addresses[2], addresses[3]), s, x, s + h, trial, p, z, watched, fresh, row == 1, guards, monitors,
+            monitors_after, counters,
+        )  # fmt: skip
+        if why != GOES_ON:
+            return row, why
         if dichotomy:
             freed = False
             if located and _any_held(table, z):

@@ -9,6 +9,7 @@ from typing import Any
 
 VOCABULARY = (
     "contacts",
+    "located",
     "transitions",
     "nonlinear",
     "functions",

@@ -1,0 +1,37 @@
+"""How long a fixed step is: as given, or a share of the forcing's period."""
+
+from __future__ import annotations
+
+import math
+
+from hybridsim.engine.period import system_period
+from hybridsim.engine.system import System
+from hybridsim.errors import UsageError
+
+
+def fixed_step_length(
+    system: System, step: float | None, period: float | None, steps_per_period: float, name: str
+) -> float:
+    """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
+    for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise UsageError(f"{name}: {label} is {value!r}", remedy="give a positive number")
+    if step is not None:
+        return step
+    if period is None:
+        period = system_period(system)
+    if period is None:
+        raise UsageError(
+            f"{name} steps by a share of the forcing's period, and model {system.model.name} has no single one",
+            remedy="give step=... or period=...",
+        )
+    return period / steps_per_period
+
+
+def refuse_longer(step: float, max_step: float, name: str) -> None:
+    """A fixed step is not shortened behind the user's back."""
+    if step > max_step:
+        raise UsageError(
+            f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
+            remedy="set step or steps_per_period",
+        )
