@@ -79,6 +79,13 @@ def add_to(commands: Any) -> None:
         type=values.count,
         help="threads of --over (default: one for each processor)",
     )
+    parser.add_argument(
+        "--budget",
+        metavar="SECONDS",
+        type=values.positive,
+        help="what all of it may take (default: 120; with --over as long as it takes); what does not fit is left out, "
+        "and said",
+    )
     parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw it ({', '.join(PICTURES)})")
     parser.add_argument("--json", action="store_true", help="print everything as JSON instead of the table")
     parser.set_defaults(execute=execute)
@@ -105,6 +112,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             v0=args.v0,
             integrators=not args.no_integrators,
             workers=args.workers,
+            budget=args.budget,
             progress=lambda done, total, what: progress(done / total, what),
         )
     print(found.to_json() if args.json else found.table())

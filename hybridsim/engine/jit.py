@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import os
 import sys
+import threading
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -29,6 +31,7 @@ if ENABLED:
     import numba
     from llvmlite import ir
     from numba import types
+    from numba.core import event
     from numba.extending import intrinsic
 
     from hybridsim.engine.machine_code import compile_text, machine_name
@@ -36,6 +39,32 @@ if ENABLED:
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
     SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
+
+    class _Compiling(event.Listener):
+        """Adds up what each thread spends on compiling kernels, or on reading them from the cache."""
+
+        def __init__(self) -> None:
+            self.of = threading.local()
+
+        def on_start(self, event: Any) -> None:
+            """A kernel, or one that another needs."""
+            depth = getattr(self.of, "depth", 0)
+            if depth == 0:
+                self.of.since = time.perf_counter()
+            self.of.depth = depth + 1
+
+        def on_end(self, event: Any) -> None:
+            """The kernel is ready."""
+            self.of.depth -= 1
+            if self.of.depth == 0:
+                self.of.spent = seconds_compiling() + time.perf_counter() - self.of.since
+
+    _compiling = _Compiling()
+    event.register("numba:compiler_lock", _compiling)
+
+    def seconds_compiling() -> float:
+        """Seconds that this thread has spent so far on getting kernels ready."""
+        return float(getattr(_compiling.of, "spent", 0.0))
 
     def _with_cache_folder(folder: str, define: Callable[[], Any]) -> Any:
         """Run `define` while numba's cache folder is ours, and give the setting back to the user's own code."""
@@ -105,6 +134,10 @@ else:
         return function
 
     inlined = allocating_kernel = polynomial_kernel = kernel
+
+    def seconds_compiling() -> float:
+        """None: nothing is compiled."""
+        return 0.0
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""

@@ -20,6 +20,11 @@ from analysis.advice_by_hand import (
 
 import hybridsim as hs
 from hybridsim.analysis.advise.certificates import certificates
+from hybridsim.analysis.advise.ladder import Limits, climb, scene_of
+from hybridsim.analysis.advise.question import Answer, question_of, watched
+from hybridsim.analysis.race import Budget
+from hybridsim.analysis.rungs import Scene
+from hybridsim.analysis.rungs.regularised import Tanh
 from hybridsim.errors import SimulationError, UsageError
 
 
@@ -245,6 +250,55 @@ def test_a_linear_model_has_nothing_to_drop() -> None:
     found = hs.advise(model, "amplitude.x")
     assert "linear" in found.certificates[0] and found.simplest.name == "full model"
     assert found.value == pytest.approx(1.0 / math.hypot(3.0, 1.0), rel=1e-7)
+
+
+def hardening(F0: float) -> hs.Model:
+    """A cubic spring on a contact that holds 4 and slides with a Stribeck force."""
+    law = hs.load_law("stribeck-exponential")
+    pull = f"{F0!r}*sin(1.3*t) - 0.1*v - x - 0.5*x**3 - f"
+    contact = hs.Contact(
+        "f", velocity="v", normal=10, law=law, arguments={"mu_s": 0.4, "mu_k": 0.3, "v_s": 0.1}
+    )
+    return hs.Model("hardening", [hs.State("x", 0, "v"), hs.State("v", 0, pull)], contacts=[contact])
+
+
+def test_a_nonlinear_model_below_the_threshold_is_at_rest_by_theory() -> None:
+    (said,) = certificates(hardening(2.0))
+    assert said.rung == "at-rest" and "the load of at most 2 never exceeds the 4" in said.text
+    assert certificates(hardening(4.0)) and not certificates(hardening(math.nextafter(4.0, 5.0)))
+    pulled = hardening(2.0).with_start(x=-1.0)  # the spring takes 1.5 of the 4
+    assert "at most 3.5" in certificates(pulled)[0].text
+    assert not certificates(hardening(2.0).with_start(x=-1.5))  # 1.5 + 0.5*1.5**3 = 3.1875
+
+
+def test_a_rung_dearer_than_the_full_model_is_stopped() -> None:
+    # next to the threshold the body creeps through v0, a hundredth of next to nothing: 1e8 per second
+    limits = Limits(Budget(1e9), least=0.05, repeat=False)
+    model = watched(dfcs(20.08, 1.03))
+    question = question_of(model, "amplitude.x", None, 1e-8)
+    full = question.ask(model)
+    (step,) = climb([Tanh()], scene_of(model, full.motion, None), question, full, 0.01, limits)
+    assert step.verdict == "stopped" and "dearer than the full model: not done after" in step.why
+    assert step.value is None and not step.is_adequate
+
+
+def test_what_does_not_fit_the_budget_is_left_out_and_said() -> None:
+    seen: list[tuple[int, int, str]] = []
+    with pytest.raises(SimulationError, match=r"within the budget: not done after 0\.01 s"):
+        # an undamped body with a cubic spring goes on for thousands of periods
+        stray = hs.Model("stray", [hs.State("x", 1, "v"), hs.State("v", 0, "sin(1.3*t) - x**3 + x - 0.05*v")])
+        hs.advise(stray, "amplitude.x", budget=0.01)
+    found = hs.advise(
+        "dfcs", "amplitude.x", budget=1e4, rungs=["no-friction"], progress=lambda *p: seen.append(p)
+    )
+    assert found["no-friction"].verdict == "not adequate" and found.left_out == ""
+    assert seen[0] == (0, 3, "full model") and any(what == "no-friction" for _, _, what in seen)
+    spent = Limits(Budget(1e-9), 5.0)
+    question = question_of(hs.load("dfcs"), "amplitude.x", None, 1e-8)
+    (step,) = climb([Tanh()], Scene(hs.load("dfcs")), question, Answer(1.0, 1.0, None), 0.01, spent)
+    assert (step.verdict, step.why) == ("not started", "the budget of 1e-09 s is spent")
+    with pytest.raises(UsageError, match="budget"):
+        hs.advise("dfcs", "amplitude.x", budget=0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.advise.ladder import FULL, Step
+from hybridsim.analysis.advise.ladder import FULL, Step, duration
 from hybridsim.analysis.advise.question import Number
 from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
@@ -39,6 +39,7 @@ class Advice:
     spread : what given ranges of parameters do to the quantity.
     region : a `Sweep` with, at each point, ``simplest`` (a name), ``error`` of it, ``value`` of the full model and
         ``errors`` of all rungs (inf where a rung does not apply, or was not tried because a simpler one serves).
+    left_out : what the budget left no time for, in a sentence.
     seconds : of all of it.
     """
 
@@ -51,6 +52,7 @@ class Advice:
     settings: tuple[Setting, ...] = ()
     spread: Spread | None = None
     region: Sweep | None = None
+    left_out: str = ""
     seconds: float = math.nan
 
     @property
@@ -136,15 +138,15 @@ class Advice:
 
 
 def _remarks(advice: Advice) -> list[str]:
-    found = []
+    found = [advice.left_out] if advice.left_out else []
     simplest, full = advice.simplest, advice.ladder[-1]
     where = " everywhere in the region" if advice.region is not None else ""
     if simplest.verdict == FULL and len(advice.ladder) > 1:
         found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:
         found.append(
-            f"{simplest.name} is simpler but not quicker: {_time(simplest.seconds)} against "
-            f"{_time(full.seconds)} of the full model"
+            f"{simplest.name} is simpler but not quicker: {duration(simplest.seconds)} against "
+            f"{duration(full.seconds)} of the full model"
         )
     spread = advice.spread
     if spread is not None and spread.relative > advice.tol:
@@ -162,10 +164,6 @@ def _remarks(advice: Advice) -> list[str]:
             f"{int(advice.region.failed.sum())} of {advice.region.failed.size} points have no answer"
         )
     return found
-
-
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 def _fields(item: Any, names: str) -> dict[str, Any]:

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from os import PathLike
 from typing import Any
 
 from hybridsim import arguments
 from hybridsim.analysis.advise.advice import Advice
 from hybridsim.analysis.advise.certificates import certificates
-from hybridsim.analysis.advise.ladder import FULL, Step, asked, climb, scene_of
+from hybridsim.analysis.advise.ladder import FULL, Limits, Step, climb, scene_of
 from hybridsim.analysis.advise.question import NoAnswer, Question, question_of, watched
 from hybridsim.analysis.advise.region import over_region
 from hybridsim.analysis.advise.settings import settings
 from hybridsim.analysis.advise.uncertainty import ranges_of, spread
+from hybridsim.analysis.allowance import OutOfTime
 from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.race import Budget
 from hybridsim.analysis.rungs import LADDER, Rung
 from hybridsim.analysis.wanted import positive, words
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 
+_BUDGET = 120.0  # seconds of an advice that nobody has given any thought, as of a comparison
+# seconds that a rung may take at least: nobody minds them once, or a few hundred times
+_LEAST, _LEAST_AT_A_POINT = 5.0, 2.0
+_PAUSE = 0.1  # seconds between two words of progress about the same
 _FINER = 1e-6  # of the tolerance: verdicts are then wrong only for errors that near to it
 _ACCURACY = (1e-10, 1e-6)  # bounds of what is asked of the runs
 
@@ -40,6 +48,7 @@ def advise(
     v0: float | None = None,
     integrators: bool = True,
     workers: int | None = None,
+    budget: float | None = None,
     progress: Progress | None = None,
 ) -> Advice:
     """The simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
@@ -64,6 +73,9 @@ def advise(
     v0 : width of the regularised forces; a hundredth of the largest sliding speed unless given.
     integrators : whether to try integrator settings for the full model; over a region none are.
     workers : threads of a region.
+    budget : seconds that all of it may take: 120 unless given; over a region as long as it takes. What does not fit is
+        not run, and its row says so. A rung that becomes ten times as dear as the full model is stopped earlier, but
+        not before 5 seconds (over a region, 2 at a point).
     progress : called as progress(done, total, what is next).
 
     Returns
@@ -72,7 +84,8 @@ def advise(
 
     Errors
     ------
-    UsageError for arguments that do not fit; SimulationError where the full model itself has no answer.
+    UsageError for arguments that do not fit; SimulationError where the full model itself has no answer, or none within
+    the budget.
 
     Examples
     --------
@@ -94,12 +107,14 @@ def advise(
     question = question_of(model, quantity, span, accuracy)
     width = None if v0 is None else positive(v0, "v0")
     chosen, ranges = _chosen(rungs), None if uncertain is None else ranges_of(uncertain)
+    spending = Budget(_spendable(budget, over is not None))
     seen = watched(model)
     if over is not None:
         if ranges is not None:
             raise UsageError("over and uncertain are both given", remedy="ask about ranges at one point")
         options = {"mode": mode, "workers": workers, "progress": progress}
-        region, ladder = over_region(seen, over, chosen, question, tol, width, options)
+        limits = Limits(spending, _LEAST_AT_A_POINT, repeat=False)
+        region, ladder = over_region(seen, over, chosen, question, tol, width, limits, options)
         return Advice(
             model,
             question.text,
@@ -110,21 +125,33 @@ def advise(
             seconds=time.perf_counter() - began,
         )
     told = _Told(progress, len(chosen) + 1 + integrators + (ranges is not None))
+    limits = Limits(spending, _LEAST, told=told.again)
     told("full model")
     try:
-        full = asked(question, seen)
+        full = limits.warm(partial(question.ask, seen), limits.allowance())
     except NoAnswer as reason:
         raise SimulationError(f"the full model gives no {question.text}: {reason}") from reason
+    except OutOfTime as fault:
+        raise SimulationError(
+            f"the full model gives no {question.text} within the budget: {fault}",
+            remedy="give a larger budget",
+        ) from fault
     scene = scene_of(seen, full.motion, width)
     steps = []
-    for rung, step in zip(chosen, climb(chosen, scene, question, full.value, tol), strict=True):
+    for rung, step in zip(chosen, climb(chosen, scene, question, full, tol, limits), strict=True):
         told(rung.name)
         steps.append(step)
     steps.append(
         Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "what the others are held against")
     )
-    tried = settings(seen, question, full.motion, full.value, tol, told) if integrators else ()
-    known = None if ranges is None else _spread(seen, question, full.value, ranges)
+    tried = settings(seen, question, full, tol, limits, told) if integrators else ()
+    known, left_out = None, ""
+    if ranges is not None:
+        told("ranges of parameters")
+        try:
+            known = _spread(seen, question, full.value, ranges, limits)
+        except OutOfTime:
+            left_out = f"{limits.spent}: what the ranges of parameters do was not found out"
     return Advice(
         model,
         question.text,
@@ -134,13 +161,20 @@ def advise(
         tuple(c.text for c in certificates(model)),
         tried,
         known,
+        left_out=left_out,
         seconds=time.perf_counter() - began,
     )
 
 
-def _spread(model: Model, question: Question, full: Any, ranges: Any) -> Any:
+def _spendable(budget: float | None, is_region: bool) -> float:
+    if budget is not None:
+        return positive(budget, "budget")
+    return math.inf if is_region else _BUDGET
+
+
+def _spread(model: Model, question: Question, full: Any, ranges: Any, limits: Limits) -> Any:
     try:
-        return spread(model, question, full, ranges)
+        return spread(model, question, full, ranges, limits.allowance())
     except NoAnswer as reason:
         raise SimulationError(
             f"at an end of the given ranges there is no {question.text}: {reason}"
@@ -159,12 +193,18 @@ def _chosen(names: Sequence[str] | None) -> tuple[Rung, ...]:
 
 
 class _Told:
-    """Passes on what is next."""
+    """Passes on what is next, and that it goes on."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1
+        self._what, self._next = "", 0.0
 
     def __call__(self, what: str) -> None:
-        self._done = min(self._done + 1, self._total - 1)
-        if self._progress is not None:
-            self._progress(self._done, self._total, what)
+        self._done, self._what, self._next = min(self._done + 1, self._total - 1), what, 0.0
+        self.again()
+
+    def again(self) -> None:
+        """Say the same once more, now and then: it goes on."""
+        if self._progress is not None and time.monotonic() >= self._next:
+            self._next = time.monotonic() + _PAUSE
+            self._progress(self._done, self._total, self._what)

@@ -9,8 +9,9 @@ from typing import Any
 from hybridsim.analysis.closed_forms.affine import Affine, NotAffine, affine
 from hybridsim.analysis.rungs import DoesNotApply, Scene
 from hybridsim.analysis.rungs.at_rest import AtRest
+from hybridsim.analysis.rungs.forces import inlined
 from hybridsim.analysis.rungs.no_stop import NoStop, held
-from hybridsim.expr import evaluate
+from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Model
 
 _UNIT_BOUND = 1.0  # no shape of a wave exceeds its amplitude
@@ -34,7 +35,10 @@ def certificates(model: Model) -> tuple[Certificate, ...]:
     """All that theory says of a model, the strongest first."""
     found = []
     if bound := _nothing_moves(model):
-        text = f"nothing moves: the load of at most {bound[0]:.6g} never exceeds the {bound[1]:.6g} that stick holds"
+        load, limit = (f"{value:.6g}" for value in bound)
+        text = (
+            f"at rest, nothing moves: the load of at most {load} never exceeds the {limit} that stick holds"
+        )
         found.append(Certificate(text, AtRest.name, AtRest().apply(Scene(model))))
     elif _is_linear(model):
         found.append(Certificate("the model is linear and has no modes: there is nothing to make simpler"))
@@ -84,22 +88,22 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
     if not model.contacts[0].law.is_set_valued or model.contacts[0].opens:
         return None
     contact, values, start = model.contacts[0], model.parameter_values(), model.start_values()
-    definitions = dict(model.definitions)
-    unknowns = {*start, contact.name, *(i.name for i in model.inputs)}
     if contact.law.stick_backward is not None:
         return None
+    at_start = {name: parse(repr(value)) for name, value in start.items()}
+    definitions = dict(model.definitions)
+    unknowns = {contact.name, *(i.name for i in model.inputs)}
     try:
-        slide = affine(contact.velocity, unknowns, values, definitions)
-        rates = {s.name: affine(s.der, unknowns, values, definitions) for s in model.states}
-        limit = affine(contact.limit_force(), unknowns, values, definitions)
+        slide = affine(contact.velocity, unknowns | start.keys(), values, definitions)
+        # where nothing moves the states are what they are at the start, and no product of them counts
+        rates = {
+            s.name: affine(substitute(inlined(model, s.der), at_start), unknowns, values, {})
+            for s in model.states
+        }
+        limit = affine(substitute(inlined(model, contact.limit_force()), at_start), unknowns, values, {})
     except NotAffine:
         return None
-    if (
-        not limit.is_constant
-        or slide.waves
-        or not slide.linear.keys() <= start.keys()
-        or _at(slide, start) != 0.0
-    ):
+    if not limit.is_constant or slide.waves or not slide.linear.keys() <= start.keys() or _at(slide, start):
         return None
     pull = Affine()
     for name, weight in slide.linear.items():
@@ -110,9 +114,9 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
     # in stick the force is what makes the rate of the relative velocity zero; then no state may have a rate at all
     for rate in rates.values():
         left = rate.plus(pull, -rate.linear.get(contact.name, 0.0) / effect)
-        if _largest(model, left, start, contact.name, values) != 0.0:
+        if _largest(model, left, contact.name, values) != 0.0:
             return None
-    load = _largest(model, Affine().plus(pull, -1.0 / effect), start, contact.name, values)
+    load = _largest(model, Affine().plus(pull, -1.0 / effect), contact.name, values)
     return (load, limit.constant) if load <= limit.constant else None
 
 
@@ -120,16 +124,12 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
     return form.constant + sum(value * start.get(name, 0.0) for name, value in form.linear.items())
 
 
-def _largest(
-    model: Model, form: Affine, start: Mapping[str, float], force: str, values: Mapping[str, float]
-) -> float:
-    """A bound of |form| at the start, whatever the time and without the contact's force."""
+def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
+    """A bound of |form|, whatever the time and without the contact's force."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():
-        if name in start:
-            steady += value * start[name]
-        elif name in inputs:
+        if name in inputs:
             number = {field: float(evaluate(e, values)) for field, e in inputs[name].expressions.items()}
             steady += value * number["offset"]
             swing += abs(value * number["amplitude"]) * _UNIT_BOUND

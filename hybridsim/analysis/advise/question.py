@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.analysis.allowance import Stopwatch
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.errors import HybridsimError, UsageError, nearest
 from hybridsim.model import Model, Output
@@ -104,34 +104,34 @@ class Question:
         parts = self.text.split(".")
         return int(parts[2]) if len(parts) > 2 else 1
 
-    def ask(self, model: Model) -> Answer:
-        """The value, from a steady state or a run.
+    def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
+        """The value, from a steady state or a run, with its cost but for compiling; `progress` as in these.
 
         Errors
         ------
         NoAnswer with the reason.
         """
-        began = time.perf_counter()
+        watch = Stopwatch()
         try:
-            motion = self.motion(model)
-            seconds = time.perf_counter() - began
+            motion = self.motion(model, progress)
+            seconds = watch.seconds
             value = self.read(motion)
         except HybridsimError as error:
             raise NoAnswer(error.message) from error
         return Answer(value, seconds, motion)
 
-    def motion(self, model: Model) -> Any:
+    def motion(self, model: Model, progress: Callable[[float], None] | None = None) -> Any:
         """The steady state, or the run."""
         from hybridsim.analysis.steady import steady_state
         from hybridsim.simulate import simulate
 
         if self.t_span is None:
-            steady = steady_state(model, tol=self.accuracy)
+            steady = steady_state(model, tol=self.accuracy, progress=progress)
             if not steady.success:
                 raise NoAnswer(steady.message)
             _require_limit_cycle(model, steady)
             return steady
-        solution = simulate(model, self.t_span, rtol=0.01 * self.accuracy)
+        solution = simulate(model, self.t_span, rtol=0.01 * self.accuracy, progress=progress)
         if not solution.success:
             raise NoAnswer(f"{solution.status}: {solution.message}")
         return OverRun(solution)

@@ -15,12 +15,15 @@ from hybridsim.analysis.advise.ladder import (
     FULL,
     NOT_ADEQUATE,
     NOT_APPLICABLE,
+    Limits,
     Step,
     by_theory,
     climb,
     scene_of,
 )
 from hybridsim.analysis.advise.question import NoAnswer, Question
+from hybridsim.analysis.allowance import OutOfTime
+from hybridsim.analysis.rows import STOPPED
 from hybridsim.analysis.rungs import Rung
 from hybridsim.analysis.sweep import Sweep, sweep
 from hybridsim.errors import SimulationError
@@ -41,17 +44,22 @@ class _Point:
     question: Question
     tol: float
     v0: float | None
+    limits: Limits
 
     def __call__(self, model: Model) -> dict[str, Any]:
+        if not self.limits.budget.left:
+            raise SimulationError(self.limits.spent)
         try:
-            full = by_theory(certificates(model), self.question) or self.question.ask(model)
-        except NoAnswer as reason:
+            full = by_theory(certificates(model), self.question) or self.question.ask(
+                model, self.limits.allowance()
+            )
+        except (NoAnswer, OutOfTime) as reason:
             raise SimulationError(str(reason)) from reason
         scene = scene_of(model, full.motion, self.v0)
-        errors = np.full(len(self.rungs), math.inf)
+        errors, stopped = np.full(len(self.rungs), math.inf), np.zeros(len(self.rungs))
         simplest = None
-        for k, step in enumerate(climb(self.rungs, scene, self.question, full.value, self.tol, Question.ask)):
-            errors[k] = step.error
+        for k, step in enumerate(climb(self.rungs, scene, self.question, full, self.tol, self.limits)):
+            errors[k], stopped[k] = step.error, step.verdict == STOPPED
             if simplest is None and step.is_adequate:
                 simplest = k
             following = self.rungs[k + 1 : k + 2]
@@ -62,6 +70,7 @@ class _Point:
             "error": 0.0 if simplest is None else float(errors[simplest]),
             "value": full.value,
             "errors": errors,
+            "stopped": stopped,
         }
 
 
@@ -72,10 +81,11 @@ def over_region(
     question: Question,
     tol: float,
     v0: float | None,
+    limits: Limits,
     options: Mapping[str, Any],
 ) -> tuple[Sweep, tuple[Step, ...]]:
     """The map, and the ladder as it fared over all of it."""
-    found = sweep(model, over, _Point(tuple(rungs), question, tol, v0), **options)
+    found = sweep(model, over, _Point(tuple(rungs), question, tol, v0, limits), **options)
     if found.failed.all():
         raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")
     return found, tuple(_steps(found, rungs, tol))
@@ -96,6 +106,8 @@ def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
         elif verdict == NOT_APPLICABLE:
             verdict = NOT_ADEQUATE
         why = f"serves at {serves} of {total} points, is the simplest at {first}"
+        if given_up := int(found["stopped"][done][:, k].sum()):
+            why += f", dearer than the full model at {given_up} and stopped there"
         steps.append(
             Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why)
         )

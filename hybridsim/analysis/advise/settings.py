@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from hybridsim.analysis.advise.ladder import asked, relative_error
+from hybridsim.analysis.advise.ladder import Limits, Watch, relative_error
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
+from hybridsim.analysis.allowance import OutOfTime, Stopwatch
 from hybridsim.errors import HybridsimError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
@@ -68,14 +68,14 @@ class _Settling:
     save: str | float
     step_base: float
 
-    def ask(self, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
+    def ask(self, model: Model, name: str, options: Mapping[str, Any], watch: Watch | None = None) -> Answer:
         given = dict(options)
         if "steps" in given:
             given = {"step": self.step_base / given["steps"]}
-        began = time.perf_counter()
+        stopwatch = Stopwatch()
         try:
-            solution = simulate(model, self.span, integrator=name, save=self.save, **given)
-            seconds = time.perf_counter() - began
+            solution = simulate(model, self.span, integrator=name, save=self.save, progress=watch, **given)
+            seconds = stopwatch.seconds
             if not solution.success:
                 raise NoAnswer(f"{solution.status}: {solution.message}")
             run = OverRun(solution)
@@ -90,46 +90,49 @@ class _Settling:
 def settings(
     model: Model,
     question: Question,
-    motion: Any,
-    full: Number,
+    full: Answer,
     tol: float,
-    progress: Callable[[str], None] | None = None,
+    limits: Limits,
+    told: Callable[[str], None],
 ) -> tuple[Setting, ...]:
     """Every family from its loosest setting on until one is within the tolerance, quickest adequate one first."""
     found = []
     if question.t_span is None:
         loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
-        found.append(_measured(_SHOOTING, {}, lambda: asked(loose, model), full, tol))
+        found.append(_measured(_SHOOTING, {}, partial(loose.ask, model), full, tol, limits))
     # a run has no period of its own, and a function of a steady state cannot be handed a run
     if question.t_span is not None or (question.function is None and question.head != "period"):
-        settling = _settling(question, motion, tol)
+        settling = _settling(question, full.motion, tol)
         for name, option in _FAMILIES:
             values: tuple[float, ...] = {"rtol": _RTOLS, "steps": _STEPS}.get(option, (0.0,))
             for value in values:
                 options = {option: value} if option else {}
-                if progress is not None:
-                    progress(f"{name} {value:g}" if option else name)
-                one = _measured(name, options, partial(_twice, settling, model, name, options), full, tol)
+                told(f"{name} {value:g}" if option else name)
+                ask = partial(settling.ask, model, name, options)
+                one = _measured(name, options, ask, full, tol, limits)
                 found.append(one)
                 if one.is_adequate or one.value is None:
                     break
     return tuple(sorted(found, key=lambda s: (not s.is_adequate, math.isnan(s.seconds), s.seconds)))
 
 
-def _twice(settling: _Settling, model: Model, name: str, options: Mapping[str, Any]) -> Answer:
-    first = settling.ask(model, name, options)
-    second = settling.ask(model, name, options) if first.seconds < 20.0 else first
-    return min(first, second, key=lambda answer: answer.seconds)
-
-
 def _measured(
-    name: str, options: Mapping[str, Any], ask: Callable[[], Answer], full: Number, tol: float
+    name: str,
+    options: Mapping[str, Any],
+    ask: Callable[[Watch | None], Answer],
+    full: Answer,
+    tol: float,
+    limits: Limits,
 ) -> Setting:
+    if not limits.budget.left:
+        return Setting(name, options, why=limits.spent)
     try:
-        answer = ask()
+        answer = limits.warm(ask, limits.allowance(full))
     except NoAnswer as reason:
         return Setting(name, options, why=str(reason))
-    error = relative_error(answer.value, full)
+    except OutOfTime as fault:
+        return Setting(name, options, why=limits.reason(fault, full))
+    error = relative_error(answer.value, full.value)
     return Setting(name, options, answer.value, error, answer.seconds, error <= tol)
 
 

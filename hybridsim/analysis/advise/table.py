@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE
+from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE, duration
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice
@@ -68,7 +68,7 @@ def _spread(advice: Advice) -> str:
 def _cost(seconds: float) -> str:
     if math.isnan(seconds):
         return ""
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+    return duration(seconds)
 
 
 def _is_nan(value: float | complex) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,12 +46,16 @@ def ranges_of(given: Any) -> dict[str, tuple[float, float]]:
 
 
 def spread(
-    model: Model, question: Question, full: Number, ranges: Mapping[str, tuple[float, float]]
+    model: Model,
+    question: Question,
+    full: Number,
+    ranges: Mapping[str, tuple[float, float]],
+    watch: Callable[[float], None] | None = None,
 ) -> Spread:
     """The quantity at the corners of the ranges, and at both ends of each with the others as declared."""
     values = [abs(full) if isinstance(full, complex) else full]
     for point in _points(ranges):
-        value = question.ask(model.with_(**point)).value
+        value = question.ask(model.with_(**point), watch).value
         values.append(abs(value) if isinstance(value, complex) else value)
     low, high = min(values), max(values)
     half = 0.5 * (high - low)

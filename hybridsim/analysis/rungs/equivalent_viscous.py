@@ -58,7 +58,7 @@ class EquivalentViscous(Rung):
             if (np.abs(response.mean(c)) > _ONE_WAY * np.abs(response(c))).any():
                 raise DoesNotApply(_DRIFTS)
         except NotLinear:
-            c = _solve(_by_runs(viscous, model, order, period), forces, _MOST_RUNS)
+            c = _solve(_by_runs(viscous, scene, order), forces, _MOST_RUNS)
         return viscous.with_(**dict(zip(order, c.tolist(), strict=True)))
 
 
@@ -72,16 +72,17 @@ def _period(model: Model) -> float:
     return period
 
 
-def _by_runs(viscous: Model, model: Model, names: list[str], period: float) -> Response:
+def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
     """The response of a model that is not linear, from its own steady state."""
     from hybridsim.analysis.steady import steady_state
 
-    velocities = {f"{n}_v": c.velocity for n, c in zip(names, model.contacts, strict=True)}
+    velocities = {f"{n}_v": c.velocity for n, c in zip(names, scene.model.contacts, strict=True)}
     seen = replace(viscous, outputs=(*viscous.outputs, *(Output(n, e) for n, e in velocities.items())))
 
     def response(c: np.ndarray) -> np.ndarray:
+        damped = seen.with_(**dict(zip(names, c.tolist(), strict=True)))
         try:
-            steady = steady_state(seen.with_(**dict(zip(names, c.tolist(), strict=True))), tol=1e-9)
+            steady = steady_state(damped, tol=1e-9, progress=scene.progress)
         except HybridsimError as error:
             raise DoesNotApply(f"the model with dampers has no steady motion: {error.message}") from error
         if not steady.success or steady.multiple > 1:

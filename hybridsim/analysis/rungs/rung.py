@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -25,12 +25,14 @@ class Scene:
     speed : mean speed of each contact while it slides, of the full motion; empty where it is not known.
     peak : the largest speed of any contact in the full motion.
     v0 : width of a regularised force; a hundredth of ``peak`` unless given.
+    progress : called from time to time by a rung that needs runs of its own; what it raises ends them.
     """
 
     model: Model
     speed: Mapping[str, float] = field(default_factory=dict)
     peak: float | None = None
     v0: float | None = None
+    progress: Callable[[float], None] | None = None
 
 
 class Rung(ABC):

@@ -13,6 +13,8 @@ from hybridsim.errors import SimulationError
 from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridsim.engine.pieces import Segment
     from hybridsim.model import Model
     from hybridsim.solution import Solution
@@ -50,12 +52,24 @@ class Motion:
     model : with its parameters set.
     options : of `simulate`: integrator, rtol and the like.
     first : x0 and z0 of a run from the model's start.
+    progress : called from time to time during every run.
     """
 
-    def __init__(self, model: Model, options: dict[str, Any], first: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        options: dict[str, Any],
+        first: dict[str, Any] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
         self.model, self.options, self.first = model, options, first or {}
+        self.progress = progress
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
+
+    def unwatched(self) -> Motion:
+        """The same, for runs that are made later, when nobody looks on any more."""
+        return Motion(self.model, self.options, self.first)
 
     def on_constraints(self, point: Point) -> Point:
         """The point with the states that its modes hold where the model's parameters put them."""
@@ -69,7 +83,9 @@ class Motion:
         if start is not None:
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
-        solution = simulate(self.model, (0.0, t_end), **given, **(self.options | options))
+        solution = simulate(
+            self.model, (0.0, t_end), **given, progress=self.progress, **(self.options | options)
+        )
         if solution.status != "finished":
             raise SimulationError(
                 f"the run towards the steady state ended early ({solution.status}): {solution.message}"

@@ -76,6 +76,7 @@ def steady_state(
     settle : periods (passings of a section, without forcing) before the first look.
     max_periods : periods after which the motion is judged as it is: chaotic where its largest Lyapunov exponent is
         positive, quasi-periodic where it is nought, else not settled.
+    progress : called with the share of these periods that is over, from time to time; what it raises ends the search.
 
     Returns
     -------
@@ -112,13 +113,16 @@ def steady_state(
         "integrator": integrator,
         "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
     }
+    told = arguments.callback(progress)
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     if period is None and _is_driven(system):
         return _found(motion, QUASI, None, message="the frequencies of the forcing have no common period")
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise UsageError(f"{name} is {count!r}", remedy="give a whole number of periods")
-    search = _Search(motion, period, tol, settle, max_periods, arguments.callback(progress))
+    search = _Search(motion, period, tol, settle, max_periods)
+    if told is not None:
+        motion.progress = lambda _: told(search.share)
     return search.run()
 
 
@@ -132,11 +136,9 @@ class _Search:
         tol: float,
         settle: int,
         max_periods: int,
-        progress: Callable[[float], None] | None,
     ) -> None:
         self.motion, self.period, self.tol = motion, period, tol
         self.settle, self.max_periods = max(settle, _FEWEST), max_periods
-        self.progress = progress
         self.newton_steps, self.periods = 0, 0
         self.duration = motion.model.duration_value() or _DURATION
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
@@ -155,10 +157,13 @@ class _Search:
                 return self._other(passings)
             passings = self._follow(passings)
 
+    @property
+    def share(self) -> float:
+        """Of the periods after which the motion is judged as it is."""
+        return min(self.periods / self.max_periods, 1.0)
+
     def _follow(self, last: Passings | None) -> Passings:
         """The motion from where it is on, for as long again as it has been followed."""
-        if self.progress is not None:
-            self.progress(min(self.periods / self.max_periods, 1.0))
         start = None if last is None else last.last
         if self.period is not None:
             count = self.expected or min(max(self.settle, self.periods), _MOST_AT_ONCE)
@@ -262,7 +267,7 @@ def _found(
     periods: int = 0,
     message: str = "",
 ) -> SteadyState:
-    return SteadyState(motion, kind, orbit, is_free, newton_steps, periods, message or kind)
+    return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
 
 
 def _is_driven(system: System) -> bool:
