@@ -190,9 +190,9 @@ def page(
         "",
         f"The two differ at **{len(wrong) + len(near) + len(dear)}** points; at {len(near)} of these an error lies "
         f"within 0.01 % of the tolerance, and at {len(dear)} the advice had stopped a rung that is adequate but far "
-        f"dearer than the full model (next to the threshold, at {stopped} points in all, a force smoothed over a hundredth "
-        f"of the speed there is stiff). Amplitudes of the full model differ by {worst:.1e} at most; brute force "
-        f"repeats from period to period to {drift:.1e}. The advice took {spent:.0f} s, brute "
+        f"dearer than the full model (next to the threshold, at {stopped} points in all, a force smoothed over a "
+        f"hundredth of the speed there is stiff). Amplitudes of the full model differ by {worst:.1e} at most; brute "
+        f"force repeats from period to period to {drift:.1e}. The advice took {spent:.0f} s, brute "
         f"force {brute:.0f} s, each on one thread.",
         "",
         "| simplest within 1 % | points |",

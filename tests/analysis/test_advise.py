@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -250,6 +251,28 @@ def test_a_linear_model_has_nothing_to_drop() -> None:
     found = hs.advise(model, "amplitude.x")
     assert "linear" in found.certificates[0] and found.simplest.name == "full model"
     assert found.value == pytest.approx(1.0 / math.hypot(3.0, 1.0), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("law", "arguments"),
+    [("jenkins", {"k": "k_d"}), ("iwan", {"k": "k_d", "n": "4"}), ("dahl", {"sigma": "k_d"})],
+)
+def test_a_law_with_memory_is_held_against_rest_and_no_friction(law: str, arguments: dict[str, str]) -> None:
+    model = hs.load("blade-damper")
+    contact = hs.Contact("f", velocity="v", normal="N", law=law, arguments={"mu": "mu", **arguments})
+    model = replace(model, contacts=(contact,))
+    p = model.parameter_values()
+    found = hs.advise(model, "amplitude.x", integrators=False, rungs=["at-rest", "no-friction", "tanh"])
+    own, w = p["k_b"] - p["m"] * p["omega"] ** 2, 2.0 * p["zeta"] * math.sqrt(p["k_b"] * p["m"]) * p["omega"]
+    assert found["no-friction"].value == pytest.approx(p["F0"] / math.hypot(own, w), rel=1e-6)
+    assert found["at-rest"].value == 0.0 and found["tanh"].verdict == "does not apply"
+    assert "no simpler model answers" in found.remarks[0]
+
+
+def test_it_says_that_no_simpler_model_could_be_tried() -> None:
+    found = hs.advise("blade-damper", "amplitude.x", integrators=False, rungs=["tanh", "karnopp"])
+    assert "no simpler model could be tried" in found.table().splitlines()[0]
+    assert found.remarks == ("no simpler model could be tried: no rung applies to this model",)
 
 
 def hardening(F0: float) -> hs.Model:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -169,3 +170,18 @@ def test_a_torus_is_named() -> None:
     found = hs.steady_state(shaken, max_periods=128, tol=1e-8)
     assert found.kind == "quasi-periodic"
     assert abs(found.lyapunov) < 1e-3
+
+
+@pytest.mark.parametrize("velocity", ["v", "v + 0*x*t"])  # a name, and what has to be evaluated
+def test_a_law_with_memory_has_work_of_friction(velocity: str) -> None:
+    """What the forcing brings in is what the damper and the contact take out."""
+    model = hs.load("blade-damper")
+    contact = hs.Contact("f", velocity, "N", "jenkins", {"mu": "mu", "k": "k_d"})
+    model = replace(model, contacts=(contact,))
+    p = model.parameter_values()
+    found = hs.steady_state(model, period=2.0 * math.pi / p["omega"])
+    X = found.harmonic("x", 1)  # x = Re(X e^{iwt}) and the forcing F0 Re(-i e^{iwt})
+    brought = -math.pi * p["F0"] * X.real
+    taken = 2.0 * p["zeta"] * math.sqrt(p["k_b"] * p["m"]) * found.energy["v"]
+    assert found.dissipated["f"] == pytest.approx(brought - taken, rel=1e-8)
+    assert found.dissipated["f"] > 0.0 and not dict(found.stick_fraction)

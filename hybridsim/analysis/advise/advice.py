@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.advise.ladder import FULL, Step, duration
+from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE, Step, duration
 from hybridsim.analysis.advise.question import Number
 from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
@@ -141,7 +141,9 @@ def _remarks(advice: Advice) -> list[str]:
     found = [advice.left_out] if advice.left_out else []
     simplest, full = advice.simplest, advice.ladder[-1]
     where = " everywhere in the region" if advice.region is not None else ""
-    if simplest.verdict == FULL and len(advice.ladder) > 1:
+    if all(step.verdict in (NOT_APPLICABLE, FULL) for step in advice.ladder):
+        found.append("no simpler model could be tried: no rung applies to this model")
+    elif simplest.verdict == FULL and len(advice.ladder) > 1:
         found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:
         found.append(

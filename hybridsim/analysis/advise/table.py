@@ -31,6 +31,8 @@ def _conclusion(advice: Advice) -> str:
         return f"over {advice.region.status.size} points of {', '.join(advice.region.axes)}"
     simplest, setting = advice.simplest, advice.integrator
     how = f"; run the full model by {setting.title}" if setting is not None else ""
+    if all(step.verdict in (NOT_APPLICABLE, FULL) for step in advice.ladder):
+        return f"no simpler model could be tried, so the full model it is{how}"
     if simplest.verdict == FULL:
         return f"the full model is needed{how}"
     return f"{simplest.title} is enough{how}"

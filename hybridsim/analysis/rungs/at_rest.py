@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+
+if TYPE_CHECKING:
+    from hybridsim.model import Contact
 
 
 class Rest:
@@ -11,13 +16,13 @@ class Rest:
     x : the value at which each state stays. period : of the forcing, nan without.
     """
 
-    def __init__(self, x: dict[str, float], contacts: tuple[str, ...]) -> None:
+    def __init__(self, x: dict[str, float], contacts: tuple[Contact, ...]) -> None:
         self.x = x
         self.maximum = self.minimum = self.mean = self.final = x
         self.peak = {name: abs(value) for name, value in x.items()}
         self.amplitude = dict.fromkeys(x, 0.0)
-        self.dissipated = dict.fromkeys(contacts, 0.0)
-        self.stick_fraction = dict.fromkeys(contacts, 1.0)
+        self.dissipated = {contact.name: 0.0 for contact in contacts}
+        self.stick_fraction = {contact.name: 1.0 for contact in contacts if contact.law.is_set_valued}
         self.energy = {name: 0.0 for name, value in x.items() if value == 0.0}
 
     def harmonic(self, name: str, k: int) -> complex:
@@ -38,4 +43,4 @@ class AtRest(Rung):
         start = scene.model.start_values()
         if scene.model.discrete:
             raise DoesNotApply("the model has discrete states, which change without motion")
-        return Rest(start, tuple(contact.name for contact in scene.model.contacts))
+        return Rest(start, scene.model.contacts)

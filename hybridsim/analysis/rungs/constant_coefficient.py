@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hybridsim.analysis.rungs.forces import with_law, with_parameters
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Contact, Model
 from hybridsim.model.law import SPEED
@@ -14,7 +14,7 @@ _MEAN = "mean_speed"
 
 
 def _need_velocity_law(model: Model) -> None:
-    need_contacts(model)
+    need_stick(model)
     if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
         raise DoesNotApply("the law of a contact is a table, or not the same forward and backward")
     if not any(SPEED in contact.law.slip.names for contact in model.contacts):

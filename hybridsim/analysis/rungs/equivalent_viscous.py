@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.analysis.rungs.describing import FirstHarmonic
 from hybridsim.analysis.rungs.forces import with_forces, with_parameters
 from hybridsim.analysis.rungs.linear_response import LinearResponse, NotLinear
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.errors import HybridsimError
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Model, Output
@@ -41,7 +41,7 @@ class EquivalentViscous(Rung):
     def apply(self, scene: Scene) -> Model:
         """The model with a damper in place of each contact."""
         model = scene.model
-        need_contacts(model)
+        need_stick(model)
         period = _period(model)
         forces = [FirstHarmonic(model, contact) for contact in model.contacts]
         wishes = {f"c_eq_{c.name}": 0.0 for c in model.contacts}

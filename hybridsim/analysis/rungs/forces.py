@@ -12,12 +12,13 @@ from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parame
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
     """The model with a component of one mode for each contact, which sets its force to an expression.
 
-    Other automata of a contact, of lift-off, stay.
+    Other automata of a contact, of lift-off, stay; the states that a law with memory brings go with it.
     """
     components = tuple(
         Component(c.name, (Mode(mode, set={c.name: forces[c.name]}),)) if part.name == c.name else part
         for c in model.contacts
         for part in model.components_of(c)
+        if not _is_copy(c, part)
     )
     outputs = tuple(
         replace(output, modes={p: e for p, e in output.modes.items() if p.split(".")[0] not in forces})
@@ -30,6 +31,12 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
         outputs=outputs,
         title=f"{model.title or model.name}, {title}",
     )
+
+
+def _is_copy(contact: Contact, part: Component) -> bool:
+    """Whether an automaton is that of one of several copies of a law, whose forces are added up."""
+    number = part.name.removeprefix(f"{contact.name}_")
+    return contact.law.copies is not None and number != part.name and number.isdecimal()
 
 
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:

@@ -12,7 +12,7 @@ from hybridsim.analysis.closed_forms.coulomb_model import Recognised, recognise
 from hybridsim.analysis.closed_forms.den_hartog import no_stops
 from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
 from hybridsim.analysis.closed_forms.slip_phase import SlipPhase
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.model import Model
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -108,7 +108,7 @@ def held(model: Model) -> _Held:
     ------
     DoesNotApply where the model is another one, or its motion stops.
     """
-    need_contacts(model)
+    need_stick(model)
     found = recognise(model)
     if found is None or not found.system.force:
         raise DoesNotApply("the model is no linear oscillator with one Coulomb contact under one sine")

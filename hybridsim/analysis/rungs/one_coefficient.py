@@ -6,7 +6,7 @@ import random
 from dataclasses import replace
 
 from hybridsim.analysis.rungs.forces import inlined, with_law
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Contact, Model
 from hybridsim.model.law import SPEED
@@ -24,7 +24,7 @@ class OneCoefficient(Rung):
     def apply(self, scene: Scene) -> Model:
         """The model with the limit of stick lowered to the force of slow sliding."""
         model = scene.model
-        need_contacts(model)
+        need_stick(model)
         if any(contact.law.tables for contact in model.contacts):
             raise DoesNotApply("the law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]

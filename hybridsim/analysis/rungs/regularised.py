@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.errors import HybridsimError
 from hybridsim.model import Model
 
@@ -14,7 +14,7 @@ class _Regularised(Rung):
 
     def apply(self, scene: Scene) -> Model:
         """The model with every contact regularised."""
-        need_contacts(scene.model)
+        need_stick(scene.model)
         v0 = scene.v0
         if v0 is None:
             if not scene.peak:

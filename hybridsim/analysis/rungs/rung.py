@@ -63,5 +63,10 @@ def need_contacts(model: Model) -> None:
     """Rungs are about friction: without a contact there is nothing to drop."""
     if not model.contacts:
         raise DoesNotApply("the model has no contact")
+
+
+def need_stick(model: Model) -> None:
+    """Rungs that change a law's modes are about laws that have them."""
+    need_contacts(model)
     if not all(contact.law.is_set_valued for contact in model.contacts):
         raise DoesNotApply("the law of a contact gives a force of its own, without stick")

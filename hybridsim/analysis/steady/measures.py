@@ -7,8 +7,12 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from hybridsim.analysis.steady.orbit import Orbit, orbit_of
 from hybridsim.errors import UsageError, nearest
+from hybridsim.expr import evaluate
+from hybridsim.expr.grammar import TIME
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,11 +131,29 @@ class Measures:
     @property
     def dissipated(self) -> ByName:
         """Work of friction over the period: the integral of the force times the relative velocity, by contact."""
+        remember = [c.name for c in self.solution.model.contacts if c.name not in self._contacts]
         return ByName(
-            self._contacts,
-            lambda c: self._orbit.integral(self._orbit.of(c) * self._orbit.of(f"velocity of {c}")),
+            (*self._contacts, *remember),
+            lambda c: self._orbit.integral(self._orbit.of(c) * self._velocity(c)),
             "contact",
         )
+
+    def _velocity(self, contact: str) -> np.ndarray:
+        """Relative velocity of a contact at the orbit's points; of a law with memory from its expression."""
+        orbit, model = self._orbit, self.solution.model
+        if f"velocity of {contact}" in orbit.names:
+            return orbit.of(f"velocity of {contact}")
+        velocity = next(c.velocity for c in model.contacts if c.name == contact)
+        if velocity.text in orbit.names:
+            return orbit.of(velocity.text)
+        known, times = model.parameter_values(), self.solution.t_start + orbit.times
+        rows = {name: orbit.of(name).ravel() for name in velocity.names & set(orbit.names)}
+        rows |= {TIME: times.ravel()} if TIME in velocity.names else {}
+        found = [
+            evaluate(velocity, known | {name: float(row[k]) for name, row in rows.items()})
+            for k in range(times.size)
+        ]
+        return np.reshape(found, times.shape)
 
     @property
     def stick_fraction(self) -> ByName:

@@ -61,6 +61,11 @@ class Orbit:
         """Length of the stretch."""
         return float(self.lengths.sum())
 
+    @property
+    def times(self) -> np.ndarray:
+        """Of the points (K, POINTS), counted from the beginning of the run."""
+        return self.starts[:, None] + 0.5 * self.lengths[:, None] * (1.0 + NODES)
+
     def of(self, name: str) -> np.ndarray:
         """Values (K, POINTS) of one quantity."""
         return self.values[:, :, self.names.index(name)]

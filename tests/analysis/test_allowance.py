@@ -1,0 +1,32 @@
+"""What a stopwatch leaves out, and that an allowance ends."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from hybridsim.analysis.allowance import Allowance, OutOfTime, Stopwatch
+from hybridsim.engine import jit
+
+
+def _twice(x: float) -> float:
+    return 2.0 * x
+
+
+@pytest.mark.skipif(not jit.ENABLED, reason="the compiler is switched off")
+def test_a_stopwatch_stands_still_while_a_kernel_is_compiled() -> None:
+    before, began, watch = jit.seconds_compiling(), time.perf_counter(), Stopwatch()
+    assert jit.kernel(_twice)(1.0) == 2.0
+    seconds, spent = watch.seconds, time.perf_counter() - began
+    compiled = jit.seconds_compiling() - before
+    assert 0.0 < compiled < spent
+    assert seconds <= spent - compiled
+
+
+def test_an_allowance_is_looked_at_until_it_is_over() -> None:
+    looks: list[None] = []
+    Allowance(1e9, lambda: looks.append(None))(0.5)
+    assert len(looks) == 1
+    with pytest.raises(OutOfTime, match="not done after"):
+        Allowance(-1.0)()
