@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
+from hybridsim.analysis.advise.ladder import NOT_ADEQUATE, duration
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.sweep_readings import label_parameter, positions
@@ -16,9 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridsim.analysis import Advice
+    from hybridsim.analysis.advise.ladder import Step
 
-_FLOOR = 1e-16  # errors below rounding are drawn there
-_TOP = 1e2  # and infinite ones there
+# The axis of errors: at least that many times the tolerance to both sides, and at most so many, with some room.
+_NEAR, _FAR, _ROOM = 30.0, 1e5, 2.0
+_TOP_LINE = -0.75  # above the first rung, in rungs
 _NOTHING = "#d8d8d8"  # grey is no rung's colour
 _COLOURS = {
     "at-rest": "#4d4d4d", "no-friction": "#a6cee3", "viscous": "#1f78b4", "no-stop": "#33a02c",
@@ -30,8 +35,9 @@ _COLOURS = {
 def advice(found: Advice, axes: Axes | None = None) -> Axes:
     """Draw an advice: the ladder of one scene, or the map of a region of two parameters.
 
-    In the ladder a bar is the error of a rung against the full model, the line the tolerance; a rung without a bar does
-    not apply, or gives no value.
+    In the ladder a stem leads from the tolerance to the error of a rung against the full model: to the left, filled,
+    where it is adequate, with an arrow where it lies beyond the axis. Beside it stand error and cost. A rung without a
+    stem does not apply, gives no value or was stopped.
     """
     if axes is None:
         size = (6.4, 4.2) if found.region is not None else (7.2, 0.34 * len(found.ladder) + 1.4)
@@ -45,39 +51,56 @@ def advice(found: Advice, axes: Axes | None = None) -> Axes:
 
 def _ladder(found: Advice, axes: Axes) -> None:
     steps = [step for step in found.ladder if step.name != "full model"]
+    low, high = _window([step.error for step in steps if step.value is not None], found.tol)
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    axes.axvspan(low, found.tol, color=style.MARK, alpha=0.3, linewidth=0.0, zorder=0)
+    axes.axvline(found.tol, color=style.INK, linewidth=1.2)
     for k, step in enumerate(steps):
         if step.value is None:
-            axes.text(
-                0.01,
-                k,
-                step.verdict,
-                transform=axes.get_yaxis_transform(),
-                va="center",
-                fontsize=8,
-                color=style.FAINT,
-            )
+            word = "no value" if step.verdict == NOT_ADEQUATE else step.verdict
+            axes.text(1.1 * found.tol, k, word, va="center", fontsize=8, color=style.FAINT)
             continue
-        error = min(max(step.error, _FLOOR), _TOP)
-        axes.barh(
-            k, error, left=0.0, height=0.6, color=_COLOURS[step.name], alpha=1.0 if step.is_adequate else 0.45
-        )
-    axes.set_xscale("log")
-    axes.set_xlim(_FLOOR, _TOP)
-    axes.axvline(found.tol, color=style.INK, linewidth=1.2)
+        _draw(axes, k, step, found.tol, (low, high))
+        _beside(axes, k, f"{_short(step.error)}, {duration(step.seconds)}", style.INK)
+    _beside(axes, _TOP_LINE, "error, cost", style.FAINT)
     axes.text(
-        found.tol,
-        1.0,
-        f" tolerance {found.tol:g}",
-        transform=axes.get_xaxis_transform(),
-        fontsize=8,
-        va="bottom",
+        found.tol / 1.1, _TOP_LINE, f"adequate: up to {found.tol:g}", ha="right", va="center", fontsize=8
     )
     axes.set_yticks(range(len(steps)), [style.literal(step.name) for step in steps])
-    axes.invert_yaxis()
+    axes.set_ylim(len(steps) - 0.4, -1.2)
     style.dress(axes)
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel(style.literal(f"error of {found.quantity} against the full model"))
-    style.head(axes, f"{found.model.title or found.model.name}: {found.simplest.title}", " ")
+    axes.set_xlabel(style.literal(f"error of {found.quantity}, relative to the full model's value"))
+    style.head(axes, f"{found.model.name}, {found.quantity} within {found.tol:g}: {found.simplest.title}")
+
+
+def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
+    """Ends of the axis: the tolerance stands well inside, and so do all errors that are near enough to be compared."""
+    near = [e for e in errors if tol / _FAR <= e <= tol * _FAR]
+    return min([tol / _NEAR, *near]) / _ROOM, max([tol * _NEAR, *near]) * _ROOM
+
+
+def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
+    """A stem from the tolerance to the error, filled where it is adequate; an arrow where it lies beyond an end."""
+    low, high = ends
+    colour = style.PALETTE[0] if step.is_adequate else style.PALETTE[1]
+    at = min(max(step.error, low), high)
+    marker = "<" if step.error < low else ">" if step.error > high else "o"
+    axes.hlines(k, tol, at, color=colour, linewidth=1.6)
+    face = colour if step.is_adequate else "white"
+    axes.plot([at], [k], marker, color=colour, markerfacecolor=face, markersize=7, clip_on=False, zorder=3)
+
+
+def _beside(axes: Axes, y: float, text: str, colour: str) -> None:
+    """Text to the right of the axes, on the level of a rung."""
+    axes.text(
+        1.03, y, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=colour
+    )  # fmt: skip
+
+
+def _short(error: float) -> str:
+    return "\u221e" if math.isinf(error) else f"{error:.1e}" if 0.0 < error < 1e-3 else f"{error:.2g}"
 
 
 def _map(found: Advice, axes: Axes) -> None:
