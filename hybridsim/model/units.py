@@ -1,20 +1,66 @@
-"""Units of what a model names, as they were declared."""
+"""Units of what a model names, as they were declared; of a contact force from the load that presses it."""
 
 from __future__ import annotations
 
+import ast
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hybridsim.model.contact import Contact
     from hybridsim.model.model import Model
 
 
 def units_of(model: Model) -> dict[str, str]:
     """Names of states, outputs, contact forces, discrete states and inputs, in that order, with their units."""
     units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
-    rest = {contact.name: "" for contact in model.contacts} | {d.name: d.unit for d in model.discrete}
-    rest |= {declared.name: "" for declared in model.inputs}
+    rest = dict.fromkeys((contact.name for contact in model.contacts), "")
+    if missing := [contact for contact in model.contacts if contact.name not in units]:
+        rest |= _of_forces(model, missing)
+    rest |= {d.name: d.unit for d in model.discrete} | {declared.name: "" for declared in model.inputs}
     return units | {name: unit for name, unit in rest.items() if name not in units}
+
+
+def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:
+    """Of each friction force that of its load, coefficients having none; where that is a number, of a coefficient."""
+    known = {q.name: q.unit for q in model.states} | {q.name: q.unit for q in model.parameters}
+    known |= {q.name: q.unit for q in model.discrete}
+    definitions = {name: expression.tree for name, expression in model.definitions}
+    found = {}
+    for contact in contacts:
+        unit = _unit(contact.normal.tree, known, definitions)
+        if not contact.normal.names:
+            coefficients = [e for name, e in contact.arguments.items() if name.startswith("mu")]
+            unit = next((u for e in coefficients if (u := _unit(e.tree, known, definitions))), "")
+        found[contact.name] = unit
+    return found
+
+
+def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, ast.expr]) -> str:
+    """The unit of an expression where it is that of one of its parts; "" where units would have to be multiplied."""
+
+    def of(part: ast.expr) -> str:
+        return _unit(part, known, definitions)
+
+    match node:
+        case ast.Name(id=name):
+            unit = of(definitions[name]) if name in definitions else known.get(name, "")
+            return "" if unit == "1" else unit
+        case ast.UnaryOp(operand=operand):
+            return of(operand)
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+            return of(left) or of(right)
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            first, second = of(left), of(right)
+            return "" if first and second else first or second
+        case ast.BinOp(left=left, op=ast.Div(), right=right):
+            return "" if of(right) else of(left)
+        case ast.IfExp(body=body):
+            return of(body)
+        case ast.Call(func=ast.Name(id="abs" | "max" | "min"), args=args):
+            return next((unit for arg in args if (unit := of(arg))), "")
+    return ""
 
 
 def time_unit(model: Model) -> str:
