@@ -1,0 +1,47 @@
+"""The unit of a contact force is that of its load: coefficients have none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.model.units import units_of
+
+
+@pytest.mark.parametrize(
+    ("normal", "unit"),
+    [
+        ("N", "N"),
+        ("2*N/r", "N"),
+        ("N + N*sin(t)", "N"),
+        ("max(N - load, 0)", "N"),
+        ("load", "N"),
+        ("k*x", ""),  # N/m times m: nothing is multiplied here
+        ("N/x", ""),
+        ("3", ""),
+    ],
+)
+def test_of_a_contact_force(normal: str, unit: str) -> None:
+    model = hs.Model(
+        "press",
+        [hs.State("x", 1, "v", unit="m"), hs.State("v", 0, "-x - f", unit="m/s")],
+        [
+            hs.Parameter("N", 40, "N"),
+            hs.Parameter("r", 2, "1"),
+            hs.Parameter("k", 1, "N/m"),
+            hs.Parameter("mu", 0.5),
+        ],
+        contacts=[hs.Contact("f", "v", normal, "coulomb", {"mu": "mu"})],
+        definitions={"load": "0.5*N"},
+    )
+    assert units_of(model)["f"] == unit
+
+
+def test_it_stands_in_tables_and_readings() -> None:
+    model = replace(hs.load("dfcs"), outputs=())  # which declare a unit of their own
+    assert units_of(model)["f"] == "N"
+    assert hs.simulate(model, (0, 0.01)).table().units["f"] == "N"
+    # a load that is a number leaves the unit to the coefficient
+    assert units_of(hs.load("lugre-presliding"))["f"] == "N"
