@@ -22,6 +22,9 @@ from hybridsim.engine.cache import kernel_folder
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 
 
+_NOTICED = 1.0  # seconds of compiling that a person wonders about
+
+
 def _fill_nan(out: Any) -> None:
     for i in range(len(out)):
         out[i] = math.nan
@@ -48,6 +51,12 @@ if ENABLED:
 
         def on_start(self, event: Any) -> None:
             """A kernel, or one that another needs."""
+            if event.kind == "numba:compile":  # it was not in the cache, and comes within a lock
+                ours = event.data["dispatcher"].py_func.__module__.startswith("hybridsim.")
+                if ours and seconds_compiling() + time.perf_counter() - self.of.since > _NOTICED:
+                    # a part that no run has needed before, such as derivatives
+                    _tell("hybridsim: compiling the engine for this, once ...")
+                return
             depth = getattr(self.of, "depth", 0)
             if depth == 0:
                 self.of.since = time.perf_counter()
@@ -55,12 +64,15 @@ if ENABLED:
 
         def on_end(self, event: Any) -> None:
             """The kernel is ready."""
+            if event.kind == "numba:compile":
+                return
             self.of.depth -= 1
             if self.of.depth == 0:
                 self.of.spent = seconds_compiling() + time.perf_counter() - self.of.since
 
     _compiling = _Compiling()
-    event.register("numba:compiler_lock", _compiling)
+    for _kind in ("numba:compiler_lock", "numba:compile"):
+        event.register(_kind, _compiling)
 
     def seconds_compiling() -> float:
         """Seconds that this thread has spent so far on getting kernels ready."""
@@ -165,4 +177,13 @@ def announce_compilation() -> None:
     if ENABLED and not announced.exists():
         announced.parent.mkdir(parents=True, exist_ok=True)
         announced.touch()
-        print("hybridsim: compiling the engine, once (some 20 s) ...", file=sys.stderr, flush=True)
+        _tell("hybridsim: compiling the engine, once (some 20 s) ...")
+
+
+_told: set[str] = set()  # in this process: one line is enough
+
+
+def _tell(text: str) -> None:
+    if not _told:
+        _told.add(text)
+        print(text, file=sys.stderr, flush=True)

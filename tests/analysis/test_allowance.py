@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import pytest
 
@@ -30,3 +31,20 @@ def test_an_allowance_is_looked_at_until_it_is_over() -> None:
     assert len(looks) == 1
     with pytest.raises(OutOfTime, match="not done after"):
         Allowance(-1.0)()
+
+
+@pytest.mark.skipif(not jit.ENABLED, reason="the compiler is switched off")
+def test_compiling_that_takes_a_while_is_said_once(
+    capsys: pytest.CaptureFixture[str], monkeypatch: Any
+) -> None:
+    monkeypatch.setattr(jit, "_told", set())
+    monkeypatch.setattr(jit, "_NOTICED", 0.0)
+    numba = pytest.importorskip("numba")
+    for module in ("somebody.else", "hybridsim.engine.mine", "hybridsim.engine.mine"):
+
+        def doubled(x: float) -> float:
+            return 2.0 * x
+
+        doubled.__module__ = module
+        numba.njit(doubled)(1.0)  # not cached: it is compiled each time
+    assert capsys.readouterr().err == "hybridsim: compiling the engine for this, once ...\n"
