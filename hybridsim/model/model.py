@@ -155,11 +155,28 @@ class Model(Declared):
         ------
         UsageError for a name that is no parameter; ExpressionError for a value that is no expression.
         """
-        _known(changes, [parameter.name for parameter in self.parameters], "parameter", self.name)
+        names = [parameter.name for parameter in self.parameters]
+        _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
         changed = (
             replace(p, value=parse(changes[p.name])) if p.name in changes else p for p in self.parameters
         )
         return self._valued(parameters=tuple(changed))
+
+    def remedy_for_parameter(self, name: str, others: tuple[str, ...] = ()) -> str:
+        """What to do where a name is no parameter: near names, or how an argument of a law becomes a parameter."""
+        names = [parameter.name for parameter in self.parameters]
+        for contact in self.contacts:
+            if name not in contact.law.parameters:
+                continue
+            given = contact.arguments.get(name, contact.law.parameters[name])
+            if given is not None and given.text in names:
+                return f"contact {contact.name} has {name} = {given.text}: change {given.text}."
+            text = "its own default" if given is None else given.text
+            return (
+                f"{name} is an argument of the law of contact {contact.name}, written there as {text}: name a "
+                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}.'
+            )
+        return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
@@ -350,7 +367,13 @@ def _content(model: Model) -> tuple[object, ...]:
     return (model.name, *parts, *words, model.flow)
 
 
-def _known(changes: Mapping[str, Any], names: Iterable[str], kind: str, model: str) -> None:
+def _known(
+    changes: Mapping[str, Any],
+    names: Iterable[str],
+    kind: str,
+    model: str,
+    remedy: Callable[[str], str] | None = None,
+) -> None:
     allowed = as_tuple(names)
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
@@ -358,5 +381,5 @@ def _known(changes: Mapping[str, Any], names: Iterable[str], kind: str, model: s
         if name not in allowed:
             raise UsageError(
                 f"the model '{model}' has no {kind} '{name}'",
-                remedy=nearest(name, allowed, kind=f"{kind}s"),
+                remedy=remedy(name) if remedy else nearest(name, allowed, kind=f"{kind}s"),
             )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Branch
 
-_MARKERS = {"fold": "o", "period doubling": "s", "torus": "D", "sequence": "|"}
+_MARKERS = {"fold": "o", "branch point": "P", "period doubling": "s", "torus": "D", "sequence": "|"}
 _TITLES = {"sequence": "sequence of modes changes"}
 
 

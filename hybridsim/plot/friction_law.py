@@ -23,7 +23,7 @@ def friction_law(
     law: FrictionLaw | str,
     arguments: Mapping[str, float] | None = None,
     *,
-    speed: float,
+    speed: float | None = None,
     normal: float = 1.0,
     amplitude: float = 1.0,
     mean: float = 0.0,
@@ -39,9 +39,13 @@ def friction_law(
     ----------
     law : a law, or the name of one that comes with the package.
     arguments : values of its parameters.
-    speed : largest velocity (about the mean).
+    speed : largest velocity (about the mean); has to be given, since no law knows how fast it is used.
     """
     found = load_law(law) if isinstance(law, str) else law
+    if speed is None:
+        raise UsageError(
+            f"friction_law({found.name!r}) has no speed", remedy="give speed=, the largest velocity to draw"
+        )
     if not speed > 0 or not amplitude > 0:
         raise UsageError(f"speed is {speed!r}, amplitude is {amplitude!r}", remedy="give numbers above zero")
     given = {name: parse(value) for name, value in (arguments or {}).items()}

@@ -275,6 +275,18 @@ def test_it_says_that_no_simpler_model_could_be_tried() -> None:
     assert found.remarks == ("no simpler model could be tried: no rung applies to this model",)
 
 
+def test_verdicts_say_what_there_is_to_say() -> None:
+    found = hs.advise(hardening(2.0), "amplitude.x", rungs=["mu_s=mu_k", "no-stop"])
+    assert found["mu_s=mu_k"].verdict == "nothing to drop" and "mu_s = mu_k already" in found["mu_s=mu_k"].why
+    assert found["no-stop"].verdict == "does not apply"
+    exact = next(setting for setting in found.settings if setting.integrator == "exact")
+    assert exact.verdict == "does not apply" and "closed form takes modes that are linear" in exact.why
+    constant = hs.advise("dfcs", "amplitude.x", rungs=["constant-mu-mean"], integrators=False)[
+        "constant-mu-mean"
+    ]
+    assert constant.verdict == "nothing to drop" and "mu is constant already" in constant.why
+
+
 def hardening(F0: float) -> hs.Model:
     """A cubic spring on a contact that holds 4 and slides with a Stribeck force."""
     law = hs.load_law("stribeck-exponential")
@@ -336,6 +348,11 @@ def test_what_does_not_fit_the_budget_is_left_out_and_said() -> None:
         ({"quantity": "amplitude.x", "uncertain": {"mu": 0.3}}, "mu"),
         ({"quantity": "amplitude.x", "uncertain": {"mu": (0.3, 0.2)}}, "low < high"),
         ({"quantity": "amplitude.x.2"}, "amplitude.x"),
+        (
+            {"quantity": "amplitude.x", "uncertain": {"mu": (0.2, 0.3)}},
+            r"mu is in \[0.2, 0.3\], and the model has mu = 0.5",
+        ),
+        ({"quantity": "amplitude.x", "uncertain": {"nu": (0.2, 0.3)}}, "no parameter"),
     ],
 )
 def test_what_is_refused(arguments: dict[str, Any], words: str) -> None:

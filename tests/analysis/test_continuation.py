@@ -85,3 +85,23 @@ def test_bad_questions_are_refused() -> None:
         hs.continuation("dfcs", "F0", (1, 2))
     with pytest.raises(UsageError, match="no periodic orbit"):
         hs.continuation("free-decay", "mu", (0.05, 0.2))
+
+
+def test_a_pitchfork_is_marked_where_it_is() -> None:
+    """y = (sin t - cos t)/2 has the mean square 1/4: along x = 0 the multiplier is exp(2 pi (a - 3/4)) exactly."""
+    model = hs.Model(
+        "pitchfork",
+        parameters={"a": 0.6},
+        states=[hs.State("x", 0, "(a - 1 + y**2)*x - x**3"), hs.State("y", 0, "-y + sin(t)")],
+    )
+    found = hs.continuation(model, "a", (0.5, 0.95))
+    (special,) = found.special
+    assert special.kind == "branch point" and special.parameter == pytest.approx(0.75, abs=1e-3)
+    assert (found.stable == (found.parameter < 0.75)).all()
+    assert found.message == "it ends at a = 0.5 (the bound) and at a = 0.95 (the bound)"
+    # beyond it the branch that crosses attracts what does not start on the symmetric one
+    assert hs.steady_state(model, params={"a": 0.9}, x0={"x": 1e-3}).mean["x"] > 0.1
+
+
+def test_a_fold_is_no_branch_point(branch: hs.Branch) -> None:
+    assert "branch point" not in {special.kind for special in branch.special}

@@ -11,6 +11,7 @@ import pytest
 from model.samples import block, everything
 
 import hybridsim as hs
+from hybridsim.errors import UsageError
 
 
 def test_a_model_and_a_law_in_under_twenty_lines() -> None:
@@ -168,3 +169,23 @@ def test_structure_is_blind_to_what_code_does_not_depend_on(change: str) -> None
 def test_structure_sees_what_code_depends_on(change: str) -> None:
     model = everything()
     assert OTHER[change](model).structure() != model.structure()
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("0.3", r"written there as 0.3: name a parameter, mu = 0.3 under \[parameters\], and write"),
+        ("friction", "contact f has mu = friction: change friction"),
+    ],
+)
+def test_an_argument_of_a_law_is_no_parameter_and_how_it_becomes_one(argument: str, words: str) -> None:
+    states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x - f")]
+    contact = hs.Contact("f", "v", "1", "coulomb", {"mu": argument})
+    model = hs.Model("m", states, {"friction": 0.3}, contacts=[contact])
+    for ask in (
+        lambda: model.with_(mu=0.4),
+        lambda: hs.sweep(model, {"mu": [0.3, 0.4]}, "final", t_span=(0, 1)),
+        lambda: hs.continuation(model, "mu", (0.2, 0.4)),
+    ):
+        with pytest.raises(UsageError, match=words):
+            ask()

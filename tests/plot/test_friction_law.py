@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
+from hybridsim.errors import UsageError
 from hybridsim.plot import friction_law
 
 
@@ -29,3 +30,8 @@ def test_a_law_with_states_is_a_loop_as_well() -> None:
 def test_a_picture_needs_a_speed() -> None:
     with pytest.raises(hs.UsageError, match="speed is 0"):
         friction_law("coulomb", {"mu": 0.5}, speed=0)
+
+
+def test_a_law_does_not_know_how_fast_it_is_used() -> None:
+    with pytest.raises(UsageError, match="give speed="):
+        friction_law("coulomb", {"mu": 0.5})

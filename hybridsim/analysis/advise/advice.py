@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE, Step, duration
+from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, Step, duration
 from hybridsim.analysis.advise.question import Number
 from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
@@ -105,7 +105,10 @@ class Advice:
             "integrator": None if self.integrator is None else self.integrator.title,
             "ladder": [_fields(s, "name title drops value error seconds verdict why") for s in self.ladder],
             "settings": [
-                {**_fields(s, "integrator value error seconds is_adequate why"), "options": dict(s.options)}
+                {
+                    **_fields(s, "integrator value error seconds verdict is_adequate why"),
+                    "options": dict(s.options),
+                }
                 for s in self.settings
             ],
             "certificates": list(self.certificates),
@@ -141,7 +144,7 @@ def _remarks(advice: Advice) -> list[str]:
     found = [advice.left_out] if advice.left_out else []
     simplest, full = advice.simplest, advice.ladder[-1]
     where = " everywhere in the region" if advice.region is not None else ""
-    if all(step.verdict in (NOT_APPLICABLE, FULL) for step in advice.ladder):
+    if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
         found.append("no simpler model could be tried: no rung applies to this model")
     elif simplest.verdict == FULL and len(advice.ladder) > 1:
         found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")

@@ -106,7 +106,7 @@ def advise(
     span = None if t_span is None else arguments.time_span(t_span)
     question = question_of(model, quantity, span, accuracy)
     width = None if v0 is None else positive(v0, "v0")
-    chosen, ranges = _chosen(rungs), None if uncertain is None else ranges_of(uncertain)
+    chosen, ranges = _chosen(rungs), None if uncertain is None else ranges_of(model, uncertain)
     spending = Budget(_spendable(budget, over is not None))
     seen = watched(model)
     if over is not None:

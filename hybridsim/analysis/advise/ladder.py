@@ -13,11 +13,13 @@ from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, Questio
 from hybridsim.analysis.allowance import Allowance, OutOfTime, Stopwatch
 from hybridsim.analysis.race import Budget
 from hybridsim.analysis.rows import NOT_STARTED, STOPPED
-from hybridsim.analysis.rungs import DoesNotApply, Rung, Scene
+from hybridsim.analysis.rungs import DoesNotApply, NothingToDrop, Rung, Scene
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.model import Model
 
 ADEQUATE, NOT_ADEQUATE, NOT_APPLICABLE, FULL = "adequate", "not adequate", "does not apply", "full model"
+NOTHING_TO_DROP = "nothing to drop"
+WITHOUT_TRIAL = (NOT_APPLICABLE, NOTHING_TO_DROP)  # verdicts that no run stands behind
 _AGAIN_BELOW = (
     2.0  # seconds: what takes longer is not done twice to have it without making the model's functions
 )
@@ -39,7 +41,8 @@ class Step:
     value : of the quantity; None where the rung gives none.
     error : relative to the full model's value; inf where that is zero and this one is not.
     seconds : measured, for the value.
-    verdict : "adequate", "not adequate", "does not apply", "full model"; "stopped" for a rung that has become far
+    verdict : "adequate", "not adequate", "does not apply", "nothing to drop" where the model has not got what the
+        rung would drop, "full model"; "stopped" for a rung that has become far
         dearer than the full model, "not started" where the budget was spent.
     why : a sentence.
     model : the simpler model, where it is one.
@@ -145,6 +148,8 @@ def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float
             answer = limits.warm(partial(question.ask, simpler), allowance)
         else:
             answer = limits.warm(partial(_formula, rung, watched, question), allowance)
+    except NothingToDrop as reason:
+        return _without(rung, NOTHING_TO_DROP, str(reason), model)
     except DoesNotApply as reason:
         return _without(rung, NOT_APPLICABLE, str(reason), model)
     except NoAnswer as reason:

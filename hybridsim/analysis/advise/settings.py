@@ -8,10 +8,18 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from hybridsim.analysis.advise.ladder import Limits, Watch, relative_error
+from hybridsim.analysis.advise.ladder import (
+    ADEQUATE,
+    NOT_ADEQUATE,
+    NOT_APPLICABLE,
+    Limits,
+    Watch,
+    relative_error,
+)
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
 from hybridsim.analysis.allowance import OutOfTime, Stopwatch
-from hybridsim.errors import HybridsimError
+from hybridsim.analysis.rows import NOT_STARTED, STOPPED
+from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 
@@ -26,6 +34,7 @@ _FAMILIES: tuple[tuple[str, str], ...] = (
     ("rk4-sign", "steps"),
 )
 _SHOOTING = "steady_state"
+FAILED = "failed"
 _FEWEST, _MOST = 8, 1000  # periods of settling
 _NEUTRAL = 1.0 - 1e-6  # a multiplier from there on stands for what stays
 _SHARE = 0.01  # of the tolerance: what settling may leave over
@@ -41,7 +50,8 @@ class Setting:
     integrator, options : as for `simulate`; "steady_state" is the call of that name.
     value, error : of the quantity; the error is relative to the accurate value.
     seconds : measured.
-    is_adequate : whether it is within the tolerance.
+    verdict : "adequate", "not adequate", "does not apply" where the integrator cannot run the model, "failed",
+        "stopped", "not started".
     why : what went wrong, if anything.
     """
 
@@ -50,8 +60,13 @@ class Setting:
     value: Number | None = None
     error: float = math.inf
     seconds: float = math.nan
-    is_adequate: bool = False
+    verdict: str = FAILED
     why: str = ""
+
+    @property
+    def is_adequate(self) -> bool:
+        """Whether it is within the tolerance."""
+        return self.verdict == ADEQUATE
 
     @property
     def title(self) -> str:
@@ -125,15 +140,17 @@ def _measured(
     limits: Limits,
 ) -> Setting:
     if not limits.budget.left:
-        return Setting(name, options, why=limits.spent)
+        return Setting(name, options, verdict=NOT_STARTED, why=limits.spent)
     try:
         answer = limits.warm(ask, limits.allowance(full))
     except NoAnswer as reason:
-        return Setting(name, options, why=str(reason))
+        refused = isinstance(reason.__cause__, UsageError)
+        return Setting(name, options, verdict=NOT_APPLICABLE if refused else FAILED, why=str(reason))
     except OutOfTime as fault:
-        return Setting(name, options, why=limits.reason(fault, full))
+        return Setting(name, options, verdict=STOPPED, why=limits.reason(fault, full))
     error = relative_error(answer.value, full.value)
-    return Setting(name, options, answer.value, error, answer.seconds, error <= tol)
+    verdict = ADEQUATE if error <= tol else NOT_ADEQUATE
+    return Setting(name, options, answer.value, error, answer.seconds, verdict)
 
 
 def _settling(question: Question, motion: Any, tol: float) -> _Settling:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from hybridsim.analysis.advise.ladder import FULL, NOT_APPLICABLE, duration
+from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, duration
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice
@@ -31,7 +31,7 @@ def _conclusion(advice: Advice) -> str:
         return f"over {advice.region.status.size} points of {', '.join(advice.region.axes)}"
     simplest, setting = advice.simplest, advice.integrator
     how = f"; run the full model by {setting.title}" if setting is not None else ""
-    if all(step.verdict in (NOT_APPLICABLE, FULL) for step in advice.ladder):
+    if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
         return f"no simpler model could be tried, so the full model it is{how}"
     if simplest.verdict == FULL:
         return f"the full model is needed{how}"
@@ -45,7 +45,7 @@ def _ladder(advice: Advice) -> list[tuple[str, ...]]:
 
 def _row(step: Step) -> tuple[str, ...]:
     value = "" if step.value is None or _is_nan(step.value) else f"{step.value:.7g}"
-    error = "" if step.verdict == NOT_APPLICABLE or (step.value is None) else f"{step.error:.2e}"
+    error = "" if step.verdict in WITHOUT_TRIAL or step.value is None else f"{step.error:.2e}"
     return (step.name, value, error, _cost(step.seconds), step.verdict, step.why)
 
 
@@ -54,9 +54,7 @@ def _settings(advice: Advice) -> list[tuple[str, ...]]:
     for s in advice.settings:
         value = "" if s.value is None else f"{s.value:.7g}"
         error = "" if s.value is None else f"{s.error:.2e}"
-        rows.append(
-            (s.title, value, error, _cost(s.seconds), "adequate" if s.is_adequate else "not adequate", s.why)
-        )
+        rows.append((s.title, value, error, _cost(s.seconds), s.verdict, s.why))
     return rows
 
 

@@ -28,19 +28,29 @@ class Spread:
     relative: float
 
 
-def ranges_of(given: Any) -> dict[str, tuple[float, float]]:
-    """Ranges by parameter, checked."""
+def ranges_of(model: Model, given: Any) -> dict[str, tuple[float, float]]:
+    """Ranges by parameter, checked: each holds the model's own value, which is what the answer is given for."""
     if not isinstance(given, Mapping) or not given:
         raise UsageError(f"uncertain is {given!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}")
     if len(given) > _MOST:
         raise UsageError(f"uncertain has {len(given)} ranges", remedy=f"give at most {_MOST}")
-    found = {}
+    found, known = {}, model.parameter_values()
     for name, ends in given.items():
         if not is_row(ends) or len(ends) != 2:
             raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high)")
         low, high = (number(end, f"an end of the range of {name}") for end in ends)
         if not low < high:
             raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high) with low < high")
+        if name not in known:
+            raise UsageError(
+                f"uncertain has {name!r}, and model {model.name} has no parameter of that name",
+                remedy=model.remedy_for_parameter(str(name)),
+            )
+        if not low <= known[name] <= high:
+            raise UsageError(
+                f"uncertain says that {name} is in [{low:g}, {high:g}], and the model has {name} = {known[name]:g}",
+                remedy="give a range that holds the model's own value, or another value with params",
+            )
         found[str(name)] = (low, high)
     return found
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.steady.shooting import Orbit
 
 _ON_THE_CIRCLE = 1e-9
+_CLEAR = 1e-7  # from +1: what is nearer is there to stay, but for the rounding of derivatives
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class BranchPoint:
 class Special:
     """Where a branch changes its kind, between two of its points.
 
-    kind : "fold" (the branch turns back in the parameter), "period doubling" (a multiplier passes -1), "torus" (a pair
+    kind : "fold" (the branch turns back in the parameter), "branch point" (a multiplier passes +1 and it does not turn:
+        another branch crosses, as where a symmetry breaks), "period doubling" (a multiplier passes -1), "torus" (a pair
         passes the unit circle), "sequence" (the modes it goes through change: a graze, or a stop that appears).
     parameter : its value there, interpolated.
     index : number of the point before it.
@@ -73,7 +75,7 @@ class Branch:
     ----------
     name : of the parameter.
     points : in order along the branch; the parameter need not be monotone.
-    special : folds, period doublings, tori, changes of the sequence of modes.
+    special : folds, branch points, period doublings, tori, changes of the sequence of modes.
     message : why it ended, at both ends.
     """
 
@@ -119,7 +121,30 @@ def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
         found += _crossings(a, b, i)
         if i > 0 and (a.parameter - points[i - 1].parameter) * (b.parameter - a.parameter) < 0.0:
             found.append(Special("fold", _turn(points[i - 1], a, b), i))
-    return tuple(found)
+    return tuple(sorted([*found, *_branchings(points, found)], key=lambda s: s.index))
+
+
+def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[Special]:
+    """Where a multiplier passes +1 and the branch does not turn: another one begins there.
+
+    The sign of the product of 1 - m over all multipliers tells; each fold accounts for the change next to it.
+    """
+    folds = [s.index for s in found if s.kind == "fold"]
+    branchings = []
+    for i, (a, b) in enumerate(pairwise(points)):
+        if a.word != b.word or len(a.multipliers) != len(b.multipliers):
+            continue
+        below, above = (float(np.prod(1.0 - p.multipliers).real) for p in (a, b))
+        clear = all(np.abs(1.0 - p.multipliers).min(initial=np.inf) > _CLEAR for p in (a, b))
+        if not (clear and below * above < 0.0):
+            continue
+        nearest = min(folds, key=lambda k: abs(k - i), default=None)
+        if nearest is not None and -1 <= nearest - i <= 2:
+            folds.remove(nearest)
+            continue
+        at = a.parameter + below / (below - above) * (b.parameter - a.parameter)
+        branchings.append(Special("branch point", at, i))
+    return branchings
 
 
 def _crossings(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:

@@ -20,7 +20,7 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import sizes
-from hybridsim.errors import HybridsimError, UsageError, nearest
+from hybridsim.errors import HybridsimError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -75,7 +75,7 @@ def continuation(
 
     Returns
     -------
-    Branch, with folds, period doublings, tori and changes of the sequence of modes marked.
+    Branch, with folds, branch points, period doublings, tori and changes of the sequence of modes marked.
 
     Errors
     ------
@@ -93,7 +93,7 @@ def continuation(
     if parameter not in names:
         raise UsageError(
             f"model {model.name} has no parameter {parameter!r}",
-            remedy=nearest(str(parameter), names, kind="parameters"),
+            remedy=model.remedy_for_parameter(str(parameter)),
         )
     low, high = arguments.time_span(bounds)
     value = model.parameter_values()[parameter]
@@ -125,7 +125,7 @@ def continuation(
             progress(0.5 * (number + 1))
     (backward, why_low), (forward, why_high) = sides
     points = (*reversed(backward), first.point, *forward)
-    return Branch(parameter, points, specials(points), f"{why_low}; {why_high}")
+    return Branch(parameter, points, specials(points), f"it ends at {why_low} and at {why_high}")
 
 
 class _Follower:
@@ -169,18 +169,20 @@ class _Follower:
                     at = here.point.parameter
                     return (
                         found,
-                        f"no orbit next to {self.parameter} = {at:.9g} was found (a graze, or its end)",
+                        f"{self.parameter} = {at:.9g} (no orbit next to it was found: a graze, or its end)",
                     )
                 continue
             value = there.point.parameter
             if not self.bounds[0] <= value <= self.bounds[1]:
-                return found + self._at_bound(here.point, there.point), "the bound was reached"
+                return found + self._at_bound(
+                    here.point, there.point
+                ), f"{self.parameter} = {self.bounds[0 if value < self.bounds[0] else 1]:g} (the bound)"
             found.append(there.point)
             tangent = self._tangent(there, tangent)
             here = there
             if count <= _FEW:
                 step = min(step * _MORE, _LARGEST)
-        return found, f"{self.max_points} points"
+        return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
         """The orbit at the bound between two points, if Newton's method finds it."""

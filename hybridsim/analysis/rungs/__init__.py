@@ -9,9 +9,9 @@ from hybridsim.analysis.rungs.no_friction import NoFriction
 from hybridsim.analysis.rungs.no_stop import NoStop
 from hybridsim.analysis.rungs.one_coefficient import OneCoefficient
 from hybridsim.analysis.rungs.regularised import Arctan, Karnopp, Tanh
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene
+from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Scene
 
-__all__ = ["LADDER", "DoesNotApply", "Rung", "Scene"]
+__all__ = ["LADDER", "DoesNotApply", "NothingToDrop", "Rung", "Scene"]
 
 # From the simplest up: no motion, linear models, a formula, fewer numbers in the law, the law without its corner.
 LADDER: tuple[Rung, ...] = (

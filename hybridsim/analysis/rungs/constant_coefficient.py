@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hybridsim.analysis.rungs.forces import with_law, with_parameters
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Contact, Model
 from hybridsim.model.law import SPEED
@@ -18,7 +18,7 @@ def _need_velocity_law(model: Model) -> None:
     if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
         raise DoesNotApply("the law of a contact is a table, or not the same forward and backward")
     if not any(SPEED in contact.law.slip.names for contact in model.contacts):
-        raise DoesNotApply("no friction force depends on the speed")
+        raise NothingToDrop("mu is constant already: no friction force depends on the speed")
 
 
 class ConstantAtRest(Rung):

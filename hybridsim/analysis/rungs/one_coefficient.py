@@ -6,7 +6,7 @@ import random
 from dataclasses import replace
 
 from hybridsim.analysis.rungs.forces import inlined, with_law
-from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Contact, Model
 from hybridsim.model.law import SPEED
@@ -29,7 +29,9 @@ class OneCoefficient(Rung):
             raise DoesNotApply("the law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
-            raise DoesNotApply("no contact holds more at rest than it slides with")
+            raise NothingToDrop(
+                "mu_s = mu_k already: every contact breaks loose at the force with which it slides"
+            )
         contacts = tuple(
             _lowered(contact) if jump else contact
             for contact, jump in zip(model.contacts, jumps, strict=True)

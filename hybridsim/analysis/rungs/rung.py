@@ -15,6 +15,10 @@ class DoesNotApply(Exception):
     """A rung cannot stand for a model; the text says why."""
 
 
+class NothingToDrop(DoesNotApply):
+    """A model has not got what a rung would drop: it is on that rung already; the text says why."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """The full model and what is known of its motion, from which a rung takes the numbers it needs.

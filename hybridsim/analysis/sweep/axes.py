@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.arguments import is_row, number
-from hybridsim.errors import ExpressionError, UsageError, nearest
+from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, parse, require_names, resolve
 from hybridsim.model import Model
 
@@ -99,7 +99,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         if name not in units and name not in starts:
             raise UsageError(
                 f"model {model.name} has no parameter or state {name!r} to sweep over",
-                remedy=nearest(str(name), [*units, *starts], kind="parameters and states"),
+                remedy=model.remedy_for_parameter(str(name), tuple(starts)),
             )
     settings = {name: _settings(name, row) for name, row in values.items()}
     lengths = {name: len(row) for name, row in settings.items()}

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
@@ -74,7 +74,7 @@ def sensitivities(
         if name not in names:
             raise UsageError(
                 f"model {model.name} has no parameter {name!r}",
-                remedy=nearest(name, names, kind="parameters"),
+                remedy=model.remedy_for_parameter(name),
             )
     _refuse(solution)
     chosen = tuple(names if parameters is None else parameters)
