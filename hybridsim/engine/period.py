@@ -24,12 +24,17 @@ def system_period(system: System) -> float | None:
 
 def common_period(system: System) -> float | None:
     """After how long all forcing, inputs and clocks repeat: the least multiple of the longest period, or None."""
+    periods = all_periods(system)
+    return _multiple_of_all(periods, _MOST) if periods else None
+
+
+def all_periods(system: System) -> list[float]:
+    """The periods of all forcing, inputs and clocks; none where one of the forcings has none."""
     periods = forcing_periods(system)
     if periods is None:
-        return None
+        return []
     values = system.values
-    periods += [evaluate(c.period, values) for c in system.model.schedules if c.period is not None]
-    return _multiple_of_all(periods, _MOST) if periods else None
+    return periods + [evaluate(c.period, values) for c in system.model.schedules if c.period is not None]
 
 
 def forcing_periods(system: System) -> list[float] | None:

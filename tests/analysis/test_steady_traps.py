@@ -162,3 +162,46 @@ def test_a_mapping_of_measures_is_a_mapping() -> None:
     for wrong in ("a", 1.5, -1):
         with pytest.raises(HybridsimError):
             found.harmonic("x", wrong)  # type: ignore[arg-type]
+
+
+FORCED_TWICE = "0.2*sin(t) + 0.2*sin(sqrt(2)*t)"
+TWO_CLOCKS = """[discrete]
+u = { start = 0 }
+w = { start = 0 }
+[clocks.c]
+period = 1
+set.u = "-0.5*x"
+[clocks.d]
+period = "sqrt(2)"
+set.w = "1 - 0.2*x\""""
+HELD = '[contacts.f]\nvelocity = "v"\nnormal = "1"\nlaw = { name = "coulomb", mu = 0.5 }'
+
+
+@pytest.mark.parametrize(
+    ("states", "rest", "kind", "said"),
+    [
+        (
+            f'x = {{ start = 1, der = "-x + {FORCED_TWICE}" }}',
+            "",
+            "quasi-periodic",
+            "a change of the start is",
+        ),
+        (
+            'x = { start = 1, der = "-x + u + w" }',
+            TWO_CLOCKS,
+            "quasi-periodic",
+            "forcing and clocks have no common",
+        ),
+        # the undamped vibration of the start stays: there is a third frequency
+        (
+            OSCILLATOR.format(x0=1, der="-9*x + " + FORCED_TWICE),
+            "",
+            "not settled",
+            "a change of the start is 1",
+        ),
+        (OSCILLATOR.format(x0=0, der=f"-x - f + {FORCED_TWICE}"), HELD, "equilibrium", "nothing moves"),
+    ],
+)
+def test_forcing_without_a_common_period_is_followed(states: str, rest: str, kind: str, said: str) -> None:
+    found = hs.steady_state(model(states, "", rest), max_periods=64)
+    assert found.kind == kind and said in found.message

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
 
 import hybridsim as hs
+from hybridsim.errors import UsageError
 
 LOADS = [15.0, 22.0, 40.0]
 WORDS = ("amplitude.x", "energy.x", "harmonic.x.1", "stick_fraction.f", "stops_per_period.f", "kind", "word")
@@ -78,6 +80,14 @@ def test_what_does_not_exist(measure: object, options: dict[str, object], messag
         hs.sweep("dfcs", {"F0": [30]}, measure, **options)
 
 
-def test_an_option_that_does_not_exist_is_said_at_each_point() -> None:
-    found = hs.sweep("dfcs", {"F0": [30, 31]}, "steady", integrator="exat")
-    assert found.failed.all() and "UsageError" in found.status[0] and "exact" in found.status[0]
+@pytest.mark.parametrize("measure", ["steady", "final", lambda model: 1.0])
+def test_an_option_that_nothing_knows_is_refused_before_the_first_point(measure: Any) -> None:
+    span = {"t_span": (0, 1)} if measure == "final" else {}
+    with pytest.raises(UsageError, match="'rtoll' is no option of"):
+        hs.sweep("dfcs", {"F0": [20, 30]}, measure, rtoll=1e-8, **span)
+    if not callable(measure):
+        with pytest.raises(UsageError, match="no integrator 'dop835'"):
+            hs.sweep("dfcs", {"F0": [20, 30]}, measure, integrator="dop835", **span)
+        assert (
+            hs.sweep("dfcs", {"F0": [20]}, measure, integrator="dop853", rtol=1e-8, **span).status[0] == "ok"
+        )

@@ -148,7 +148,7 @@ def free_passings(motion: Motion, start: Point | None, duration: float) -> Passi
     low, high = (side[:n] for side in orbit.extremes)
     moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
     end = point_at_end(late)
-    if moves.max(initial=0.0) <= _RESTS:
+    if moves.max(initial=0.0) <= RESTS:
         return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
     j = int(np.argmax(moves))
     times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
@@ -157,4 +157,4 @@ def free_passings(motion: Motion, start: Point | None, duration: float) -> Passi
     return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
 
 
-_RESTS = 1e-12  # no state moves by more, relative to its largest size
+RESTS = 1e-12  # no state moves by more, relative to its largest size

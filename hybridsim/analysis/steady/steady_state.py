@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
@@ -96,7 +97,7 @@ def steady_state(
     ('periodic', ('stick', 'slip+', 'stick', 'slip-'), 2.0)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.period import common_period
+    from hybridsim.engine.period import all_periods, common_period
     from hybridsim.engine.recent import system_of
 
     tol = arguments.number(tol, "tol")
@@ -115,11 +116,14 @@ def steady_state(
     }
     told = arguments.callback(progress)
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
-    if period is None and _is_driven(system):
-        return _found(motion, QUASI, None, message="the frequencies of the forcing have no common period")
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise UsageError(f"{name} is {count!r}", remedy="give a whole number of periods")
+    if period is None and (periods := all_periods(system)):
+        motion.progress = told
+        found = follow(motion, max(periods), max(settle, _FEWEST), max_periods)
+        kind = EQUILIBRIUM if found.rests else QUASI if found.dies_out else UNSETTLED
+        return _found(motion, kind, found.rests, periods=found.periods, message=found.message)
     search = _Search(motion, period, tol, settle, max_periods)
     if told is not None:
         motion.progress = lambda _: told(search.share)
@@ -268,11 +272,6 @@ def _found(
     message: str = "",
 ) -> SteadyState:
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
-
-
-def _is_driven(system: System) -> bool:
-    """Whether the equations depend on time."""
-    return any(rate != 0.0 for rate in system.rates) or bool(system.model.inputs)
 
 
 def _check_period(model: Model, period: float, own: float | None) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import Points, points_of
+from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.sweep.job import Job, Settings, new_token
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.section import Section, with_section
@@ -90,6 +91,9 @@ def bifurcation(
     >>> found["x"].shape, found["repeats_after"].tolist()
     ((2, 2, 4), [[1.0, 1.0], [1.0, 1.0]])
     """
+    from hybridsim.simulate import simulate
+
+    refuse_unknown([simulate], options)
     base = chosen_model(model, params).validate()
     points = points_of(base, {parameter: values}, "list")
     if points.axes[0].is_start:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from hybridsim.analysis.sweep.given import refuse_what_it_does_not_take
 from hybridsim.analysis.sweep.job import Measure
 from hybridsim.analysis.sweep.ready import ready_measure
 from hybridsim.arguments import is_row
@@ -35,6 +36,7 @@ class Given:
 def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, Any]) -> Measure:
     """A measure by what `sweep` was given for it."""
     if callable(measure):
+        refuse_what_it_does_not_take(measure, options)
         return Given(measure, options, chained)
     if isinstance(measure, str):
         return ready_measure(measure, model, options)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.sweep.job import Incomplete
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
@@ -81,10 +82,14 @@ def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str
     """
     asked = (words,) if isinstance(words, str) else tuple(words)
     states = [state.name for state in model.states]
+    from hybridsim.analysis.steady import steady_state
+    from hybridsim.simulate import simulate
+
     heads = {word.partition(".")[0] for word in asked}
     if heads == {FINAL}:
         if "t_span" not in options:
             raise UsageError(f"measure is {words!r} without t_span", remedy="give t_span=(0, ...)")
+        refuse_unknown([simulate], options)
         names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
         return Final(tuple(names), options)
     if FINAL in heads:
@@ -92,6 +97,7 @@ def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str
             f"measure is {words!r}",
             remedy="steady states and ends of runs are two sweeps; ask for one of them",
         )
+    refuse_unknown([steady_state, simulate], options)
     known = _known(model)
     if asked == (STEADY,):
         asked = tuple(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
-from hybridsim.engine.period import system_period
+from hybridsim.engine.period import common_period, system_period
 from hybridsim.engine.recent import system_of
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.expr import parse
@@ -22,6 +22,8 @@ LEVEL = "section"  # the monitor of a level
 REPEATS = "repeats_after"
 _DURATION = 10.0  # the first stretch of a model without a duration: a few swings of a mechanism of about 1 Hz
 _STRETCHES = 12  # each twice as long as the one before: the last two thousand times the first
+_FEWEST = 32  # periods of a first stretch under forcing: a section that is not passed in them is not reached
+_EMPTY_FREE = 5  # stretches without a single passing after which there is none, without forcing
 
 
 class Passings(NamedTuple):
@@ -76,13 +78,19 @@ class Section:
 
     def _passed(self, motion: Motion, start: Point | None) -> Passings:
         wanted = self.settle + self.samples
-        length = motion.model.duration_value() or _DURATION
-        for _ in range(_STRETCHES):
+        period = common_period(system_of(motion.model))
+        length = motion.model.duration_value() or (period * max(wanted, _FEWEST) if period else _DURATION)
+        for stretch in range(1, _STRETCHES + 1):
             # from the beginning each time: what is driven, or has a clock, cannot be cut anywhere
             run = motion.run(start, length)
             found = [e.x_minus for e in run.events if e.component == self.level and e.kind == "monitor"]
             if len(found) >= wanted:
                 return Passings(np.array(found[self.settle : wanted]), _sizes(run), point_at_end(run))
+            if not found and (period or stretch == _EMPTY_FREE):
+                raise SimulationError(
+                    f"the section was not passed upward once in a run of {length:.6g}: the motion does not reach it, "
+                    "or a contact sticks there"
+                )
             length *= 2.0
         raise SimulationError(f"the section was passed {len(found)} times, and {wanted} were wanted")
 

@@ -46,7 +46,9 @@ def sensitivities(
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
     its saltation matrix (`hybridsim.analysis.variations.carried`), a contact's loss of rank in stick included. They are
-    derivatives for a fixed sequence of events: where a graze or a coincidence changes the sequence, there is none.
+    derivatives for a fixed sequence of events: where a graze or a coincidence changes the sequence, there is none. The
+    end is a fixed time, also where an event has ended the run: the derivatives are those at that time, and not of the
+    state at the event. For how such a time moves let the monitor record, and run on: it is then among ``times``.
 
     Parameters
     ----------

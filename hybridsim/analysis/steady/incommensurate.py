@@ -1,0 +1,60 @@
+"""The motion of a model whose forcing and clocks have no common period, followed with a change of its start."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, point_at_end
+from hybridsim.analysis.steady.settling import RESTS
+from hybridsim.analysis.steady.shooting import Orbit
+from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.sizes import ranges, sizes
+from hybridsim.errors import UsageError
+
+_DIES_OUT = 1e-6  # what is left of a change of the start by then is nothing
+_MOST = 512  # periods of the slowest forcing
+_LONGER = 4
+_NO_PERIOD = "the periods of forcing and clocks have no common multiple"
+
+
+class Followed(NamedTuple):
+    """What became of the motion: whether it rests, whether a change of its start dies out, and that in words."""
+
+    rests: Orbit | None
+    dies_out: bool
+    periods: int
+    message: str
+
+
+def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Followed:
+    """Follow a motion for more and more periods of its slowest forcing, until its start is forgotten.
+
+    Where every small change of the start dies out, the motion is that of the forcing alone, with its frequencies and
+    their sums: quasi-periodic. Where it does not there are other frequencies, or chaos.
+    """
+    count = settle
+    while True:
+        solution = motion.run(None, count * longest)
+        low, high = ranges(solution, 0.5 * solution.t_end)
+        largest = sizes(solution)
+        if (high - low <= RESTS * largest).all() and not solution._system.layout.discrete:
+            rest = Orbit(point_at_end(solution), longest, 1, 0.0)
+            message = (
+                f"equilibrium: nothing moves in the later half of {count} periods of the slowest forcing"
+            )
+            return Followed(rest, True, count, f"{message}; {_NO_PERIOD}")
+        try:
+            matrix = sensitivities(solution, ()).by_start
+        except UsageError as reason:
+            return Followed(None, False, count, f"not settled: {_NO_PERIOD}; {reason.message}")
+        unit = np.where(largest > 0.0, largest, 1.0)
+        unit = np.concatenate([unit, np.ones(len(matrix) - len(unit))])
+        left = float(np.abs(matrix * unit[None, :] / unit[:, None]).max(initial=0.0))
+        said = f"a change of the start is {left:.1e} times as large after {count} periods of the slowest"
+        if left <= _DIES_OUT:
+            return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {said}")
+        if count * _LONGER > min(max_periods, _MOST):
+            return Followed(None, False, count, f"not settled: {_NO_PERIOD}, and {said}")
+        count *= _LONGER

@@ -1,0 +1,53 @@
+"""Options of a sweep, refused before the first point where they would fail at every one."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from hybridsim.arguments import integrator_name
+from hybridsim.errors import UsageError, nearest
+
+# What "auto" may take; an option of any of them may be meant.
+_OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853", "scipy-radau")
+
+
+def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
+    """Check options for calls of which the last passes what it does not know on to an integrator.
+
+    Errors
+    ------
+    UsageError for a name that none of them has, and for an integrator that there is not.
+    """
+    from hybridsim.integrators.registry import integrator_class, option_names
+
+    own = {name for call in calls for name in _names(call)}
+    name = integrator_name(options.get("integrator", "auto"))
+    classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
+    known = own | {option for one in classes for option in option_names(one)}
+    whose = "simulate and of the integrators that auto takes" if name == "auto" else f"simulate and of {name}"
+    _refuse(options, known, whose)
+
+
+def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    """Check options for a measure that is anybody's function, as far as it says what it takes."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # of a builtin: nothing is said
+        return
+    if not any(p.kind is p.VAR_KEYWORD for p in parameters):
+        _refuse(options, set(_names(function)), getattr(function, "__name__", "the measure"))
+
+
+def _names(call: Callable[..., Any]) -> list[str]:
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return [name for name, p in inspect.signature(call).parameters.items() if p.kind in kinds]
+
+
+def _refuse(options: Mapping[str, Any], known: set[str], whose: str) -> None:
+    for option in options:
+        if option not in known:
+            raise UsageError(
+                f"{option!r} is no option of {whose}", remedy=nearest(option, known, kind="options")
+            )
