@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
+from hybridsim.cli.options import PICTURES
 from hybridsim.cli.output import complain, require_writable
 from hybridsim.cli.progress import Progress
-from hybridsim.cli.run import PICTURES
 from hybridsim.cli.session import Session
 from hybridsim.cli.sweep import values_by_name
 from hybridsim.errors import UsageError
@@ -73,21 +72,10 @@ def add_to(commands: Any) -> None:
         help="width of regularised forces (default: a hundredth of the largest sliding speed)",
     )
     parser.add_argument("--no-integrators", action="store_true", help="try no integrator settings")
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=values.count,
-        help="threads of --over (default: one for each processor)",
-    )
-    parser.add_argument(
-        "--budget",
-        metavar="SECONDS",
-        type=values.positive,
-        help="what all of it may take (default: 120; with --over as long as it takes); what does not fit is left out, "
-        "and said",
-    )
-    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw it ({', '.join(PICTURES)})")
-    parser.add_argument("--json", action="store_true", help="print everything as JSON instead of the table")
+    options.add_workers(parser, " of --over")
+    options.add_budget(parser, "120; with --over as long as it takes")
+    options.add_plot(parser, "it")
+    options.add_json(parser, "everything")
     parser.set_defaults(execute=execute)
 
 
@@ -113,7 +101,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             integrators=not args.no_integrators,
             workers=args.workers,
             budget=args.budget,
-            progress=lambda done, total, what: progress(done / total, what),
+            progress=progress.of_steps,
         )
     print(found.to_json() if args.json else found.table())
     if found.region is not None:

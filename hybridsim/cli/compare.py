@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
 from hybridsim.cli.output import require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
@@ -66,16 +66,9 @@ def add_to(commands: Any) -> None:
         default=3,
         help="timed repetitions of every run (default: 3)",
     )
-    parser.add_argument(
-        "--budget",
-        metavar="SECONDS",
-        type=values.positive,
-        help="what all of it may take (default: 120, and 600 for the suite); what does not fit is left out, and said",
-    )
-    parser.add_argument(
-        "--out", metavar="FOLDER", type=Path, help="folder of the results (default: compare-MODEL, here)"
-    )
-    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
+    options.add_budget(parser, "120, and 600 for the suite")
+    options.add_out(parser, "compare-MODEL")
+    options.add_json(parser, "the data")
     parser.set_defaults(execute=execute)
 
 
@@ -112,7 +105,7 @@ def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> i
             regularized=args.regularized,
             v0=args.v0,
             **({} if args.budget is None else {"budget": args.budget}),
-            progress=lambda done, total, what: progress(done / total, what),
+            progress=progress.of_steps,
         )
     from hybridsim.plot import regularisation, work_precision
 
@@ -141,7 +134,7 @@ def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
             steps=args.steps,
             repeat=args.repeat,
             **({} if args.budget is None else {"budget": args.budget}),
-            progress=lambda done, total, what: progress(done / total, what),
+            progress=progress.of_steps,
         )
     from hybridsim.plot import suite_page
 

@@ -30,6 +30,10 @@ class Progress:
             self._shown = len(line)
             self._next = time.monotonic() + _PAUSE
 
+    def of_steps(self, done: int, total: int, what: str) -> None:
+        """The same, from a count of steps."""
+        self(done / total, what)
+
     def __enter__(self) -> Self:
         return self
 

@@ -8,7 +8,8 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
+from hybridsim.cli.options import PICTURES
 from hybridsim.cli.output import INTERRUPTED, complain, print_json, require_writable
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
@@ -16,8 +17,6 @@ from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
-
-PICTURES = (".png", ".pdf", ".svg")
 
 _EXAMPLES = """\
 examples:
@@ -37,12 +36,8 @@ def add_to(commands: Any) -> None:
     )
     values.add_model_arguments(parser)
     values.add_span_argument(parser)
-    parser.add_argument(
-        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
-    )
-    parser.add_argument(
-        "--rtol", metavar="TOL", type=values.positive, help="relative tolerance (default: 1e-9)"
-    )
+    options.add_integrator(parser)
+    options.add_rtol(parser, "1e-9")
     parser.add_argument(
         "--atol",
         metavar="TOL",
@@ -58,7 +53,7 @@ def add_to(commands: Any) -> None:
         default=[],
         help="set an option of the integrator itself",
     )
-    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw the run ({', '.join(PICTURES)})")
+    options.add_plot(parser, "the run")
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the run as a table")
     parser.add_argument(
         "--npz", metavar="FILE", type=Path, help="write the run and its events for numpy.load"
@@ -69,7 +64,7 @@ def add_to(commands: Any) -> None:
         type=values.count,
         help="equal steps of time for --csv and --npz (default: the integrator's own, events on both sides)",
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of the summary")
+    options.add_json(parser, "the result", "the summary")
     parser.set_defaults(execute=execute)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
+from hybridsim.cli.options import PICTURES
 from hybridsim.cli.output import print_json, require_writable
 from hybridsim.cli.progress import Progress
-from hybridsim.cli.run import PICTURES
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError
 
@@ -34,9 +33,7 @@ def add_to(commands: Any) -> None:
         epilog=_EXAMPLES,
     )
     values.add_model_arguments(parser)
-    parser.add_argument(
-        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
-    )
+    options.add_integrator(parser)
     parser.add_argument(
         "--tol",
         metavar="TOL",
@@ -57,8 +54,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--harmonics", metavar="N", type=values.count, default=5, help="how many to print (default: 5)"
     )
-    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw one period ({', '.join(PICTURES)})")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of the table")
+    options.add_plot(parser, "one period")
+    options.add_json(parser, "the result")
     parser.set_defaults(execute=execute)
 
 

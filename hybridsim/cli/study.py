@@ -8,6 +8,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.cli import options
 from hybridsim.cli.output import print_json, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
@@ -30,13 +31,11 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("name", metavar="NAME", choices=STUDIES, help="which study: " + ", ".join(STUDIES))
     parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: some minutes")
-    parser.add_argument(
-        "--out", metavar="FOLDER", type=Path, help="folder of the results (default: study-NAME, here)"
-    )
+    options.add_out(parser, "study-NAME")
     parser.add_argument(
         "--images", metavar="FOLDER", type=Path, help="folder of the pictures (default: that of the results)"
     )
-    parser.add_argument("--json", action="store_true", help="print the verdicts as JSON instead of the table")
+    options.add_json(parser, "the verdicts")
     parser.set_defaults(execute=execute)
 
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
 from hybridsim.cli.output import INTERRUPTED, complain, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
@@ -61,16 +61,12 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--warm-start", action="store_true", help="start from the neighbour on the first axis"
     )
-    parser.add_argument("--integrator", metavar="NAME", help="see: hybridsim integrators (default: auto)")
-    parser.add_argument("--rtol", metavar="TOL", type=values.positive, help="relative tolerance of the runs")
-    parser.add_argument(
-        "--workers", metavar="N", type=values.count, help="threads (default: one for each processor)"
-    )
+    options.add_integrator(parser)
+    options.add_rtol(parser, "that of the measure")
+    options.add_workers(parser)
     parser.add_argument("--over", metavar="NAME", help="draw lines over this parameter instead of maps")
-    parser.add_argument(
-        "--out", metavar="FOLDER", type=Path, help="folder of the results (default: sweep-MODEL, here)"
-    )
-    parser.add_argument("--json", action="store_true", help="print the data as JSON instead of the table")
+    options.add_out(parser, "sweep-MODEL")
+    options.add_json(parser, "the data")
     parser.set_defaults(execute=execute)
 
 
@@ -84,11 +80,11 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         raise UsageError(f"--over {args.over}", remedy=f"name one of the parameters: {', '.join(axes)}")
     if len(axes) > _MOST_DRAWN and not args.list:
         complain("more than two parameters: there will be no picture")
-    options: dict[str, Any] = {
+    given: dict[str, Any] = {
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
     if any(word.partition(".")[0] == "final" for word in args.measure):
-        options["t_span"] = (0.0, values.end_time(model, args.t_end))
+        given["t_span"] = (0.0, values.end_time(model, args.t_end))
     elif args.t_end is not None:
         raise UsageError("--t-end is for --measure final", remedy="leave it out: steady states have no end")
 
@@ -102,8 +98,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             mode="list" if args.list else "grid",
             workers=args.workers,
             warm_start=args.warm_start,
-            progress=lambda done, total, what: progress(done / total, what),
-            **options,
+            progress=progress.of_steps,
+            **given,
         )
     print(result.to_json() if args.json else result.table())
     _write(result, args.over, folder, session)

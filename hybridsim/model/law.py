@@ -58,8 +58,8 @@ class FrictionLaw(Declared):
 
     name: str
     # None where the law gives a force, and nowhere else; most readers have to do with set-valued laws alone
-    slip: Expression = None  # type: ignore[assignment]
-    stick: Expression = None  # type: ignore[assignment]
+    slip: Expression = None  # type: ignore[assignment]  # None in a law with memory alone, which nobody asks for it
+    stick: Expression = None  # type: ignore[assignment]  # likewise
     parameters: Mapping[str, Expression | None] = field(default_factory=FrozenMap)
     title: str = ""
     source: str = ""

@@ -158,7 +158,7 @@ class _Smoothing:
         if self._has_corner(expr.tree):
             minus = isinstance(expr.tree, ast.UnaryOp) and isinstance(expr.tree.op, ast.USub)
             # mypy does not see that minus means a UnaryOp
-            if self.work.never_negative(expr.tree.operand if minus else expr.tree):  # type: ignore[attr-defined]
+            if self.work.never_negative(expr.tree.operand if minus else expr.tree):  # type: ignore[attr-defined]  # a minus has one
                 self.work.note(
                     expr.tree, MODE, "it never changes its sign, so that the monitor never fires", here
                 )
@@ -186,7 +186,7 @@ class _Smoothing:
             side = found.argument if m == 0 else ast.UnaryOp(ast.USub(), found.argument)
             values = {variable: self._expression(pair[m]) for variable, pair in found.values.items()}
             # a name stands for a Choice, as in any declaration
-            guard = Guard("side", self._expression(side), then=(other,))  # type: ignore[arg-type]
+            guard = Guard("side", self._expression(side), then=(other,))  # type: ignore[arg-type]  # made a choice
             modes.append(Mode(name, (guard,), set=values))
         return Corner(found.name, tuple(modes), initial="+")
 

@@ -208,6 +208,11 @@ def test_a_tolerance_finer_than_what_is_known() -> None:
     assert not any("finer" in remark for remark in found.remarks)
     finer = hs.advise(model, "amplitude.x", 1e-3, uncertain=ranges, integrators=False, rungs=["viscous"])
     assert any("more model is not more truth" in remark for remark in finer.remarks)
+    at_odds = hs.advise(
+        dfcs(22.0, 0.64), "amplitude.x", uncertain={"mu": (0.48, 0.52)}, integrators=False, rungs=["at-rest"]
+    )
+    assert at_odds.spread is not None and at_odds.spread.relative > 1.0  # to that spread rest itself would do
+    assert "know them better" in at_odds.remarks[-1] and not any("would do" in r for r in at_odds.remarks)
 
 
 def test_a_region_says_the_same_as_each_point() -> None:

@@ -160,8 +160,10 @@ def _remarks(advice: Advice) -> list[str]:
             f"{advice.quantity} by {spread.relative:.2g}; more model is not more truth"
         )
         enough = next(s for s in advice.ladder if s.error <= spread.relative or s.verdict == FULL)
-        if enough is not simplest:
-            found.append(f"within that spread {enough.name} is enough (error {enough.error:.2g})")
+        if spread.relative >= 1.0:
+            found.append("they leave it open by more than its own size: what helps is to know them better")
+        elif enough is not simplest:
+            found.append(f"to that spread {enough.name} would do (error {enough.error:.2g})")
     if advice.settings and advice.integrator is None:
         found.append("no integrator setting that was tried is within the tolerance")
     if advice.region is not None and advice.region.failed.any():

@@ -239,7 +239,7 @@ def watched(model: Model) -> Model:
             _speed(contact.name): f"abs{velocity}",
             _power(contact.name): f"{contact.name}*{velocity}",
         }
-        more += [Output(name, text) for name, text in texts.items() if name not in known]  # type: ignore[arg-type]
+        more += [Output(name, text) for name, text in texts.items() if name not in known]  # type: ignore[arg-type]  # made one
     return replace(model, outputs=(*model.outputs, *more)) if more else model
 
 

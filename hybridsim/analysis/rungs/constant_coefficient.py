@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hybridsim.analysis.rungs.forces import with_law, with_parameters
+from hybridsim.analysis.rungs.forces import at_speed, with_contacts, with_law, with_parameters
 from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
-from hybridsim.expr import parse, substitute
+from hybridsim.expr import parse
 from hybridsim.model import Contact, Model
 from hybridsim.model.law import SPEED
 
@@ -32,8 +32,7 @@ class ConstantAtRest(Rung):
         """The model with Coulomb's law at the force of slow sliding."""
         model = scene.model
         _need_velocity_law(model)
-        contacts = tuple(_constant(contact, "0") for contact in model.contacts)
-        return replace(model, contacts=contacts, title=f"{model.title or model.name}, constant mu (at rest)")
+        return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")
 
 
 class ConstantAtMeanSpeed(Rung):
@@ -51,13 +50,14 @@ class ConstantAtMeanSpeed(Rung):
             raise DoesNotApply("nothing slides in the full motion, so there is no mean speed")
         wishes = {f"{_MEAN}_{c.name}": scene.speed[c.name] for c in model.contacts}
         changed, names = with_parameters(model, wishes)
-        contacts = tuple(_constant(c, _MEAN, names[f"{_MEAN}_{c.name}"]) for c in model.contacts)
-        return replace(changed, contacts=contacts, title=f"{model.title or model.name}, constant mu (mean)")
+        return with_contacts(
+            changed, lambda c: _constant(c, _MEAN, names[f"{_MEAN}_{c.name}"]), "constant mu (mean)"
+        )
 
 
 def _constant(contact: Contact, speed: str, parameter: str | None = None) -> Contact:
     law = contact.law
-    force = substitute(law.slip, {SPEED: parse(speed)})
+    force = at_speed(law.slip, speed)
     parameters = dict(law.parameters) | ({speed: None} if parameter else {})
     arguments = dict(contact.arguments) | ({speed: parse(parameter)} if parameter else {})
     fixed = replace(

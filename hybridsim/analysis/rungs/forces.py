@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from hybridsim.expr import Expression, substitute
+from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
+from hybridsim.model.law import SPEED
 
 
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
@@ -39,6 +40,17 @@ def _is_copy(contact: Contact, part: Component) -> bool:
     return contact.law.copies is not None and number != part.name and number.isdecimal()
 
 
+def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str) -> Model:
+    """The model with each contact changed, and a title that says so."""
+    contacts = tuple(change(contact) for contact in model.contacts)
+    return replace(model, contacts=contacts, title=f"{model.title or model.name}, {title}")
+
+
+def at_speed(slip: Expression, speed: str) -> Expression:
+    """The slip force at a speed: a number or the name of a parameter of the law."""
+    return substitute(slip, {SPEED: parse(speed)})
+
+
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:
     """The contact with another law, without the parameters that this does not use."""
     used = {name for _, expression in law.expressions() for name in expression.names}
@@ -61,7 +73,7 @@ def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, d
             name += "_"
         taken.add(name)
         names[wish] = name
-    more = tuple(Parameter(names[wish], value) for wish, value in wishes.items())  # type: ignore[arg-type]
+    more = tuple(Parameter(names[wish], value) for wish, value in wishes.items())  # type: ignore[arg-type]  # made an expression
     return replace(model, parameters=(*model.parameters, *more)), names
 
 

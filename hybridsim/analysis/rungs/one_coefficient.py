@@ -5,11 +5,10 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from hybridsim.analysis.rungs.forces import inlined, with_law
+from hybridsim.analysis.rungs.forces import at_speed, inlined, with_contacts, with_law
 from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
-from hybridsim.expr import evaluate, parse, substitute
+from hybridsim.expr import evaluate
 from hybridsim.model import Contact, Model
-from hybridsim.model.law import SPEED
 
 _TRIALS = 4  # points at which a jump at rest is looked for; one would do but for accidents
 
@@ -32,21 +31,15 @@ class OneCoefficient(Rung):
             raise NothingToDrop(
                 "mu_s = mu_k already: every contact breaks loose at the force with which it slides"
             )
-        contacts = tuple(
-            _lowered(contact) if jump else contact
-            for contact, jump in zip(model.contacts, jumps, strict=True)
-        )
-        return replace(model, contacts=contacts, title=f"{model.title or model.name}, mu_s := mu_k")
+        lowered = {c.name for c, jump in zip(model.contacts, jumps, strict=True) if jump}
+        return with_contacts(model, lambda c: _lowered(c) if c.name in lowered else c, self.title)
 
 
 def _lowered(contact: Contact) -> Contact:
     law = contact.law
-    forward, backward = (
-        None if slip is None else substitute(slip, {SPEED: parse(0)})
-        for slip in (law.slip, law.slip_backward)
-    )
-    name = f"{law.name}, mu_s := mu_k"
-    return with_law(contact, replace(law, name=name, stick=forward, stick_backward=backward))  # type: ignore[arg-type]
+    backward = None if law.slip_backward is None else at_speed(law.slip_backward, "0")
+    name = f"{law.name}, {OneCoefficient.title}"
+    return with_law(contact, replace(law, name=name, stick=at_speed(law.slip, "0"), stick_backward=backward))
 
 
 def _jumps(model: Model, contact: Contact) -> bool:

@@ -120,7 +120,7 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
         found = readings(job.measure.read(result))
     except Incomplete as error:
         return Outcome(error.message, error.found), None
-    except Exception as error:
+    except Exception as error:  # a measure may be anybody's: whatever it raises costs its own point only
         return Outcome(_said(error), None), None
     missing = not_numbers(found)
     if missing:

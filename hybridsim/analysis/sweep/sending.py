@@ -135,7 +135,7 @@ def require_sendable(job: Job, cause: BaseException | None = None) -> None:
     for what, thing in (("measure", job.measure), ("model", job.model)):
         try:
             pickle.dumps(thing)
-        except Exception as error:
+        except Exception as error:  # pickle raises what the thing's own methods raise
             raise UsageError(
                 f"the {what} of the sweep cannot be sent to another process ({error})",
                 remedy="define its functions with def at the top of a module, or leave executor out: threads take any",

@@ -1,0 +1,58 @@
+"""Options that several commands have, each declared once."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hybridsim.cli import values
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def add_integrator(parser: argparse.ArgumentParser) -> None:
+    """Which integrator."""
+    parser.add_argument(
+        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
+    )
+
+
+def add_rtol(parser: argparse.ArgumentParser, default: str) -> None:
+    """How accurate; `default` says what holds without it."""
+    parser.add_argument(
+        "--rtol", metavar="TOL", type=values.positive, help=f"relative tolerance (default: {default})"
+    )
+
+
+def add_workers(parser: argparse.ArgumentParser, of: str = "") -> None:
+    """How many threads, of what."""
+    parser.add_argument(
+        "--workers", metavar="N", type=values.count, help=f"threads{of} (default: one for each processor)"
+    )
+
+
+def add_budget(parser: argparse.ArgumentParser, default: str) -> None:
+    """How long all may take."""
+    parser.add_argument(
+        "--budget",
+        metavar="SECONDS",
+        type=values.positive,
+        help=f"what all of it may take (default: {default}); what does not fit is left out, and said",
+    )
+
+
+def add_out(parser: argparse.ArgumentParser, default: str) -> None:
+    """Where results go."""
+    parser.add_argument(
+        "--out", metavar="FOLDER", type=Path, help=f"folder of the results (default: {default}, here)"
+    )
+
+
+def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
+    """A picture of what, to a file."""
+    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw {what} ({', '.join(PICTURES)})")
+
+
+def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:
+    """What is printed as JSON, and instead of what."""
+    parser.add_argument("--json", action="store_true", help=f"print {what} as JSON instead of {instead}")
