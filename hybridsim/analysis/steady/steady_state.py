@@ -64,7 +64,9 @@ def steady_state(
     A run is followed until it repeats; Newton's method on the period map (single shooting) then takes the place of
     waiting, its matrix from the variational flow carried through the events (`hs.sensitivities`). Where an orbit's
     sequence of events differs from that of the step before, or Newton's method does not close in, the run goes on
-    instead. Only what attracts is returned: a motion that repels is not what a model settles on.
+    instead. Only what attracts is returned: a motion that repels is not what a model settles on. Where the periods of
+    forcing and clocks have no common multiple nothing repeats: the motion is quasi-periodic if every small change of
+    its start dies out, else not settled.
 
     Parameters
     ----------
