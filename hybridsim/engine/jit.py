@@ -43,40 +43,48 @@ if ENABLED:
     _LONGS = types.CPointer(types.int64)
     SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
 
+    class _Spent(threading.local):
+        """Of a thread: how deep it is in compiling, since when, and the seconds of all times before."""
+
+        depth, since, spent = 0, 0.0, 0.0
+
     class _Compiling(event.Listener):
         """Adds up what each thread spends on compiling kernels, or on reading them from the cache."""
 
         def __init__(self) -> None:
-            self.of = threading.local()
+            self.of = _Spent()
 
         def on_start(self, event: Any) -> None:
             """A kernel, or one that another needs."""
-            if event.kind == "numba:compile":  # it was not in the cache, and comes within a lock
-                ours = event.data["dispatcher"].py_func.__module__.startswith("hybridsim.")
-                if ours and seconds_compiling() + time.perf_counter() - self.of.since > _NOTICED:
+            of = self.of
+            if event.kind == _COMPILING:  # it was not in the cache
+                compiled = event.data["dispatcher"].py_func.__module__ or ""
+                so_far = of.spent + (time.perf_counter() - of.since if of.depth else 0.0)
+                if compiled.startswith("hybridsim.") and so_far > _NOTICED:
                     # a part that no run has needed before, such as derivatives
                     _tell("hybridsim: compiling the engine for this, once ...")
                 return
-            depth = getattr(self.of, "depth", 0)
-            if depth == 0:
-                self.of.since = time.perf_counter()
-            self.of.depth = depth + 1
+            if of.depth == 0:
+                of.since = time.perf_counter()
+            of.depth += 1
 
         def on_end(self, event: Any) -> None:
             """The kernel is ready."""
-            if event.kind == "numba:compile":
+            of = self.of
+            if event.kind == _COMPILING or of.depth == 0:
                 return
-            self.of.depth -= 1
-            if self.of.depth == 0:
-                self.of.spent = seconds_compiling() + time.perf_counter() - self.of.since
+            of.depth -= 1
+            if of.depth == 0:
+                of.spent += time.perf_counter() - of.since
 
+    _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # the first happens within the second
     _compiling = _Compiling()
-    for _kind in ("numba:compiler_lock", "numba:compile"):
+    for _kind in (_COMPILING, _LOCKED):
         event.register(_kind, _compiling)
 
     def seconds_compiling() -> float:
         """Seconds that this thread has spent so far on getting kernels ready."""
-        return float(getattr(_compiling.of, "spent", 0.0))
+        return _compiling.of.spent
 
     def _with_cache_folder(folder: str, define: Callable[[], Any]) -> Any:
         """Run `define` while numba's cache folder is ours, and give the setting back to the user's own code."""
