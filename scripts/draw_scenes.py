@@ -18,6 +18,10 @@ def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in ("clutches", "drill-string", "lugre-presliding", "pid-servo", "valve-stiction"):
         save(time_history(run(name)), FOLDER / f"{name}.png")
+    for name in ("elastic-gap", "rocking-block", "water-tanks", "buck-converter", "gear-rattle", "impact-oscillator"):
+        save(time_history(run(name)), FOLDER / f"{name}.png")
+    save(time_history(run("vibrating-plate")), FOLDER / "vibrating-plate.png")
+    save(phase_portrait(run("chua")), FOLDER / "chua.png")
     save(friction_loop(run("blade-damper"), "f", "x", t_span=(0.9, 1.0)), FOLDER / "blade-damper.png")
     save(phase_portrait(run("feeny-moon"), t_span=(50, 150)), FOLDER / "feeny-moon.png")
 

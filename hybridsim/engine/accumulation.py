@@ -17,6 +17,8 @@ _TERMS = 10
 _FEW = 4  # intervals after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
 _SAME_FACTOR = 1e-3
+# A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
+_FAR_DOWN = 1e-6
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
 _ULPS = 16.0
 
@@ -49,6 +51,8 @@ class Accumulation:
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
         self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
+        self.longest = 0.0  # interval since which they shrink
+        self.forecast: tuple[float, float] | None = None  # limit of the series so far, and how far ahead it was
 
     def is_under_way(self) -> bool:
         """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
@@ -97,6 +101,14 @@ class Accumulation:
             return None
         factors = [b / a for a, b in pairwise(gaps)]
         factor = factors[-1]
-        steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
-        rest = gaps[-1] * factor / (1.0 - factor) if factor < 1.0 else math.inf
-        return float(float(instant) + rest) if steady and rest <= self.resolution else None
+        self.longest = max(gaps) if factor >= 1.0 else max(self.longest, *gaps)
+        if factor < 1.0 and self.is_under_way():
+            rest = gaps[-1] * factor / (1.0 - factor)
+            self.forecast = (float(float(instant) + rest), rest)
+            steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
+            return self.forecast[0] if steady and rest <= self.resolution else None
+        before, self.forecast = self.forecast, None
+        if before is None or before[1] > _FAR_DOWN * self.longest:
+            return None
+        # within what was left of the series, but no longer in step with it
+        return before[0] if abs(float(instant) - before[0]) <= before[1] else None

@@ -22,7 +22,6 @@ MECHANISMS = {
 
 # scene -> mechanism, and where it is another one with some solvers, solver -> mechanism ("" where it is right)
 FAILURES: dict[str, tuple[str, dict[str, str]]] = {
-    "ball-accumulation": (CLOSED, {"scipy-rk23": ENDS, "scipy-bdf": "", "scipy-lsoda": ""}),
     "BALL2D": (CLOSED, {}),
     "SCI-cubic": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
     "cubic-modes": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
