@@ -279,9 +279,7 @@ class ModeLoop:
         system, z = self.system, self.outcome.z
         p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
         error = error.copy()
-        error[[system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and z[c] == a.hold]] = (
-            0.0
-        )
+        error[system.evaluated(z)] = 0.0
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
         resets = [("schedule", k) for k in schedules]
         return Settling(system, at, z.copy(), self.forward).run((), resets)
@@ -307,9 +305,7 @@ class ModeLoop:
                 s_error = max(s_error, abs(value / slope))
         slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
         x_error = segment.rounding() + s_error * slopes
-        holding = [
-            system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold
-        ]
+        holding = system.evaluated(flow.z)
         x_error[holding] = UNIT * np.abs(arrival.x[holding])
         return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 

@@ -363,7 +363,7 @@ class Settling:
 
     def _pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)
-        mask[[self.system.pins[c] for c in components]] = True
+        mask[[self.system.pins[c] for c in components if c in self.system.pins]] = True
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:

@@ -128,7 +128,7 @@ class Flow:
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """States (k, n) at local times (k,) with held states on their constraints."""
         x = np.ascontiguousarray(x, dtype=float)
-        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.pins else x
+        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
 
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Guard values (k, guards); held states are evaluated from their constraints on the way."""
