@@ -37,6 +37,7 @@ class HeldStates:
         free = self._without_choice(choices)
         self.pins = self._chosen({c: found for c, found in choices.items() if c not in free})
         self.projected = {c: self._uses(c) for c in surfaces if c in free}
+        self._lengths: dict[int, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     # -- which ----------------------------------------------------------------------------------------------
 
@@ -169,6 +170,7 @@ class HeldStates:
                         matrix[c, d] = sp.Symbol(name, real=True)
             length = {c: sp.Symbol(f"length_{k}_{c}", real=True) for c in order}
             items += self.lowering.eliminate(order, length, matrix, right, prefix=f"p{k}_")
+            self._lengths = {c: self._lengths[c] + length[c] for c in order}
             after = {}
             for i in moved:
                 name = f"moved_{k}_{i}"
@@ -179,6 +181,27 @@ class HeldStates:
         for i in moved:
             items.append(Assign(states[i].name, _where_pinned(sp, at[states[i]], _raw(sp, i))))
         return items
+
+    def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
+        """Rates of the states as they are integrated, from those on the surfaces: the normals turn on the way.
+
+        The projection of x + sum of l_c grad s_c(x) is x, so that what is integrated, off the surface by its errors, moves
+        by x' + sum of l_c d(grad s_c)/dt with the l_c as they are: its projection moves by x' then, to first order.
+        """
+        sp, states = self.lowering.sp, self.states
+        items: list[Item] = []
+        names = list(derivatives)
+        for i in sorted({i for held in self.projected.values() for i in held}):
+            rate = sp.Symbol(derivatives[i], real=True)
+            for c, held in self.projected.items():
+                normal = sp.diff(self.surfaces[c], states[i])
+                turning = sp.diff(normal, self.lowering.s) + sp.diff(normal, self.lowering.t)
+                for j in held:
+                    turning += sp.diff(normal, states[j]) * sp.Symbol(derivatives[j], real=True)
+                rate += self._lengths[c] * turning
+            names[i] = f"turned_{i}"
+            items.append(Assign(names[i], rate))
+        return items, names
 
 
 def _raw(sp: Any, i: int) -> Any:

@@ -157,7 +157,8 @@ class Lowering:
         items += self._mode_variables()
         items += unknown_items
         derivative_items, derivatives = self._derivatives(der, held.pins)
-        items += derivative_items
+        turning_items, derivatives = held.turned(derivatives)
+        items += derivative_items + turning_items
         items += [Assign(f"surface_{c}", s) for c, s in surfaces.items()]
         guard_items, conditions = self._guards()
         items += guard_items

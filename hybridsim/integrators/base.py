@@ -16,8 +16,9 @@ from hybridsim.engine.trajectory import Task, Trajectory
 
 NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
 CAPABILITIES = {
-    "contacts": "components with a surface: contacts, relays",
+    "contacts": "contacts with dry friction, which stick",
     "located": "events of contacts are located: their number and order are those of the motion",
+    "sliding": "switching surfaces, along which a motion slides",
     "transitions": "general automata: modes, choices, resets",
     "monitors": "events that change no mode",
     "scheduled": "events and inputs at times known beforehand",

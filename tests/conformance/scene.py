@@ -10,6 +10,7 @@ from typing import Any
 VOCABULARY = (
     "contacts",
     "located",
+    "sliding",
     "transitions",
     "nonlinear",
     "functions",
