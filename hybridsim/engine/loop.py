@@ -57,8 +57,6 @@ class ModeLoop:
         model = self.system.model
         if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors or model.inputs:
             return None
-        if self.system.projected:  # each step is to land on its surface
-            return None
         return self.method.leaper(self.system, self.task.tolerances, self.renewal)
 
     def run(self) -> Trajectory:
