@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
+from hybridsim.engine.gathering import gathered
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
@@ -287,10 +288,20 @@ class ModeLoop:
     def _accumulated(self, instants: np.ndarray) -> bool:
         """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
         limit = self.accumulation.limit_of_all(instants)
-        if limit is None:
+        if limit is None or self._gathered(limit):
             return False
         self.record.status = "accumulation"
         self.record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+        return True
+
+    def _gathered(self, limit: float) -> bool:
+        """Whether the motion goes on sliding along the surfaces whose crossings accumulate."""
+        left = abs(limit - float(self.origin)) + self.accumulation.last_interval()
+        found = gathered(self.system, self.outcome, self.p, left) if self.forward else None
+        if found is None:
+            return False
+        self.accumulation.begin_anew()
+        self._adopt(self.origin, found, self.outcome.x, (), ())
         return True
 
     def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
