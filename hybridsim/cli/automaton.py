@@ -27,8 +27,10 @@ def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> I
     yield from _section("definitions", (f"{name} = {_flat(value)}" for name, value in model.definitions))
     yield from _section("inputs", map(_input, model.inputs))
     laws = {contact.name: contact.law.name for contact in model.contacts}
+    surfaces = {surface.name for surface in model.surfaces}
     for component in model.all_components():
-        kind = f"contact, law {laws[component.name]}" if component.name in laws else "component"
+        kind = "switching surface" if component.name in surfaces else "component"
+        kind = f"contact, law {laws[component.name]}" if component.name in laws else kind
         yield from _section(f"{component.name}: {kind}", _component(component, report))
     yield from _section("corners and jumps", map(_primitive, primitives))
     yield from _section("monitors", map(_monitor, model.monitors))

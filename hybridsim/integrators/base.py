@@ -24,6 +24,7 @@ CAPABILITIES = {
     "scheduled": "events and inputs at times known beforehand",
     "multiple-roots": "several zeros of a guard within one step",
     "accumulation": "events that follow each other ever faster, down to rounding",
+    "tangent-exit": "sliding that is left, at a tangency as ever, where several states make the surface",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
     "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",

@@ -127,7 +127,7 @@ def _contact(scope: Scope, contact: Contact) -> None:
     forces = sorted(
         name
         for name in reached
-        if "variable" in scope.kinds.get(name, "") or scope.kinds.get(name) == "contact force"
+        if scope.is_switched(name)
     )
     if forces:
         message = f"{what}: the velocity depends on '{forces[0]}', which depends on a mode"

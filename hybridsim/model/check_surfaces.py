@@ -22,13 +22,10 @@ def _surface(scope: Scope, surface: SwitchingSurface) -> None:
     reached = scope.reached(surface.expr)
     if not reached <= scope.all_names:
         return
-    kinds = {name: scope.kinds.get(name, "") for name in reached}
-    switched = sorted(
-        n for n, k in kinds.items() if k.startswith("variable") or k in ("contact force", "switching surface")
-    )
+    switched = sorted(filter(scope.is_switched, reached))
     if switched:
         message = f"{what}: the switching function depends on '{switched[0]}', which depends on a mode"
         scope.fail(surface, message, "write it over states, discrete states, parameters and t.")
-    elif "state" not in kinds.values():
+    elif not any(scope.kinds.get(name) == "state" for name in reached):
         message = f"{what}: the switching function '{surface.expr.text}' contains no state"
         scope.fail(surface, message, "write what is zero on the surface, e.g. 'x'; an input switches by itself.")

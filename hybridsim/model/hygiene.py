@@ -195,6 +195,9 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
     for contact in model.contacts:
         yield f"contact {contact.name}", contact.velocity
         yield f"contact {contact.name}", contact.normal
+    for surface in model.surfaces:
+        values = (surface.expr, *surface.above.values(), *surface.below.values())
+        yield from ((f"surface {surface.name}", expr) for expr in values)
     for component in model.components:
         for mode in component.modes:
             where = f"mode {mode.name} of component {component.name}"

@@ -61,6 +61,8 @@ def _expressions(model: Model) -> Iterator[Expression]:
         yield from (contact.velocity, contact.normal, *(expr for _, expr in contact.law.expressions()))
         yield from (value for value in contact.law.parameters.values() if value is not None)
         yield from contact.arguments.values()
+    for surface in model.surfaces:
+        yield from (surface.expr, *surface.above.values(), *surface.below.values())
     for component in model.components:
         for mode in component.modes:
             yield from (*mode.der.values(), *mode.set.values(), *(guard.expr for guard in mode.guards))

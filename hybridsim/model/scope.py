@@ -71,6 +71,11 @@ class Scope:
             for name in component.variables:
                 yield f"variable of component {component.name}", name, component
 
+    def is_switched(self, name: str) -> bool:
+        """Whether a name stands for something that modes decide."""
+        kind = self.kinds.get(name, "")
+        return kind.startswith("variable") or kind in ("contact force", "switching surface")
+
     @cached_property
     def changed_by_reset(self) -> tuple[str, ...]:
         return (*(part.name for part in self.model.states), *(part.name for part in self.model.discrete))

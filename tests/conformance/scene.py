@@ -18,6 +18,7 @@ VOCABULARY = (
     "scheduled",
     "multiple-roots",
     "accumulation",
+    "tangent-exit",
     "exact-stick",
     "backward",
     "corners",
