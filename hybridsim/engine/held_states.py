@@ -77,8 +77,9 @@ class HeldStates:
         chosen = self._match(list(choices), choices, {})
         if chosen is None:
             lowering = self.lowering
+            titles = dict.fromkeys(f"{lowering.title(c)}s" for c in choices)
             raise ModelError(
-                "the surfaces of "
+                f"the {' and '.join(titles)} of "
                 + ", ".join(lowering.components[c].name for c in choices)
                 + " are not independent: holding all of them at zero leaves no state for each",
                 place=lowering.place(next(iter(choices))),

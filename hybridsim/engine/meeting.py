@@ -16,6 +16,7 @@ import numpy as np
 
 from hybridsim.engine.decide import FINE
 from hybridsim.engine.jets import UNIT
+from hybridsim.model.meanings import Meanings
 
 if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
@@ -67,14 +68,42 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
     return found
 
 
-def words_on(settling: Settling, members: list[int]) -> str:
-    """What to know of the switching surfaces that no motion could be decided at; empty where there is nothing."""
+def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
+    """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
     system = settling.system
-    held = {*system.pins, *system.projected}
-    slow = [system.automata[c].name for c in members if system.automata[c].is_unique and c not in held]
-    if not slow:
+    unique = [c for c in members if system.automata[c].is_unique]
+    slow = [c for c in unique if c not in system.pins and c not in system.projected]
+    if slow:
+        names = ", ".join(system.automata[c].name for c in slow)
+        return "inconsistent", (
+            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it is "
+            "of a higher order, which is not followed"
+        )
+    pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
+    if (pull < 0.0).any():
+        names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
+        return "nonunique", (
+            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there are "
+            "directions"
+        )
+    return "inconsistent", message
+
+
+def words_on_cascade(settling: Settling) -> str:
+    """What to do about two modes of an automaton that push against each other across one surface; empty for others."""
+    model, last = settling.system.model, settling.changes[-2:]
+    if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
+    component = model.all_components()[last[0].component]
+    meanings, found = Meanings(model), []
+    for change in last:
+        mode = component.modes[change.source]
+        found.append(next((meanings.family(g.expr.tree) for g in mode.guards if g.name == change.guard), None))
+    if component.surface or None in found or found[0] != (found[1][0], -found[1][1]):
+        return ""
+    names = " and ".join(component.modes[change.source].name for change in last)
+    text = next(g.expr.text for g in component.modes[last[0].source].guards if g.name == last[0].guard)
     return (
-        f"; {', '.join(slow)} acts on higher derivatives of its switching function alone, so that sliding along it is of "
-        "a higher order, which is not followed"
+        f". Modes {names} push against each other across one surface: the motion slides along it if it is declared as "
+        f'one, [surfaces.NAME] expr = "{text}", NAME being +1 on one side and -1 on the other'
     )

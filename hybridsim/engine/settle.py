@@ -19,7 +19,7 @@ from hybridsim.engine.decide import (
 )
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.meeting import keeps_nothing, rivals, words_on
+from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.system import Series, System
 
@@ -109,7 +109,7 @@ class Settling:
         return self._stop(
             "cascade",
             f"transitions follow each other over and over, {limit} rounds without rest ({names}); "
-            f"guards that fire: {guards}",
+            f"guards that fire: {guards}{words_on_cascade(self)}",
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
@@ -343,7 +343,8 @@ class Settling:
         )
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
-            return "nonunique", self._say(taking_part, rival, "several motions are admissible")
+            status = "nonunique" if self.forward else "backward-nonunique"
+            return status, self._say(taking_part, rival, "several motions are admissible")
         holds = np.array([automata[c].hold for c in taking_part])
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
@@ -351,8 +352,7 @@ class Settling:
                 taking_part, candidates[verdicts != LEAVES], "several motions are admissible"
             )
         if number == NONE:
-            message = self._say(taking_part, candidates, "no motion is admissible")
-            return "inconsistent", message + words_on(self, taking_part)
+            return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
         if reason := keeps_nothing(self, taking_part, self._with(taking_part, candidates[number])):
             return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 from hybridsim.errors import HybridsimError, Place
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import TIME
+from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
+from hybridsim.model.smoothing import smoothing_of
 
 if TYPE_CHECKING:
     from hybridsim.model.component import Component, Mode
@@ -34,10 +36,10 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t. Nothing is reported that the
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing is reported that the
     form of an expression does not show. The guards of contacts are made by the program and not looked at.
     """
-    return (*_of_signs(model), *_of_units(model), *_of_pulses(model))
+    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *_of_jumps(model))
 
 
 class _Reading:
@@ -205,3 +207,17 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
             yield from ((f"guard {guard.name} of {where}", guard.expr) for guard in mode.guards)
     for monitor in model.monitors:
         yield f"monitor {monitor.name}", monitor.expr
+
+
+def _of_jumps(model: Model) -> Iterator[Caution]:
+    """Jumps inside a mode, along which a motion cannot slide."""
+    if not uses_primitives(model):
+        return
+    for one in smoothing_of(model).primitives:
+        if one.became == KEPT and one.remark == JUMPS:
+            yield Caution(
+                f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a motion "
+                "that both sides drive back into the jump crawls",
+                one.place,
+                'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign.',
+            )

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # what became of a primitive
 COMPONENT, MODE, KEPT, POWER = "component", "mode", "kept", "power"
+JUMPS = "it jumps, as far as its form shows"  # the reason to keep a primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
 _ZERO = ast.Constant(0)
