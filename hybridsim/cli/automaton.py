@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER
-
 from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
@@ -101,9 +100,14 @@ def _component(component: Component, report: Report) -> Iterator[str]:
         held, projected = report.held.get(component.name), report.projected.get(component.name)
         yield (
             f"{surface.above} where {_flat(surface.function)} > 0, {surface.below} where it is < 0; "
-            f"{surface.hold} keeps it at 0 by {surface.unknown}" + (f", with {held} exact" if held else "")
+            f"{surface.hold} keeps it at 0 by {surface.unknown}"
+            + (f", with {held} exact" if held else "")
             + (f", with {', '.join(projected)} projected onto it" if projected else "")
-            + ("" if held or projected else ", which its rate does not depend on: it is crossed, not slid along")
+            + (
+                ""
+                if held or projected
+                else ", which its rate does not depend on: it is crossed, not slid along"
+            )
         )
     for mode in component.modes:
         linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""

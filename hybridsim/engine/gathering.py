@@ -8,7 +8,9 @@ from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 
-_REACH = 2.0  # a surface this many times as far away as its rate leads in the time that is left is not the limit's
+_REACH = (
+    2.0  # a surface this many times as far away as its rate leads in the time that is left is not the limit's
+)
 
 
 def gathered(system: System, outcome: Outcome, p: np.ndarray, left: float) -> Outcome | None:

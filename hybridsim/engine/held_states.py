@@ -186,8 +186,9 @@ class HeldStates:
     def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
         """Rates of the states as they are integrated, from those on the surfaces: the normals turn on the way.
 
-        The projection of x + sum of l_c grad s_c(x) is x, so that what is integrated, off the surface by its errors, moves
-        by x' + sum of l_c d(grad s_c)/dt with the l_c as they are: its projection moves by x' then, to first order.
+        The projection of x + sum of l_c grad s_c(x) is x, so that what is integrated, off the surface by its errors,
+        moves by x' + sum of l_c d(grad s_c)/dt with the l_c as they are: its projection moves by x' then, to first
+        order.
         """
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []

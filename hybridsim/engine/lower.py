@@ -73,7 +73,9 @@ class Lowering:
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
         self.effects: list[Any] = []  # of each unknown on the rate of its own surface
-        self.never_held: set[int] = set()  # components whose unknown does not act on the rate of their surface
+        self.never_held: set[int] = (
+            set()
+        )  # components whose unknown does not act on the rate of their surface
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
@@ -275,7 +277,9 @@ class Lowering:
         partners = sorted({name, *map(_name, others)})
         if len(partners) == 1:
             message = f"{name} enters the rate of the switching function '{self.written(c)}' nonlinearly"
-            remedy = f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
+            remedy = (
+                f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
+            )
         else:
             message = (
                 f"{' and '.join(partners)} multiply each other in the rate of the switching function "

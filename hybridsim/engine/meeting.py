@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
 
 
-def rivals(settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray) -> np.ndarray:
+def rivals(
+    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+) -> np.ndarray:
     """The admissible joint candidates, where they differ in the mode of a switching surface; else none."""
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
     fine = candidates[verdicts == FINE]
@@ -98,7 +100,9 @@ def words_on_cascade(settling: Settling) -> str:
     meanings, found = Meanings(model), []
     for change in last:
         mode = component.modes[change.source]
-        found.append(next((meanings.family(g.expr.tree) for g in mode.guards if g.name == change.guard), None))
+        found.append(
+            next((meanings.family(g.expr.tree) for g in mode.guards if g.name == change.guard), None)
+        )
     if component.surface or None in found or found[0] != (found[1][0], -found[1][1]):
         return ""
     names = " and ".join(component.modes[change.source].name for change in last)

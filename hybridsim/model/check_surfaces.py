@@ -28,4 +28,6 @@ def _surface(scope: Scope, surface: SwitchingSurface) -> None:
         scope.fail(surface, message, "write it over states, discrete states, parameters and t.")
     elif not any(scope.kinds.get(name) == "state" for name in reached):
         message = f"{what}: the switching function '{surface.expr.text}' contains no state"
-        scope.fail(surface, message, "write what is zero on the surface, e.g. 'x'; an input switches by itself.")
+        scope.fail(
+            surface, message, "write what is zero on the surface, e.g. 'x'; an input switches by itself."
+        )

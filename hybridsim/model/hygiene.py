@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import HybridsimError, Place
-from hybridsim.expr import Expression
+from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import TIME
+from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
@@ -210,11 +211,13 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
 
 
 def _of_jumps(model: Model) -> Iterator[Caution]:
-    """Jumps inside a mode, along which a motion cannot slide."""
+    """Jumps inside a mode where a state changes its sign, along which a motion cannot slide."""
     if not uses_primitives(model):
         return
+    meanings, states = Meanings(model), {state.name for state in model.states}
     for one in smoothing_of(model).primitives:
-        if one.became == KEPT and one.remark == JUMPS:
+        is_jump = one.became == KEPT and one.remark == JUMPS
+        if is_jump and names_of(meanings.written_out(parse(one.text).tree)) & states:
             yield Caution(
                 f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a motion "
                 "that both sides drive back into the jump crawls",

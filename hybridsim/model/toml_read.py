@@ -156,8 +156,8 @@ def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
         above, below = table.expressions("above"), table.expressions("below")
         single = sorted(set(above) ^ set(below))
         for one in single:
-            side = "below" if one in above else "above"
-            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}.", side)
+            given, side = ("above", "below") if one in above else ("below", "above")
+            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}.", given, one)
         if not single:
             yield SwitchingSurface(name, expr, above, below, place=table.place)
 

@@ -36,7 +36,9 @@ def stays(component: str, *terms: str) -> Check:
             if interval.mode == SLIDING:
                 times = np.linspace(interval.t0, interval.t1, 101)[1:-1]
                 x = dict(zip([s.name for s in solution.model.states], solution(times), strict=True))
-                value = sum(x[name] if power == "1" else x[name] ** 2 for name, power in map(str.split, terms))
+                value = sum(
+                    x[name] if power == "1" else x[name] ** 2 for name, power in map(str.split, terms)
+                )
                 target = 1.0 if any(term.endswith("2") for term in terms) else 0.0
                 if np.abs(value - target).max() > 1e-14:
                     return [f"off the surface of {component} by {np.abs(value - target).max():.2g}"]
@@ -146,9 +148,7 @@ def _circle() -> Scene:
         "sliding-circle",
         "sliding-circle",
         (0.0, 6.0),
-        Truth(
-            ((onto, "u:sliding"), (off, "u:above")), states, checks=(("", stays("u", "x 2", "y 2")),)
-        ),
+        Truth(((onto, "u:sliding"), (off, "u:above")), states, checks=(("", stays("u", "x 2", "y 2")),)),
         NEEDS | {"tangent-exit"},
         unit=6.0,
         tol_t=1e-9,
@@ -213,7 +213,11 @@ def _refused() -> tuple[Scene, ...]:
             "repelling",
             (0.0, 1.0),
             Truth(
-                (), ((END, (0.0,)),), status="nonunique", end=0.0, checks=(("", says("u: above", "u: below")),)
+                (),
+                ((END, (0.0,)),),
+                status="nonunique",
+                end=0.0,
+                checks=(("", says("u: above", "u: below")),),
             ),
             NEEDS,
         ),

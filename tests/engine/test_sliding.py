@@ -56,7 +56,10 @@ def crossings(amplitude: float) -> tuple[float, float]:
     """Exit and entry of x' = A sin(t) - u in the first half period, from the closed form of the excursion between."""
     leaves = math.asin(1 / amplitude)
     back = brentq(
-        lambda t: amplitude * (math.cos(leaves) - math.cos(t)) - (t - leaves), leaves + 0.1, leaves + 3, xtol=1e-15
+        lambda t: amplitude * (math.cos(leaves) - math.cos(t)) - (t - leaves),
+        leaves + 0.1,
+        leaves + 3,
+        xtol=1e-15,
     )
     return leaves, back
 
@@ -92,7 +95,7 @@ def test_no_drift_off_a_circle(integrator: str) -> None:
     x, y = solution(np.linspace(1.0, 200 * math.pi, 5001))
     assert np.abs(x**2 + y**2 - 1).max() <= 4.5e-16
     assert solution.events[0].t == pytest.approx(math.log(2), abs=1e-9)
-    assert np.abs(np.angle((x[-1] + 1j * y[-1]))) < 1e-7
+    assert np.abs(np.angle(x[-1] + 1j * y[-1])) < 1e-7
 
 
 @pytest.mark.slow
@@ -205,7 +208,9 @@ def test_dependent_relays_do_not_say_what_each_does() -> None:
 
 def test_a_two_fold_is_left_where_the_surface_stops_attracting() -> None:
     """x' = -1 above and 1 below times (1 - t): it attracts up to t = 1, where both motions away are admissible."""
-    solution = run('[states]\nx = { start = 0, der = "-(1 - t)*u" }\n[surfaces]\nu = "x"\n', 2.0, integrator="dop853")
+    solution = run(
+        '[states]\nx = { start = 0, der = "-(1 - t)*u" }\n[surfaces]\nu = "x"\n', 2.0, integrator="dop853"
+    )
     assert solution.status == "nonunique"
     assert solution.t_end == pytest.approx(1.0, abs=1e-12)
     assert "u: above" in solution.message and "u: below" in solution.message
@@ -242,7 +247,9 @@ def test_modes_that_push_against_each_other_are_told_of_surfaces() -> None:
 
 
 def test_unknowns_that_multiply_are_refused_by_name() -> None:
-    with pytest.raises(ModelError, match=r"u and w multiply each other in the rate of the switching function 'x'"):
+    with pytest.raises(
+        ModelError, match=r"u and w multiply each other in the rate of the switching function 'x'"
+    ):
         run(HELPING.replace("-u - 2*w", "-u*w"), 1.0)
     with pytest.raises(ModelError, match="u enters the rate of the switching function 'x' nonlinearly"):
         run(HELPING.replace("-u - 2*w", "-u**3"), 1.0)
@@ -264,7 +271,7 @@ def test_a_contact_and_a_relay_in_one_cluster() -> None:
     law = { name = "coulomb", mu = 0.5 }
     """
     solution = run(text, 4.0, integrator="exact")
-    onto = (math.sqrt(1 + 2 / 2.5) - 1)  # 1 - 2.5 t^2/2 - 2.5 t = 0
+    onto = math.sqrt(1 + 2 / 2.5) - 1  # 1 - 2.5 t^2/2 - 2.5 t = 0
     assert solution.events[0].t == pytest.approx(onto, abs=1e-12)
     assert solution.modes["u"][-1].mode == "sliding"
     x, v = solution(4.0)

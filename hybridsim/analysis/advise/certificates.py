@@ -64,7 +64,14 @@ def _never_stops(model: Model) -> list[Certificate]:
 
 
 def _is_linear(model: Model) -> bool:
-    if model.contacts or model.surfaces or model.components or model.discrete or model.schedules or model.flow is not None:
+    if (
+        model.contacts
+        or model.surfaces
+        or model.components
+        or model.discrete
+        or model.schedules
+        or model.flow is not None
+    ):
         return False
     if any(monitor.action != "record" for monitor in model.monitors):
         return False
