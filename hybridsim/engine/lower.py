@@ -290,7 +290,7 @@ class Lowering:
 
     def _blends(self) -> dict[Any, Any]:
         """Variables that surfaces set, as they are in any of their modes: over the unknowns."""
-        found = {}
+        found: dict[Any, Any] = {}
         for component in self.components:
             if component.surface and component.surface.unique:
                 hold = component.mode(component.surface.hold)

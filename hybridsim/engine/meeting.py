@@ -1,9 +1,8 @@
 """Where switching surfaces meet: whether one motion alone is admissible, and whether the surfaces keep it.
 
-On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix), one
-choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and Stone,
-The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000), and what slides stays on the surfaces.
-Surfaces to which all fields point (nodal attractivity) are among these, and so are those that are spiralled into. Where
+On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix),
+one choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and
+Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000), and what slides stays there. Surfaces to which all fields point (nodal attractivity) are among these, and so are those that are spiralled into. Where
 it is not so, a motion that slides along several surfaces is one of many.
 """
 
@@ -78,15 +77,15 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
     if slow:
         names = ", ".join(system.automata[c].name for c in slow)
         return "inconsistent", (
-            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it is "
-            "of a higher order, which is not followed"
+            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it "
+            "is of a higher order, which is not followed"
         )
     pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
     if (pull < 0.0).any():
         names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
         return "nonunique", (
-            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there are "
-            "directions"
+            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there "
+            "are directions"
         )
     return "inconsistent", message
 
@@ -97,17 +96,20 @@ def words_on_cascade(settling: Settling) -> str:
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
     component = model.all_components()[last[0].component]
-    meanings, found = Meanings(model), []
-    for change in last:
-        mode = component.modes[change.source]
-        found.append(
-            next((meanings.family(g.expr.tree) for g in mode.guards if g.name == change.guard), None)
-        )
-    if component.surface or None in found or found[0] != (found[1][0], -found[1][1]):
+    meanings = Meanings(model)
+    guards = [
+        guard
+        for change in last
+        for guard in component.modes[change.source].guards
+        if guard.name == change.guard
+    ]
+    if component.surface or len(guards) != 2:
+        return ""
+    (one, sign), (other, opposite) = (meanings.family(guard.expr.tree) for guard in guards)
+    if one != other or sign != -opposite:
         return ""
     names = " and ".join(component.modes[change.source].name for change in last)
-    text = next(g.expr.text for g in component.modes[last[0].source].guards if g.name == last[0].guard)
     return (
         f". Modes {names} push against each other across one surface: the motion slides along it if it is declared as "
-        f'one, [surfaces.NAME] expr = "{text}", NAME being +1 on one side and -1 on the other'
+        f'one, [surfaces.NAME] expr = "{guards[0].expr.text}", NAME being +1 on one side and -1 on the other'
     )

@@ -56,7 +56,7 @@ class CvodeStepper:
         self.rates = np.asarray(flow.system.rates)
         self.phases = flow.p[at : at + len(self.rates)]
         atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
-        # a fresh start is of order 1: it cannot take up the step of the formula before an event, only what a user asks for
+        # a fresh start is of order 1: it cannot take up the step of before an event, only one that a user asks for
         first = first_step if first_step == tolerances.first_step else None
         self.solver = CVODE(
             self._rhs(),

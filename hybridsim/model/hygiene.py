@@ -1,4 +1,4 @@
-"""What a model may say and hardly means: guards that cannot fire, pulses that a step may pass over, missing units."""
+"""What a model may say and hardly means: guards that cannot fire, pulses and jumps in a flow, missing units."""
 
 from __future__ import annotations
 
@@ -37,8 +37,9 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing is reported that the
-    form of an expression does not show. The guards of contacts are made by the program and not looked at.
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing is
+    reported that the form of an expression does not show. The guards of contacts and surfaces are made by the program
+    and not looked at.
     """
     return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *_of_jumps(model))
 
@@ -219,8 +220,8 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
         is_jump = one.became == KEPT and one.remark == JUMPS
         if is_jump and names_of(meanings.written_out(parse(one.text).tree)) & states:
             yield Caution(
-                f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a motion "
-                "that both sides drive back into the jump crawls",
+                f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a "
+                "motion that both sides drive back into the jump crawls",
                 one.place,
                 'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign.',
             )

@@ -148,7 +148,8 @@ class Model(Declared):
         return hash(_content(self))
 
     def __repr__(self) -> str:
-        automata = [part.name for part in (*self.contacts, *self.surfaces, *self.components)]
+        automata = [contact.name for contact in self.contacts]
+        automata += [surface.name for surface in self.surfaces] + [part.name for part in self.components]
         names = ", ".join(state.name for state in self.states)
         return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
 

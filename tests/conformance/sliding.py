@@ -1,4 +1,4 @@
-"""Scenes of switching surfaces: crossed, slid along, left, met by others, and refused where many motions are possible."""
+"""Scenes of switching surfaces: crossed, slid along, left, met by others, and refused where many motions fit."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def test_chua_from_piece_to_piece(integrator: str) -> None:
 
 
 def test_a_twisting_controller_is_followed_up_to_its_limit() -> None:
-    """x'' = -3 sign(x) - sign(v): half of the swing each time; the limit is sliding of the second order, and is named."""
+    """x'' = -3 sign(x) - sign(v): half of the swing each time; the limit is sliding of second order, and is named."""
     model = hs.Model(
         "twisting",
         states=[hs.State("x", 1, "v"), hs.State("v", 0, "-3*u - w")],

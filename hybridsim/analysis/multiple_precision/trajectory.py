@@ -60,7 +60,7 @@ def multiple_precision_trajectory(
     if model.surfaces:
         names = ", ".join(surface.name for surface in model.surfaces)
         raise UsageError(
-            f"model {model.name} has switching surfaces ({names}), along which the multiple-precision run does not slide",
+            f"model {model.name} has switching surfaces ({names}): the multiple-precision run does not slide",
             remedy="compare with another integrator at a tight tolerance, or with a closed form",
         )
     if not t_span[1] > t_span[0]:
