@@ -37,9 +37,9 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing is
-    reported that the form of an expression does not show. The guards of contacts and surfaces are made by the program
-    and not looked at.
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing
+    is reported that the form of an expression does not show. The guards of contacts and surfaces are made by the
+    program and not looked at.
     """
     return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *_of_jumps(model))
 
