@@ -3,10 +3,10 @@
 On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix),
 one choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and
 Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000). On two surfaces the motion is then
-drawn to where they meet: a turn around it shrinks by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2) times the same of
-the other; surfaces to which all fields point (nodal attractivity) are among these. On more of them it is the one that
-slides, though others may spiral about it. Where -B is no such matrix, a motion that slides along several surfaces is one
-of many.
+drawn to where they meet: a turn around it shrinks by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2) times the same
+of the other; surfaces to which all fields point (nodal attractivity) are among these. On more of them it is the one
+that slides, though others may spiral about it. Where -B is no such matrix, a motion that slides along several surfaces
+is one of many.
 """
 
 from __future__ import annotations
