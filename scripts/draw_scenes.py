@@ -20,6 +20,10 @@ def main() -> None:
         save(time_history(run(name)), FOLDER / f"{name}.png")
     save(friction_loop(run("blade-damper"), "f", "x", t_span=(0.9, 1.0)), FOLDER / "blade-damper.png")
     save(phase_portrait(run("feeny-moon"), t_span=(50, 150)), FOLDER / "feeny-moon.png")
+    for name in ("relay-control", "relay-pair"):
+        save(time_history(run(name)), FOLDER / f"{name}.png")
+    for name in ("sliding-circle", "relay-spiral", "chua"):
+        save(phase_portrait(run(name), "x", "y"), FOLDER / f"{name}.png")
 
 
 def run(name: str) -> hs.Solution:

@@ -23,14 +23,22 @@ from hybridsim.model.meanings import Meanings
 if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
 
+_SAME = 64.0 * UNIT  # two series of one motion differ by the rounding of a few operations
 
-def rivals(
-    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
-) -> np.ndarray:
-    """The admissible joint candidates, where they differ in the mode of a switching surface; else none."""
+
+def rivals(settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray) -> np.ndarray:
+    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion; else none.
+
+    A relay that is just strong enough has one motion in two modes: it may slide, or be on the side that moves no more.
+    """
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
     fine = candidates[verdicts == FINE]
-    return fine if len(np.unique(fine[:, unique], axis=0)) > 1 else fine[:0]
+    if len(np.unique(fine[:, unique], axis=0)) < 2:
+        return fine[:0]
+    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in fine]
+    sizes = np.abs(motions).max(axis=0)
+    same = all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
+    return fine[:0] if same else fine
 
 
 def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:

@@ -354,7 +354,7 @@ class Settling:
         if number == NONE:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
-        if reason := keeps_nothing(self, taking_part, self._with(taking_part, candidates[number])):
+        if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
             return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
         guards = {
             c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0
@@ -383,9 +383,9 @@ class Settling:
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def _joint_verdict(self, modes: np.ndarray, taking_part: list[int], cluster: tuple[int, ...]) -> int:
-        return self.verdict(self._with(taking_part, modes), cluster)
+        return self.verdict(self.with_modes(taking_part, modes), cluster)
 
-    def _with(self, components: list[int], modes: np.ndarray) -> np.ndarray:
+    def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
         """The modes as they are, but for those of some components."""
         z = self.at.z.copy()
         z[components] = modes

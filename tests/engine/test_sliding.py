@@ -216,6 +216,49 @@ def test_a_two_fold_is_left_where_the_surface_stops_attracting() -> None:
     assert "u: above" in solution.message and "u: below" in solution.message
 
 
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+@pytest.mark.parametrize("start", [-1.0, 0.0])
+def test_a_relay_that_is_just_strong_enough(start: float, integrator: str) -> None:
+    """x' = 1 - u: at x = 0 it stays, whether it slides with u = 1 or is above, where nothing moves: one motion."""
+    text = '[states]\nx = { start = 0, der = "1 - u" }\n[surfaces]\nu = "x"\n'
+    solution = run(text, 2.0, x0={"x": start}, integrator=integrator)
+    assert solution.status == "finished"
+    assert solution(2.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "scipy-dop853"])
+def test_a_jump_of_the_load_and_a_reset_end_sliding(integrator: str) -> None:
+    """x' = p - u with p = 0 up to 1, 3 up to 2, 0 again; at t = 5 x is set to -1/2."""
+    text = """
+    [states]
+    x = { start = 0, der = "p - u" }
+
+    [inputs.p]
+    kind = "table"
+    times = [0, 1, 1, 2, 2, 9]
+    values = [0, 0, 3, 3, 0, 0]
+
+    [surfaces]
+    u = "x"
+
+    [schedules.kick]
+    times = [5]
+    reset = { x = "-0.5" }
+    """
+    solution = run(text, 6.0, integrator=integrator)
+    found = [(event.t, event.target) for event in solution.events if event.component == "u"]
+    assert found == [(1.0, "above"), (4.0, "sliding"), (5.0, "below"), (5.5, "sliding")]
+    assert solution([0.5, 1.5, 2.0, 3.0, 4.5, 5.25, 6.0])[0] == pytest.approx([0, 1, 2, 1, 0, -0.25, 0], abs=1e-14)
+
+
+def test_a_reset_off_a_circle_ends_sliding() -> None:
+    text = ALONG_A_CIRCLE + '[schedules.kick]\ntimes = [2]\nreset = { x = "2*x", y = "2*y" }\n'
+    solution = run(text, 4.0, integrator="dop853")
+    found = [(event.t, event.target) for event in solution.events if event.component == "u"]
+    assert [target for _, target in found] == ["sliding", "above", "sliding"]
+    assert [t for t, _ in found] == pytest.approx([math.log(2), 2.0, 2.0 + math.log(2)], abs=1e-9)
+
+
 def test_a_relay_on_the_second_derivative_is_crossed_and_not_slid_along() -> None:
     """x'' = -u: parabolas; from x = 0, v = 0 no motion of the first order goes on."""
     text = '[states]\nx = { start = 0, der = "v" }\nv = { start = 1, der = "-u" }\n[surfaces]\nu = "x"\n'
