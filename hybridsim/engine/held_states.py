@@ -77,7 +77,7 @@ class HeldStates:
         chosen = self._match(list(choices), choices, {})
         if chosen is None:
             lowering = self.lowering
-            titles = dict.fromkeys(f"{lowering.title(c)}s" for c in choices)
+            titles = dict.fromkeys(lowering.title(c, plural=True) for c in choices)
             raise ModelError(
                 f"the {' and '.join(titles)} of "
                 + ", ".join(lowering.components[c].name for c in choices)

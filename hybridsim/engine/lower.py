@@ -199,9 +199,12 @@ class Lowering:
                     remedy="write it over states, inputs, parameters and t",
                 )
 
-    def title(self, c: int) -> str:
+    def title(self, c: int, plural: bool = False) -> str:
         """What a surface's function is called."""
-        return "switching function" if self.components[c].surface.unique else "relative velocity"
+        one, many = "relative velocity", "relative velocities"
+        if self.components[c].surface.unique:
+            one, many = "switching function", "switching functions"
+        return many if plural else one
 
     def written(self, c: int) -> str:
         """A surface's function as it was written."""

@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 _SAME = 64.0 * UNIT  # two series of one motion differ by the rounding of a few operations
 
 
-def rivals(settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray) -> np.ndarray:
-    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion; else none.
+def rivals(
+    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+) -> np.ndarray:
+    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion.
 
-    A relay that is just strong enough has one motion in two modes: it may slide, or be on the side that moves no more.
+    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the side that moves no more.
     """
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
     fine = candidates[verdicts == FINE]

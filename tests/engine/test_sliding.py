@@ -248,7 +248,9 @@ def test_a_jump_of_the_load_and_a_reset_end_sliding(integrator: str) -> None:
     solution = run(text, 6.0, integrator=integrator)
     found = [(event.t, event.target) for event in solution.events if event.component == "u"]
     assert found == [(1.0, "above"), (4.0, "sliding"), (5.0, "below"), (5.5, "sliding")]
-    assert solution([0.5, 1.5, 2.0, 3.0, 4.5, 5.25, 6.0])[0] == pytest.approx([0, 1, 2, 1, 0, -0.25, 0], abs=1e-14)
+    assert solution([0.5, 1.5, 2.0, 3.0, 4.5, 5.25, 6.0])[0] == pytest.approx(
+        [0, 1, 2, 1, 0, -0.25, 0], abs=1e-14
+    )
 
 
 def test_a_reset_off_a_circle_ends_sliding() -> None:
