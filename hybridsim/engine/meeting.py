@@ -31,7 +31,8 @@ def rivals(
 ) -> np.ndarray:
     """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion.
 
-    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the side that moves no more.
+    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the
+    side that moves no more.
     """
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
     fine = candidates[verdicts == FINE]
