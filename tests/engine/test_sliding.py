@@ -206,10 +206,11 @@ def test_dependent_relays_do_not_say_what_each_does() -> None:
     assert "the surfaces u and w do not keep a motion" in solution.message
 
 
-def test_a_two_fold_is_left_where_the_surface_stops_attracting() -> None:
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p", "cvode-bdf"])
+def test_a_two_fold_is_left_where_the_surface_stops_attracting(integrator: str) -> None:
     """x' = -1 above and 1 below times (1 - t): it attracts up to t = 1, where both motions away are admissible."""
     solution = run(
-        '[states]\nx = { start = 0, der = "-(1 - t)*u" }\n[surfaces]\nu = "x"\n', 2.0, integrator="dop853"
+        '[states]\nx = { start = 0, der = "-(1 - t)*u" }\n[surfaces]\nu = "x"\n', 2.0, integrator=integrator
     )
     assert solution.status == "nonunique"
     assert solution.t_end == pytest.approx(1.0, abs=1e-12)
