@@ -32,6 +32,7 @@ _HOME = {
     "Schedule": "hybridsim.model",
     "State": "hybridsim.model",
     "Surface": "hybridsim.model",
+    "SwitchingSurface": "hybridsim.model",
     "list_models": "hybridsim.model",
     "load": "hybridsim.model",
     "load_law": "hybridsim.model",

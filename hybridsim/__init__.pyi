@@ -44,6 +44,7 @@ from hybridsim.model import Parameter as Parameter
 from hybridsim.model import Schedule as Schedule
 from hybridsim.model import State as State
 from hybridsim.model import Surface as Surface
+from hybridsim.model import SwitchingSurface as SwitchingSurface
 from hybridsim.model import list_models as list_models
 from hybridsim.model import load as load
 from hybridsim.model import load_law as load_law

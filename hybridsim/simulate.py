@@ -181,7 +181,8 @@ def _check_functions(method: Integrator, system: System, code: PythonCode, x0: n
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:
     needs = {
-        "contacts": any(a.has_surface for a in system.automata),
+        "contacts": any(a.has_surface and not a.is_unique for a in system.automata),
+        "sliding": any(a.is_unique for a in system.automata),
         "transitions": any(not a.has_surface for a in system.automata),
         "monitors": bool(model.monitors),
         "scheduled": bool(model.schedules or model.inputs),

@@ -21,8 +21,10 @@ PERIODS = 20  # of a scene that does not say how long it runs
 PICTURES: dict[str, Callable[[hs.Solution], Any]] = {
     "blade-damper": lambda sol: friction_loop(sol, "f", "x", t_span=(0.9, 1.0)),
     "buck-converter": lambda sol: time_history(sol, ["v", "i", "ramp", "control"], t_span=(17.6e-3, 20e-3)),
-    "chua": phase_portrait,
+    "chua": lambda sol: phase_portrait(sol, "x", "y"),
     "feeny-moon": lambda sol: phase_portrait(sol, t_span=(50, 150)),
+    "relay-spiral": lambda sol: phase_portrait(sol, "x", "y"),
+    "sliding-circle": lambda sol: phase_portrait(sol, "x", "y"),
 }
 
 HEAD = """# Gallery

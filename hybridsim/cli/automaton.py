@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER
+from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
     from hybridsim.engine.report import Report
@@ -27,8 +28,10 @@ def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> I
     yield from _section("definitions", (f"{name} = {_flat(value)}" for name, value in model.definitions))
     yield from _section("inputs", map(_input, model.inputs))
     laws = {contact.name: contact.law.name for contact in model.contacts}
+    surfaces = {surface.name for surface in model.surfaces}
     for component in model.all_components():
-        kind = f"contact, law {laws[component.name]}" if component.name in laws else "component"
+        kind = "switching surface" if component.name in surfaces else "component"
+        kind = f"contact, law {laws[component.name]}" if component.name in laws else kind
         yield from _section(f"{component.name}: {kind}", _component(component, report))
     yield from _section("corners and jumps", map(_primitive, primitives))
     yield from _section("monitors", map(_monitor, model.monitors))
@@ -94,10 +97,17 @@ def _component(component: Component, report: Report) -> Iterator[str]:
     sides: tuple[str, ...] = ()
     if surface := component.surface:
         sides = (surface.above, surface.below, surface.hold)
-        held = report.held.get(component.name)
+        held, projected = report.held.get(component.name), report.projected.get(component.name)
         yield (
             f"{surface.above} where {_flat(surface.function)} > 0, {surface.below} where it is < 0; "
-            f"{surface.hold} keeps it at 0 by {surface.unknown}" + (f", with {held} exact" if held else "")
+            f"{surface.hold} keeps it at 0 by {surface.unknown}"
+            + (f", with {held} exact" if held else "")
+            + (f", with {', '.join(projected)} projected onto it" if projected else "")
+            + (
+                ""
+                if held or projected
+                else ", which its rate does not depend on: it is crossed, not slid along"
+            )
         )
     for mode in component.modes:
         linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
@@ -111,7 +121,9 @@ def _mode(mode: Mode, sides: list[str]) -> Iterator[str]:
     for state, expression in mode.der.items():
         yield f"{state}' = {_flat(expression)}"
     for guard in mode.guards:
-        yield f"while {_flat(guard.expr)} >= 0   ({guard.name})"
+        text = _flat(guard.expr)
+        attracts = text.startswith(ATTRACTION)
+        yield f"while {'both sides lead to the surface' if attracts else f'{text} >= 0'}   ({guard.name})"
         yield from (f"    {line}" for line in _then(guard, sides))
 
 

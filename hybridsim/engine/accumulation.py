@@ -65,6 +65,15 @@ class Accumulation:
             abs(f - factor) <= 2.0 * _SAME_FACTOR * factor for f in factors
         )
 
+    def last_interval(self) -> float:
+        """Between the last two events."""
+        return self.intervals[-1] if self.intervals else 0.0
+
+    def begin_anew(self) -> None:
+        """Forget the intervals: what came before has been dealt with."""
+        self.last, self.longest, self.forecast = None, 0.0, None
+        self.intervals.clear()
+
     def limit_of_all(self, instants: np.ndarray) -> float | None:
         """Note events (E, 2) in a row; the limit time as soon as there is one, else None."""
         if len(instants) <= _TERMS + 2:

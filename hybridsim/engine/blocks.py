@@ -118,7 +118,9 @@ class SegmentList(list[Segment]):
                 nearest = np.searchsorted(segment.s, at)
                 same = segment.s[np.minimum(nearest, len(segment.s) - 1)] == at
                 x[same] = segment.x[nearest[same]]
-            out[chosen] = system.rows("project", system.n, at, x, segment.p, segment.z) if system.pins else x
+            out[chosen] = (
+                system.rows("project", system.n, at, x, segment.p, segment.z) if system.can_hold else x
+            )
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ class ClosedFormBlock(Sequence[Segment]):
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """States (k, n) in the segments of these numbers, at local times (k,)."""
-        n, pinned = self.system.n, bool(self.system.pins)
+        n, pinned = self.system.n, self.system.can_hold
         out = np.empty((len(s), n))
         closed_form_states(
             self.system.address("project" if pinned else "flow"),

@@ -21,7 +21,7 @@ def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarra
     except (ZeroDivisionError, ValueError, OverflowError):
         return  # not a number at the start: the run itself says where
     for c, effect in effects.items():
-        if effect >= 0.0:
+        if effect >= 0.0 and not system.automata[c].is_unique:
             name = system.automata[c].name
             place = system.model.all_components()[c].place
             raise ModelError(

@@ -292,6 +292,7 @@ class Emitter:
             "guard_count": len(guards),
             "surfaces": tuple(c for c, _ in program.surfaces),
             "pins": program.pins,
+            "projected": program.projected,
             "clusters": tuple(tuple(g) for g in program.clusters),
             "rates": len(program.rates),
             "linear": program.linear,

@@ -248,7 +248,7 @@ def leap(
         put(orders, order_now)
         put(floors, floor_now)
         put(x, y)
-        s, fired = 0.0, -1
+        s, fired, lands = 0.0, -1, landing(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
         while fired < 0 and s < bound:
@@ -279,7 +279,10 @@ def leap(
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
             if outcome == FOUND:
                 fired = g
-            put(y1, y)
+            if lands:
+                call(functions.project, s, y1, p, z, y)
+            else:
+                put(y1, y)
             for i in range(n):
                 scale[i] = max(scale[i], abs(y1[i]))
             for g in range(side_now.shape[0]):
@@ -322,5 +325,14 @@ def holding(automata: Any, z: Any) -> bool:
     """Whether any component holds its surface."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
+            return True
+    return False
+
+
+@inlined
+def landing(automata: Any, z: Any) -> bool:
+    """Whether any component keeps its surface by projection, onto which each step is to land."""
+    for c in range(z.shape[0]):
+        if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c] < 0:
             return True
     return False

@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.decide import side_after
+from hybridsim.engine.gathering import gathered
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
@@ -279,9 +280,7 @@ class ModeLoop:
         system, z = self.system, self.outcome.z
         p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
         error = error.copy()
-        error[[system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and z[c] == a.hold]] = (
-            0.0
-        )
+        error[system.evaluated(z)] = 0.0
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
         resets = [("schedule", k) for k in schedules]
         return Settling(system, at, z.copy(), self.forward).run((), resets)
@@ -289,10 +288,20 @@ class ModeLoop:
     def _accumulated(self, instants: np.ndarray) -> bool:
         """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
         limit = self.accumulation.limit_of_all(instants)
-        if limit is None:
+        if limit is None or self._gathered(limit):
             return False
         self.record.status = "accumulation"
         self.record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+        return True
+
+    def _gathered(self, limit: float) -> bool:
+        """Whether the motion goes on sliding along the surfaces whose crossings accumulate."""
+        left = abs(limit - float(self.origin)) + self.accumulation.last_interval()
+        found = gathered(self.system, self.outcome, self.p, left) if self.forward else None
+        if found is None:
+            return False
+        self.accumulation.begin_anew()
+        self._adopt(self.origin, found, self.outcome.x, (), ())
         return True
 
     def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
@@ -307,9 +316,7 @@ class ModeLoop:
                 s_error = max(s_error, abs(value / slope))
         slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
         x_error = segment.rounding() + s_error * slopes
-        holding = [
-            system.pins[c] for c, a in enumerate(system.automata) if a.has_surface and flow.z[c] == a.hold
-        ]
+        holding = system.evaluated(flow.z)
         x_error[holding] = UNIT * np.abs(arrival.x[holding])
         return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 

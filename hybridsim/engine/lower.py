@@ -6,10 +6,12 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.engine.held_states import HeldStates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.program import Assign, Item, Switch, ordered
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.symbolic import to_sympy
+from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
     from hybridsim.expr.parse import Expression
@@ -19,6 +21,11 @@ if TYPE_CHECKING:
 def user(name: str) -> str:
     """Name of a declared quantity inside the generated program; no internal name starts so."""
     return "v_" + name
+
+
+def _name(symbol: Any) -> str:
+    """The declared name of a symbol."""
+    return str(symbol.name).removeprefix("v_")
 
 
 @dataclass
@@ -31,6 +38,7 @@ class Program:
     derivatives: list[str]
     surfaces: list[tuple[int, str]]  # (component, name of s)
     pins: dict[int, int]  # component -> index of the state that its holding mode evaluates
+    projected: dict[int, tuple[int, ...]]  # component -> those that its holding mode projects instead
     rates: list[Any]  # SymPy, parameters only
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
@@ -57,6 +65,7 @@ class Lowering:
         names += [n for n, _ in model.definitions] + ["t"]
         names += sorted({n for c in self.components for m in c.modes for n in m.set})
         names += [c.surface.unknown for c in self.components if c.surface]
+        names += [ATTRACTION + c.surface.unknown for c in self.components if c.surface and c.surface.unique]
         self.symbols = {n: sp.Symbol(user(n), real=True) for n in names}
         self.s = sp.Symbol("s", real=True)
         self.t = self.symbols["t"]
@@ -64,6 +73,9 @@ class Lowering:
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
         self.effects: list[Any] = []  # of each unknown on the rate of its own surface
+        self.never_held: set[int] = (
+            set()
+        )  # components whose unknown does not act on the rate of their surface
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
@@ -141,13 +153,14 @@ class Lowering:
             if comp.surface
         }
         self._check_surfaces(surfaces)
-        pins = self._choose_pins(surfaces, der)
-        items += self._held_states(surfaces, pins)
-        items += self._mode_variables()
         unknown_items, clusters = self._unknowns(surfaces, der, definitions)
+        held = HeldStates(self, {c: s for c, s in surfaces.items() if c not in self.never_held})
+        items += held.items()
+        items += self._mode_variables()
         items += unknown_items
-        derivative_items, derivatives = self._derivatives(der, pins)
-        items += derivative_items
+        derivative_items, derivatives = self._derivatives(der, held.pins)
+        turning_items, derivatives = held.turned(derivatives)
+        items += derivative_items + turning_items
         items += [Assign(f"surface_{c}", s) for c, s in surfaces.items()]
         guard_items, conditions = self._guards()
         items += guard_items
@@ -157,11 +170,12 @@ class Lowering:
             ordered(items),
             derivatives,
             [(c, f"surface_{c}") for c in surfaces],
-            pins,
+            held.pins,
+            held.projected,
             self.rates,
             clusters,
             [self._jump(c) for c in surfaces],
-            self._linear(der, definitions),
+            self._linear(der, definitions, surfaces),
             conditions,
         )
         return program
@@ -179,96 +193,27 @@ class Lowering:
             if wrong:
                 names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
                 raise ModelError(
-                    f"{self.components[c].name}: its relative velocity '{self._velocity(c)}' uses {names}, which "
+                    f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
                     "depends on a mode",
-                    place=self._place(c),
+                    place=self.place(c),
                     remedy="write it over states, inputs, parameters and t",
                 )
 
-    def _velocity(self, c: int) -> str:
+    def title(self, c: int, plural: bool = False) -> str:
+        """What a surface's function is called."""
+        one, many = "relative velocity", "relative velocities"
+        if self.components[c].surface.unique:
+            one, many = "switching function", "switching functions"
+        return many if plural else one
+
+    def written(self, c: int) -> str:
         """A surface's function as it was written."""
         return " ".join(str(self.components[c].surface.function.text).split())
 
-    def _place(self, c: int) -> Place | None:
+    def place(self, c: int) -> Place | None:
         """Where a surface's function was written."""
         component = self.components[c]
         return component.surface.function.place or component.place
-
-    def _choose_pins(self, surfaces: dict[int, Any], der: list[Any]) -> dict[int, int]:
-        """One state for each surface, with a constant coefficient in it, no two alike, no circle."""
-        sp = self.sp
-        fixed = set(self.states)
-        choices: dict[int, list[int]] = {}
-        for c, s in surfaces.items():
-            found = []
-            for i, x in enumerate(self.states):
-                slope = sp.diff(s, x)
-                if slope != 0 and not slope.free_symbols & fixed:
-                    found.append((0 if abs(slope) == 1 else 1, i))
-            if not found:
-                raise ModelError(
-                    f"{self.components[c].name}: its relative velocity '{self._velocity(c)}' is linear in no state",
-                    place=self._place(c),
-                    remedy="introduce the relative velocity as a state of its own",
-                )
-            choices[c] = [i for _, i in sorted(found)]
-        chosen = self._match(list(surfaces), choices, surfaces, {})
-        if chosen is None:
-            raise ModelError(
-                "the relative velocities of "
-                + ", ".join(self.components[c].name for c in surfaces)
-                + " are not independent: holding all of them at zero leaves no state for each",
-                place=self._place(next(iter(surfaces))),
-                remedy="merge contacts that share one relative velocity",
-            )
-        return chosen
-
-    def _match(
-        self, open_: list[int], choices: dict[int, list[int]], surfaces: dict[int, Any], taken: dict[int, int]
-    ) -> dict[int, int] | None:
-        if not open_:
-            return taken if self._acyclic(taken, surfaces) else None
-        for i in choices[open_[0]]:
-            if i not in taken.values():
-                result = self._match(open_[1:], choices, surfaces, taken | {open_[0]: i})
-                if result is not None:
-                    return result
-        return None
-
-    def _acyclic(self, pins: dict[int, int], surfaces: dict[int, Any]) -> bool:
-        remaining = dict(pins)
-        while remaining:
-            free = [
-                c
-                for c, i in remaining.items()
-                if not surfaces[c].free_symbols & {self.states[j] for d, j in remaining.items() if d != c}
-            ]
-            if not free:
-                return False
-            for c in free:
-                del remaining[c]
-        return True
-
-    def _held_states(self, surfaces: dict[int, Any], pins: dict[int, int]) -> list[Item]:
-        """Effective states: a held one from its constraint, every other as integrated."""
-        sp = self.sp
-        items: list[Item] = []
-        by_state = {i: c for c, i in pins.items()}
-        for i, x in enumerate(self.states):
-            raw = sp.Symbol(f"raw_{i}", real=True)
-            if i not in by_state:
-                items.append(Assign(x.name, raw))
-                continue
-            c = by_state[i]
-            rest = sp.expand(surfaces[c]).coeff(x, 0)
-            value = sp.simplify(-rest / sp.diff(surfaces[c], x))
-            held = sp.Piecewise((value, sp.Symbol("pin", real=True) > 0), (raw, True))
-            component = self.components[c]
-            branches = tuple(
-                (Assign(x.name, held if m.name == component.surface.hold else raw),) for m in component.modes
-            )
-            items.append(Switch(c, branches))
-        return items
 
     def _mode_variables(self) -> list[Item]:
         items: list[Item] = []
@@ -287,6 +232,7 @@ class Lowering:
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
         all_unknown = set(unknown.values())
+        blends = self._blends()
         rate: dict[int, Any] = {}
         effect: dict[tuple[int, int], Any] = {}
         for c in order:
@@ -295,30 +241,64 @@ class Lowering:
             for x, d in zip(self.states, der, strict=True):
                 slope = sp.diff(s, x)
                 if slope != 0:
-                    total += slope * self._inline_unknown(d, definitions, all_unknown)
+                    total += slope * self._inline_unknown(d, definitions | blends, all_unknown)
             for d in order:
                 effect[c, d] = sp.simplify(sp.diff(total, unknown[d]))
                 if effect[c, d].free_symbols & all_unknown:
-                    raise ModelError(
-                        f"{unknown[d].name.removeprefix('v_')} enters the motion of "
-                        f"{self.components[c].name} nonlinearly: it cannot be solved for",
-                        place=self._place(c),
-                        remedy="let the force enter the derivative of the velocity linearly",
-                    )
+                    raise self._nonlinear(c, d, effect[c, d].free_symbols & all_unknown)
             rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
             self.effects.append(effect[c, c])
             if effect[c, c] == 0:
-                raise ModelError(
-                    f"{unknown[c].name.removeprefix('v_')} does not act on its own relative velocity "
-                    f"'{self._velocity(c)}' ({self.components[c].name}): it can never hold it",
-                    place=self._place(c),
-                    remedy=f"use {unknown[c].name.removeprefix('v_')} in the derivative of the velocity state",
-                )
+                if not self.components[c].surface.unique:
+                    raise ModelError(
+                        f"{_name(unknown[c])} does not act on its own relative velocity "
+                        f"'{self.written(c)}' ({self.components[c].name}): it can never hold it",
+                        place=self.place(c),
+                        remedy=f"use {_name(unknown[c])} in the derivative of the velocity state",
+                    )
+                self.never_held.add(c)
         clusters = self._clusters(order, effect)
         items: list[Item] = []
         for cluster in clusters:
             items += self._solve(cluster, unknown, rate, effect)
+        for c in order:
+            if self.components[c].surface.unique:
+                pull = sp.Integer(-1) if c in self.never_held else -effect[c, c]
+                items.append(Assign(user(ATTRACTION + self.components[c].surface.unknown), pull))
         return items, clusters
+
+    def _nonlinear(self, c: int, d: int, others: set[Any]) -> ModelError:
+        """The fault of an unknown that acts on a surface together with itself or others."""
+        unknown = self.symbols[self.components[d].surface.unknown]
+        name, component = _name(unknown), self.components[c]
+        if not component.surface.unique:
+            return ModelError(
+                f"{name} enters the motion of {component.name} nonlinearly: it cannot be solved for",
+                place=self.place(c),
+                remedy="let the force enter the derivative of the velocity linearly",
+            )
+        partners = sorted({name, *map(_name, others)})
+        if len(partners) == 1:
+            message = f"{name} enters the rate of the switching function '{self.written(c)}' nonlinearly"
+            remedy = (
+                f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
+            )
+        else:
+            message = (
+                f"{' and '.join(partners)} multiply each other in the rate of the switching function "
+                f"'{self.written(c)}': where their surfaces meet, the sliding motion is not unique"
+            )
+            remedy = "let the rates be sums of what each surface switches, or write the regions as modes with guards"
+        return ModelError(f"surface {component.name}: {message}", place=self.place(c), remedy=remedy)
+
+    def _blends(self) -> dict[Any, Any]:
+        """Variables that surfaces set, as they are in any of their modes: over the unknowns."""
+        found: dict[Any, Any] = {}
+        for component in self.components:
+            if component.surface and component.surface.unique:
+                hold = component.mode(component.surface.hold)
+                found |= {self.symbols[n]: self.convert(e) for n, e in hold.set.items()}
+        return found
 
     def _inline_unknown(self, e: Any, definitions: dict[Any, Any], unknown: set[Any]) -> Any:
         inner = {k: d for k, d in definitions.items() if self._inline(d, definitions).free_symbols & unknown}
@@ -343,26 +323,17 @@ class Lowering:
         sp = self.sp
         items: list[Item] = []
 
-        def branches(c: int, name: str, in_hold: Any, otherwise: Any) -> Switch:
-            surface = self.components[c].surface
-            return Switch(
-                c,
-                tuple(
-                    (Assign(name, in_hold if m.name == surface.hold else otherwise(m)),)
-                    for m in self.components[c].modes
-                ),
-            )
-
-        def declared(c: int) -> Any:
-            return lambda m: self.convert(m.set[self.components[c].surface.unknown])
-
+        branches = self._in_modes
         if len(cluster) == 1:
             c = cluster[0]
+            if c in self.never_held:
+                return [branches(c, unknown[c].name, sp.Integer(0))]
             value = -rate[c] / effect[c, c]
             if value.count_ops() < 200:
                 value = sp.expand(sp.cancel(sp.together(value)))
-            return [branches(c, unknown[c].name, value, declared(c))]
-        # joint solve: rows of components that do not hold read "unknown = its declared value"
+            return [branches(c, unknown[c].name, value)]
+        # joint solve: rows of components that do not hold read "unknown = its declared value", and it is 0 in the mode
+        # of one that never holds, which is not entered
         matrix: dict[tuple[int, int], Any] = {}
         right: dict[int, Any] = {}
         for c in cluster:
@@ -371,21 +342,38 @@ class Lowering:
                     continue
                 name = f"effect_{c}_{d}"
                 off = sp.Integer(1 if c == d else 0)
-                items.append(branches(c, name, effect[c, d], lambda m, v=off: v))
+                items.append(branches(c, name, off if c in self.never_held else effect[c, d], off))
                 matrix[c, d] = sp.Symbol(name, real=True)
-            items.append(branches(c, f"right_{c}", -rate[c], declared(c)))
+            items.append(branches(c, f"right_{c}", sp.Integer(0) if c in self.never_held else -rate[c]))
             right[c] = sp.Symbol(f"right_{c}", real=True)
-        items += self._eliminate(cluster, unknown, matrix, right)
+        items += self.eliminate(cluster, unknown, matrix, right)
         return items
 
-    def _eliminate(
+    def _in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None) -> Switch:
+        """A name with one value in the holding mode; in the others another, or what they declare for the unknown."""
+        component = self.components[c]
+        surface = component.surface
+        rows = []
+        for m in component.modes:
+            value = in_hold
+            if m.name != surface.hold:
+                value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise
+            rows.append((Assign(name, value),))
+        return Switch(c, tuple(rows))
+
+    def eliminate(
         self,
         cluster: list[int],
         unknown: dict[int, Any],
         matrix: dict[tuple[int, int], Any],
         right: dict[int, Any],
+        prefix: str = "",
     ) -> list[Item]:
-        """Gaussian elimination without exchanges (the effect of forces on accelerations is definite)."""
+        """Gaussian elimination without exchanges: of matrices whose leading minors do not vanish.
+
+        The effects of forces on accelerations are definite, and those of relays that keep their surfaces have positive
+        principal minors.
+        """
         sp = self.sp
         items: list[Item] = []
 
@@ -397,12 +385,12 @@ class Lowering:
             for d in cluster[a + 1 :]:
                 if (d, c) not in matrix:
                     continue
-                factor = fresh(f"factor_{d}_{c}", matrix.pop((d, c)) / matrix[c, c])
+                factor = fresh(f"{prefix}factor_{d}_{c}", matrix.pop((d, c)) / matrix[c, c])
                 for e in cluster[a + 1 :]:
                     if (c, e) in matrix:
                         value = matrix.get((d, e), sp.Integer(0)) - factor * matrix[c, e]
-                        matrix[d, e] = fresh(f"pivot_{a}_{d}_{e}", value)
-                right[d] = fresh(f"right_{a}_{d}", right[d] - factor * right[c])
+                        matrix[d, e] = fresh(f"{prefix}pivot_{a}_{d}_{e}", value)
+                right[d] = fresh(f"{prefix}right_{a}_{d}", right[d] - factor * right[c])
         for a in reversed(range(len(cluster))):
             c = cluster[a]
             value = right[c]
@@ -476,7 +464,9 @@ class Lowering:
 
         return c, reduced(surface.jump_above), reduced(surface.jump_below)
 
-    def _linear(self, der: list[Any], definitions: dict[Any, Any]) -> dict[str, tuple[bool, ...]]:
+    def _linear(
+        self, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
+    ) -> dict[str, tuple[bool, ...]]:
         """Which modes keep the flow linear in the states (unknowns that are solved for included)."""
         free = set(self.states) | {self.symbols[n] for c in self.components for m in c.modes for n in m.set}
         free |= {self.symbols[c.surface.unknown] for c in self.components if c.surface}
@@ -485,15 +475,16 @@ class Lowering:
             inner = sorted(e.free_symbols & free, key=str)
             return all(not self.sp.diff(e, a).free_symbols & free for a in inner)
 
+        def linear(c: int, m: Any) -> bool:
+            surface = self.components[c].surface
+            if surface and m.name == surface.hold and not affine(surfaces[c]):
+                return False
+            return all(
+                affine(self._inline(self.convert(e), definitions)) for e in [*m.set.values(), *m.der.values()]
+            )
+
         base = all(affine(self._inline(d, definitions)) for d in der)
         return {
-            component.name: tuple(
-                base
-                and all(
-                    affine(self._inline(self.convert(e), definitions))
-                    for e in [*m.set.values(), *m.der.values()]
-                )
-                for m in component.modes
-            )
-            for component in self.components
+            component.name: tuple(base and linear(c, m) for m in component.modes)
+            for c, component in enumerate(self.components)
         } | {"": (base,)}

@@ -19,7 +19,7 @@ class Automata(NamedTuple):
     guards_of (C, M, W); hold, above, pin, surface (C,); owner, place (G,): component of a guard, index in its mode;
     cluster_start (C + 1,), cluster (members): the cluster of each component; target, reset (C, M, W, T) of choices;
     reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index);
-    is_corner (C,).
+    is_corner, is_unique (C,).
     """
 
     guards_of: np.ndarray
@@ -36,6 +36,7 @@ class Automata(NamedTuple):
     reset_start: np.ndarray
     reset_slot: np.ndarray
     is_corner: np.ndarray
+    is_unique: np.ndarray
 
 
 class Tapes(NamedTuple):
@@ -103,6 +104,7 @@ def _automata(system: System) -> Automata:
         reset,
         *_flat(reset_slots),
         system.is_corner,
+        np.array([a.is_unique for a in automata], dtype=np.bool_),
     )
 
 

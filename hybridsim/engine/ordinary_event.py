@@ -438,7 +438,7 @@ def decide_surface(
     ranks = work.ranks
     c = automata.owner[fired]
     cluster = automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
-    count = 0
+    count, is_meeting = 0, False
     for i in range(cluster.shape[0]):
         d = cluster[i]
         if d == c or z[d] == hold[d]:
@@ -447,12 +447,16 @@ def decide_surface(
             members[count], current[count], holds[count] = d, z[d], hold[d]
             count += 1
             work.on_surface[d] = True
+            is_meeting = is_meeting or automata.is_unique[d]
+    if is_meeting and count > 1:
+        return -1
     put(z, trial)
     for i in range(count):
         trial[members[i]] = hold[members[i]]
     call(functions.project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        x_error[pin[members[i]]] = UNIT * abs(x[pin[members[i]]])
+        if pin[members[i]] >= 0:
+            x_error[pin[members[i]]] = UNIT * abs(x[pin[members[i]]])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     if count == 1:

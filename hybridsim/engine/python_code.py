@@ -189,6 +189,7 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "guard_count": count,
         "surfaces": (),
         "pins": {},
+        "projected": {},
         "clusters": (),
         "rates": 0,
         "linear": {"": (False,)} | linear,

@@ -28,6 +28,7 @@ class Report:
     ----------
     clusters : names of the surface components that are decided together.
     held : component to the state that its holding mode evaluates from the constraint.
+    projected : component to the states that its holding mode keeps on the surface by projection.
     linear : component to its modes whose flow is linear in the states; "" stands for the states' own equations.
     rates : number of angles that grow in time and are kept modulo 2 pi.
     operations : operations in the generated code, all modes counted.
@@ -36,6 +37,7 @@ class Report:
 
     clusters: tuple[tuple[str, ...], ...]
     held: dict[str, str]
+    projected: dict[str, tuple[str, ...]]
     linear: dict[str, tuple[str, ...]]
     rates: int
     operations: int
@@ -61,6 +63,7 @@ def describe(model: Model) -> Report:
     return Report(
         tuple(tuple(names[c] for c in cluster) for cluster in data["clusters"]),
         {names[c]: model.states[i].name for c, i in data["pins"].items()},
+        {names[c]: tuple(model.states[i].name for i in held) for c, held in data["projected"].items()},
         linear,
         data["rates"],
         operations,

@@ -15,7 +15,7 @@ from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, load, set_origin
+from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.ordinary_event import Before, find_modes, guard_series, put
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
 from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
@@ -275,6 +275,7 @@ def rk_leap(
         put(orders, order_now)
         put(floors, floor_now)
         s, fired, is_holding, is_sure = 0.0, -1, holding(automata, z), True
+        lands = landing(automata, z)
         value, slope = 0.0, 0.0
         forget(room.memory)
         put(x, y)
@@ -300,6 +301,9 @@ def rk_leap(
             error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
             room.counts[0] += 1
             h = min(next_length(d, error, error_order, room.memory), max_step)
+            if lands:
+                call(functions.project, s + d, y1, p, z, slopes)
+                put(slopes, y1)
             if not (
                 error <= 1.0
                 and series_of(step_rows, step_guards, time, states, derivatives, s + d, y1, W, right)

@@ -110,7 +110,7 @@ class SeriesBlock(Sequence[Segment]):
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """States (k, n) in the segments of these numbers, at local times (k,)."""
-        out, pinned = np.empty((len(s), self.system.n)), bool(self.system.pins)
+        out, pinned = np.empty((len(s), self.system.n)), self.system.can_hold
         project = self.system.address("project" if pinned else "flow")
         record = (self.modes, self.vectors, self.jumps)
         series_states(project, pinned, index, s, self.ends, self.steps, self.polynomials, record, out)

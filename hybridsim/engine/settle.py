@@ -19,6 +19,7 @@ from hybridsim.engine.decide import (
 )
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.system import Series, System
 
@@ -108,7 +109,7 @@ class Settling:
         return self._stop(
             "cascade",
             f"transitions follow each other over and over, {limit} rounds without rest ({names}); "
-            f"guards that fire: {guards}",
+            f"guards that fire: {guards}{words_on_cascade(self)}",
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
@@ -159,8 +160,10 @@ class Settling:
             if g >= 0 and self.fired[g]
         ]
 
-    def _series(self, z: np.ndarray, x: np.ndarray) -> Series | DifferenceSeries:
+    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series | DifferenceSeries:
+        """Series along the flow of the modes z, at the state as it is now or at another."""
         at = self.at
+        x = at.x if x is None else x
         behind = (at.s, x, at.p, at.x_error)
         if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
             self.behind, self.series = behind, {}
@@ -171,7 +174,7 @@ class Settling:
 
     def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
         """Verdict on the guards of some components in the candidate z."""
-        series = self._series(z, x)
+        series = self.series_of(z, x)
         active = np.zeros(self.system.guard_count, dtype=np.bool_)
         table = self.system.guards_of(z)
         for c in components:
@@ -338,6 +341,10 @@ class Settling:
         verdicts = np.array(
             [self._joint_verdict(c, taking_part, cluster) for c in candidates], dtype=np.int64
         )
+        rival = rivals(self, taking_part, candidates, verdicts)
+        if len(rival):
+            status = "nonunique" if self.forward else "backward-nonunique"
+            return status, self._say(taking_part, rival, "several motions are admissible")
         holds = np.array([automata[c].hold for c in taking_part])
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
@@ -345,8 +352,10 @@ class Settling:
                 taking_part, candidates[verdicts != LEAVES], "several motions are admissible"
             )
         if number == NONE:
-            return "inconsistent", self._say(taking_part, candidates, "no motion is admissible")
+            return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
+        if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
+            return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
         guards = {
             c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0
         }
@@ -363,7 +372,7 @@ class Settling:
 
     def _pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)
-        mask[[self.system.pins[c] for c in components]] = True
+        mask[[self.system.pins[c] for c in components if c in self.system.pins]] = True
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
@@ -374,9 +383,13 @@ class Settling:
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def _joint_verdict(self, modes: np.ndarray, taking_part: list[int], cluster: tuple[int, ...]) -> int:
+        return self.verdict(self.with_modes(taking_part, modes), cluster)
+
+    def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
+        """The modes as they are, but for those of some components."""
         z = self.at.z.copy()
-        z[taking_part] = modes
-        return self.verdict(np.maximum(z, 0), cluster)
+        z[components] = modes
+        return np.maximum(z, 0)
 
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
         """Whether the guards of some components admit the modes z just after the event."""
@@ -439,7 +452,7 @@ class Settling:
 
     def _done(self) -> Outcome:
         at = self.at
-        series = self._series(np.maximum(at.z, 0), at.x)
+        series = self.series_of(np.maximum(at.z, 0), at.x)
         found = [side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)]
         monitor_sides = np.array([f[0] for f in found], dtype=np.int64)
         monitor_orders = np.array([f[1] for f in found], dtype=np.int64)

@@ -102,6 +102,8 @@ class Flow:
         system = self.system
         self.n = system.n
         self._flow = system.address("flow")
+        holding = (c for c in system.projected if self.z[c] == system.automata[c].hold)
+        self._projected = sorted({i for c in holding for i in system.projected[c]})
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         """dx/dt in a fresh array; NaN where the model has no value."""
@@ -128,7 +130,15 @@ class Flow:
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """States (k, n) at local times (k,) with held states on their constraints."""
         x = np.ascontiguousarray(x, dtype=float)
-        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.pins else x
+        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
+
+    def landed(self, s: float, x: np.ndarray) -> np.ndarray:
+        """The end of a step, with states that a projection keeps on a surface put back onto it."""
+        if not self._projected:
+            return x
+        held = x.copy()
+        held[self._projected] = self.project(np.array([s]), x[None, :])[0, self._projected]
+        return held
 
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Guard values (k, guards); held states are evaluated from their constraints on the way."""

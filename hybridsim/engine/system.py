@@ -42,6 +42,7 @@ class Automaton:
     below: int = -1
     hold: int = -1
     initial: int = -1
+    is_unique: bool = False  # its surface takes a motion only where no other is admissible
     is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
 
     @property
@@ -146,6 +147,7 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
             else (-1, -1, -1)
         ),
         initial=-1 if component.initial is None else names.index(component.initial),
+        is_unique=bool(surface and surface.unique),
         is_corner=isinstance(component, Corner),
     )
 
@@ -209,6 +211,7 @@ class System:
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
         self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
         self.pins: dict[int, int] = data["pins"]
+        self.projected: dict[int, tuple[int, ...]] = data["projected"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
         self.quantities: tuple[str, ...] = data["quantities"]
         self.resets: dict[tuple[Any, ...], tuple[int, tuple[str, ...]]] = frame.resets
@@ -238,6 +241,19 @@ class System:
     def is_linear(self) -> bool:
         """Whether the flow of every mode is linear in the states."""
         return all(all(modes) for modes in self.linear.values())
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether some mode holds states on a surface."""
+        return bool(self.pins or self.projected)
+
+    def holds(self, z: np.ndarray) -> bool:
+        """Whether a mode in z holds states on a surface."""
+        return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
+
+    def evaluated(self, z: np.ndarray) -> list[int]:
+        """The states that the modes in z evaluate from their constraints, each exactly."""
+        return [i for c, i in self.pins.items() if z[c] == self.automata[c].hold]
 
     # -- values ---------------------------------------------------------------------------------------------
 
@@ -281,7 +297,7 @@ class System:
         """The functions that every run needs compiled; the others are compiled when they are first used."""
         names = ["flow"]
         names += ["guards"] if self.guard_count else []
-        names += ["project"] if self.pins else []
+        names += ["project"] if self.can_hold else []
         names += ["monitors"] if self.monitor_names else []
         return tuple(names)
 
@@ -309,7 +325,7 @@ class System:
 
     def project(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
         """x with every held state evaluated from its constraint."""
-        if not self.pins:
+        if not self.can_hold:
             return x
         out = np.empty(self.n)
         evaluate(self.address("project"), s, np.ascontiguousarray(x), p, z, out)

@@ -16,13 +16,15 @@ from hybridsim.engine.trajectory import Task, Trajectory
 
 NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
 CAPABILITIES = {
-    "contacts": "components with a surface: contacts, relays",
+    "contacts": "contacts with dry friction, which stick",
     "located": "events of contacts are located: their number and order are those of the motion",
+    "sliding": "switching surfaces, along which a motion slides",
     "transitions": "general automata: modes, choices, resets",
     "monitors": "events that change no mode",
     "scheduled": "events and inputs at times known beforehand",
     "multiple-roots": "several zeros of a guard within one step",
     "accumulation": "events that follow each other ever faster, down to rounding",
+    "tangent-exit": "sliding that is left, at a tangency as ever, where several states make the surface",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
     "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",

@@ -59,6 +59,7 @@ class Moreau(Integrator):
         "stiff": "its iteration for the new state needs steps that resolve stiff rates",
         "multiple-roots": "only the signs at the ends of a step are compared",
         "backward": "the law of a contact that sticks has no past",
+        "sliding": "its solve is made for friction forces; what a switching surface weighs needs another",
         "functions": "it takes forces apart that are declared by expressions",
     }
 

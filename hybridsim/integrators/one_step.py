@@ -101,8 +101,9 @@ class OneStepStepper(ABC):
             if trial.error <= 1.0:
                 break
             self.flow.counters.rejected += 1
-        self.here = self._point(self.bound if last else start.s + direction * h, trial.x)
-        return Step(start.s, self.here.s, start.x, trial.x, self._dense(start, self.here, trial))
+        s = self.bound if last else start.s + direction * h
+        self.here = self._point(s, self.flow.landed(s, trial.x))
+        return Step(start.s, s, start.x, self.here.x, self._dense(start, self.here, trial))
 
     def restep(self, step: Step, s: float) -> Step:
         """The step up to s in one step of exactly that length; in equal parts where its error asks for them."""

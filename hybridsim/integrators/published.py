@@ -22,6 +22,7 @@ _FIXED = {
     "multiple-roots": "only the signs at the ends of a step are compared",
     "stiff": "explicit, with a fixed step",
     "backward": "the zone rule of the force has no past",
+    "sliding": "its zone rule is made for friction, which opposes a velocity; a relay needs another",
     "functions": "it is a method for contacts, which are declared by expressions",
 }
 

@@ -18,6 +18,10 @@ _MISSES = (
     "(SUNDIALS, CVODE user guide, section on rootfinding)"
 )
 _NOISE = "hops shorter than its tolerances are noise to its root finding; the run then stops saying so"
+_TANGENT = (
+    "its root finding sees the value of a guard, which is below the error of the states at first where a surface over "
+    "several of them is left at a tangency; the run then stops saying so"
+)
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
 
@@ -52,13 +56,15 @@ class CvodeStepper:
         self.rates = np.asarray(flow.system.rates)
         self.phases = flow.p[at : at + len(self.rates)]
         atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
+        # a fresh start is of order 1: it cannot take up the step of before an event, only one that a user asks for
+        first = first_step if first_step == tolerances.first_step else None
         self.solver = CVODE(
             self._rhs(),
             jacfn=self._jacobian() if method == "BDF" else None,
             method=method,
             rtol=tolerances.rtol,
             atol=atol,
-            first_step=first_step or 0.0,
+            first_step=first or 0.0,
             max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,
             max_num_steps=_MAX_STEPS,
             **options,
@@ -179,7 +185,11 @@ class CvodeBDF(Integrator):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = {"multiple-roots": _MISSES, "accumulation": _NOISE}
+    lacks: ClassVar[dict[str, str]] = {
+        "multiple-roots": _MISSES,
+        "accumulation": _NOISE,
+        "tangent-exit": _TANGENT,
+    }
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
@@ -210,6 +220,7 @@ class CvodeAdams(Integrator):
     lacks: ClassVar[dict[str, str]] = {
         "multiple-roots": _MISSES,
         "accumulation": _NOISE,
+        "tangent-exit": _TANGENT,
         "stiff": "functional order drops with the step: use cvode-bdf",
     }
     dense_is_accurate: ClassVar[bool] = True

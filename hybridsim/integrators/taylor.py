@@ -61,8 +61,9 @@ class TaylorStepper:
             h *= _SHORTER
         if not h >= _SMALLEST * math.ulp(self.s):
             raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
-        s0, x0, self.x = self.s, self.x, x1
+        s0, x0 = self.s, self.x
         self.s = self.bound if last else s0 + direction * h
+        self.x = self.flow.landed(self.s, x1)
         return Step(s0, self.s, x0, x1, _dense(s0, coefficients))
 
     def _holds(self, coefficients: np.ndarray, x1: np.ndarray, d: float) -> bool:

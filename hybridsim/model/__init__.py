@@ -11,6 +11,7 @@ from hybridsim.model.model import Model
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.schedule import Schedule
+from hybridsim.model.switching import SwitchingSurface
 
 __all__ = [
     "Choice",
@@ -31,6 +32,7 @@ __all__ = [
     "Schedule",
     "State",
     "Surface",
+    "SwitchingSurface",
     "list_laws",
     "list_models",
     "load",

@@ -124,11 +124,7 @@ def _contact(scope: Scope, contact: Contact) -> None:
     reached = scope.reached(contact.velocity)
     if not (reached <= scope.all_names and contact.law.is_set_valued):
         return
-    forces = sorted(
-        name
-        for name in reached
-        if "variable" in scope.kinds.get(name, "") or scope.kinds.get(name) == "contact force"
-    )
+    forces = sorted(name for name in reached if scope.is_switched(name))
     if forces:
         message = f"{what}: the velocity depends on '{forces[0]}', which depends on a mode"
         scope.fail(contact, message, "write it over states, inputs, parameters and t.")

@@ -86,6 +86,8 @@ class Surface(Declared):
     above, below, hold : mode for s > 0, for s < 0, and on s = 0.
     jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s =
         0+ (in ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
+    unique : the motion must be the only admissible one. Otherwise what holds comes first, as static friction does,
+        and the unknown has to oppose s.
     """
 
     function: Expression
@@ -95,6 +97,7 @@ class Surface(Declared):
     hold: str
     jump_above: Expression
     jump_below: Expression
+    unique: bool = False
 
     def __post_init__(self) -> None:
         self._texts("unknown", "above", "below", "hold")

@@ -1,4 +1,4 @@
-"""What a model may say and hardly means: guards that cannot fire, pulses that a step may pass over, missing units."""
+"""What a model may say and hardly means: guards that cannot fire, pulses and jumps in a flow, missing units."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import HybridsimError, Place
-from hybridsim.expr import Expression
+from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import TIME
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
+from hybridsim.model.smoothing import smoothing_of
 
 if TYPE_CHECKING:
     from hybridsim.model.component import Component, Mode
@@ -34,10 +37,11 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t. Nothing is reported that the
-    form of an expression does not show. The guards of contacts are made by the program and not looked at.
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing
+    is reported that the form of an expression does not show. The guards of contacts and surfaces are made by the
+    program and not looked at.
     """
-    return (*_of_signs(model), *_of_units(model), *_of_pulses(model))
+    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *_of_jumps(model))
 
 
 class _Reading:
@@ -195,6 +199,9 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
     for contact in model.contacts:
         yield f"contact {contact.name}", contact.velocity
         yield f"contact {contact.name}", contact.normal
+    for surface in model.surfaces:
+        values = (surface.expr, *surface.above.values(), *surface.below.values())
+        yield from ((f"surface {surface.name}", expr) for expr in values)
     for component in model.components:
         for mode in component.modes:
             where = f"mode {mode.name} of component {component.name}"
@@ -202,3 +209,19 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
             yield from ((f"guard {guard.name} of {where}", guard.expr) for guard in mode.guards)
     for monitor in model.monitors:
         yield f"monitor {monitor.name}", monitor.expr
+
+
+def _of_jumps(model: Model) -> Iterator[Caution]:
+    """Jumps inside a mode where a state changes its sign, along which a motion cannot slide."""
+    if not uses_primitives(model):
+        return
+    meanings, states = Meanings(model), {state.name for state in model.states}
+    for one in smoothing_of(model).primitives:
+        is_jump = one.became == KEPT and one.remark == JUMPS
+        if is_jump and names_of(meanings.written_out(parse(one.text).tree)) & states:
+            yield Caution(
+                f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a "
+                "motion that both sides drive back into the jump crawls",
+                one.place,
+                'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign.',
+            )

@@ -18,6 +18,7 @@ from hybridsim.model.law_with_states import ContactState
 from hybridsim.model.monitor import Monitor
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.schedule import Schedule
+from hybridsim.model.switching import SwitchingSurface
 
 _PARTS: dict[str, type[Declared]] = {
     "states": State,
@@ -29,6 +30,7 @@ _PARTS: dict[str, type[Declared]] = {
     "monitors": Monitor,
     "schedules": Schedule,
     "outputs": Output,
+    "surfaces": SwitchingSurface,
 }
 
 
@@ -42,6 +44,7 @@ class Model(Declared):
     parameters : `Parameter` objects, or a dict of name to number or expression.
     discrete : states changed by resets and ticks only.
     components, contacts : the automata; their modes together are the discrete state z.
+    surfaces : switching surfaces, along which the motion may slide; automata as well.
     inputs, monitors, schedules : known signals, events that change no mode, events at known times.
     outputs : `Output` objects, or a dict of name to expression.
     definitions : named intermediate expressions, a dict or pairs; they may use one another and what
@@ -83,6 +86,7 @@ class Model(Declared):
     duration: Expression | None = None
     path: str | None = None
     flow: Callable[..., Any] | None = None
+    surfaces: tuple[SwitchingSurface, ...] = ()
 
     def __post_init__(self) -> None:
         self._functions("flow")
@@ -144,7 +148,8 @@ class Model(Declared):
         return hash(_content(self))
 
     def __repr__(self) -> str:
-        automata = [*(contact.name for contact in self.contacts), *(part.name for part in self.components)]
+        automata = [contact.name for contact in self.contacts]
+        automata += [surface.name for surface in self.surfaces] + [part.name for part in self.components]
         names = ", ".join(state.name for state in self.states)
         return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
 
@@ -274,12 +279,13 @@ class Model(Declared):
         return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
-        """All automata: the contacts expanded, then the components, in order of declaration; corners last."""
+        """All automata: the contacts expanded, the surfaces, the components, in order of declaration; corners last."""
         components: tuple[Component, ...] = self.once("components", self._components)
         return components
 
     def _components(self) -> tuple[Component, ...]:
         parts = [part for contact in self.contacts for part in self.components_of(contact)]
+        parts += [surface.component() for surface in self.surfaces]
         parts += self.components
         return tuple(sorted(parts, key=lambda part: isinstance(part, Corner)))
 
@@ -360,7 +366,7 @@ class Model(Declared):
 
 def _content(model: Model) -> tuple[object, ...]:
     parts = (
-        model.states, model.parameters, model.discrete, model.components, model.contacts, model.inputs,
+        model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
         model.monitors, model.schedules, model.outputs, model.definitions,
     )  # fmt: skip
     words = (model.title, model.source, model.description, model.look, model.duration)

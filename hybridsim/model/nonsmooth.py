@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # what became of a primitive
 COMPONENT, MODE, KEPT, POWER = "component", "mode", "kept", "power"
+JUMPS = "it jumps, as far as its form shows"  # the reason to keep a primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
 _ZERO = ast.Constant(0)
@@ -61,6 +62,8 @@ def _expressions(model: Model) -> Iterator[Expression]:
         yield from (contact.velocity, contact.normal, *(expr for _, expr in contact.law.expressions()))
         yield from (value for value in contact.law.parameters.values() if value is not None)
         yield from contact.arguments.values()
+    for surface in model.surfaces:
+        yield from (surface.expr, *surface.above.values(), *surface.below.values())
     for component in model.components:
         for mode in component.modes:
             yield from (*mode.der.values(), *mode.set.values(), *(guard.expr for guard in mode.guards))

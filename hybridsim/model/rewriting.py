@@ -14,6 +14,7 @@ from hybridsim.model.continuity import is_continuous
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.nonsmooth import (
     COMPONENT,
+    JUMPS,
     KEPT,
     MODE,
     POWER,
@@ -147,7 +148,7 @@ class Rewriting:
                 node, f"it depends on {', '.join(sorted(forced))}, which a mode solves for", here
             )
         if not self._agrees(node, parts):
-            return self._kept(node, "it jumps, as far as its form shows", here)
+            return self._kept(node, JUMPS, here)
         if self.refusal:
             return self._kept(node, self.refusal, here)
         found = self.corners.get(family)

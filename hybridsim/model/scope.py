@@ -31,6 +31,7 @@ class Scope:
                 yield from self.model.components_of(contact)
             except ModelError as fault:
                 self.errors.append(fault)
+        yield from (surface.component() for surface in self.model.surfaces)
         yield from self.model.components
 
     def fail(self, part: Declared, message: str, remedy: str) -> None:
@@ -57,13 +58,23 @@ class Scope:
         for contact in model.contacts:
             yield "contact force", contact.name, contact
         brought = {contact.name for contact in model.contacts}
-        for component in self.components[: len(self.components) - len(model.components)]:
+        own = len(model.surfaces) + len(model.components)
+        for component in self.components[: len(self.components) - own]:
             for name in component.variables:
                 if name not in brought:
                     yield f"variable of contact {component.name}", name, component
+        for surface in model.surfaces:
+            yield "switching surface", surface.name, surface
+            for name in surface.above:
+                yield f"variable of surface {surface.name}", name, surface
         for component in model.components:
             for name in component.variables:
                 yield f"variable of component {component.name}", name, component
+
+    def is_switched(self, name: str) -> bool:
+        """Whether a name stands for something that modes decide."""
+        kind = self.kinds.get(name, "")
+        return kind.startswith("variable") or kind in ("contact force", "switching surface")
 
     @cached_property
     def changed_by_reset(self) -> tuple[str, ...]:

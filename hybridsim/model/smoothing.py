@@ -108,6 +108,7 @@ class _Smoothing:
             definitions=tuple(definitions),
             components=(*made, *map(self._corner_component, self.work.corners.values())),
             contacts=(),
+            surfaces=(),
             monitors=monitors,
         )
 

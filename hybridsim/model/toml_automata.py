@@ -75,10 +75,11 @@ def _surface(parent: Table) -> Surface | None:
         return None
     names = ("unknown", "above", "below", "hold")
     jumps = ("jump_above", "jump_below")
-    table.only("function", *names, *jumps)
+    table.only("function", *names, *jumps, "unique")
     for key in names:
         table.require(key, f'write {key} = "...".')
     unknown, above, below, hold = (table.text(key) for key in names)
     jump_above, jump_below = (table.needed(key, f"{key} = 0 says that nothing jumps there.") for key in jumps)
     function = table.needed("function", 'write function = "s(t, x)".')
-    return Surface(function, unknown, above, below, hold, jump_above, jump_below, place=table.place)
+    unique = table.flag("unique")
+    return Surface(function, unknown, above, below, hold, jump_above, jump_below, unique, place=table.place)

@@ -17,6 +17,7 @@ from hybridsim.model.monitor import Monitor
 from hybridsim.model.positions import positions
 from hybridsim.model.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.schedule import Schedule
+from hybridsim.model.switching import SwitchingSurface
 from hybridsim.model.toml_automata import read_components
 from hybridsim.model.toml_inputs import read_inputs
 from hybridsim.model.toml_laws import read_law_of_contact, read_laws
@@ -25,7 +26,7 @@ from hybridsim.model.toml_table import Source, Table
 SCHEMA = 1
 KEYS = (
     "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
-    "definitions", "inputs", "laws", "contacts", "initial", "modes", "components", "monitors", "schedules",
+    "definitions", "inputs", "laws", "contacts", "surfaces", "initial", "modes", "components", "monitors", "schedules",
     "clocks", "outputs",
 )  # fmt: skip
 
@@ -91,6 +92,7 @@ def _model(root: Table, folder: Path) -> Model:
         discrete=tuple(_discrete(root)),
         components=tuple(read_components(root)),
         contacts=tuple(_contacts(root, laws)),
+        surfaces=tuple(_surfaces(root)),
         inputs=tuple(read_inputs(root, folder)),
         monitors=tuple(_monitors(root)),
         schedules=(*_schedules(root), *_clocks(root)),
@@ -145,6 +147,19 @@ def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
                 table.reals("nominal"),
                 place=table.place,
             )
+
+
+def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
+    for name, table in root.entries("surfaces", "surface", "expr"):
+        table.only("expr", "above", "below")
+        expr = table.needed("expr", 'write expr = "what is positive on one side and negative on the other".')
+        above, below = table.expressions("above"), table.expressions("below")
+        single = sorted(set(above) ^ set(below))
+        for one in single:
+            given, side = ("above", "below") if one in above else ("below", "above")
+            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}.", given, one)
+        if not single:
+            yield SwitchingSurface(name, expr, above, below, place=table.place)
 
 
 def _monitors(root: Table) -> Iterable[Monitor]:

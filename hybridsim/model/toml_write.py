@@ -59,6 +59,9 @@ def _lines(model: Model) -> Iterator[str]:
         yield from _section(f"laws.{_key(law.name)}", _law(law))
     for contact in model.contacts:
         yield from _section(f"contacts.{_key(contact.name)}", _contact(contact, laws))
+    for surface in model.surfaces:
+        sides = {"above": surface.above, "below": surface.below}
+        yield from _section(f"surfaces.{_key(surface.name)}", {"expr": surface.expr, **sides})
     for component in model.components:
         yield from _component(component)
     for monitor in model.monitors:
@@ -127,7 +130,7 @@ def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any
 def _component(component: Component) -> Iterator[str]:
     head = f"components.{_key(component.name)}"
     surface = component.surface
-    fields = ("function", "unknown", "above", "below", "hold", "jump_above", "jump_below")
+    fields = ("function", "unknown", "above", "below", "hold", "jump_above", "jump_below", "unique")
     entries: dict[str, Any] = {"initial": component.initial}
     if surface is not None:
         entries["surface"] = {field: getattr(surface, field) for field in fields}

@@ -11,6 +11,7 @@ from hybridsim.model.check_expressions import check_expressions, check_given
 from hybridsim.model.check_functions import check_functions
 from hybridsim.model.check_names import check_names
 from hybridsim.model.check_signals import check_signals
+from hybridsim.model.check_surfaces import check_surfaces
 from hybridsim.model.check_values import check_values
 from hybridsim.model.scope import Scope
 
@@ -35,6 +36,7 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_names(scope)
     check_automata(scope)
     check_contacts(scope)
+    check_surfaces(scope)
     check_signals(scope)
     check_functions(scope)
     check_expressions(scope)

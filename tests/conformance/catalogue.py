@@ -6,16 +6,13 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from conformance import corners, oscillators
+from conformance import corners, oscillators, sliding
 from conformance.checks import equals, exact_stick, says
 from conformance.facts import CASES, TRUTHS
 from conformance.scene import END, Scene, Truth
 
 LEFT_OUT = {
     "FEENY": "the normal load depends on the state and vanishes: a contact that opens",
-    "SIC-filippov": "sliding along two surfaces at once, reached through infinitely many crossings",
-    "SIC-relay2": "sliding along two surfaces at once",
-    "NOS-leave": "sliding that ends at a tangency, for a general surface",
 }
 
 
@@ -516,7 +513,7 @@ def left_once(solution: Any) -> list[str]:
 # Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
 NONLINEAR = {
     "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
-    "drag",
+    "drag", "circle-surface", "sliding-circle",
 }  # fmt: skip
 
 
@@ -538,5 +535,6 @@ SCENES: tuple[Scene, ...] = tuple(
         *backward(),
         *coincidences(),
         *corners.scenes(),
+        *sliding.scenes(),
     )
 )

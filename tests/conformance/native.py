@@ -31,6 +31,8 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "flat-guard": (CLOSED, {}),
     "u-and-its-cube": (BRENT, {}),
     "clock-and-guard-at-once": ("", {"scipy-radau": TWO_VALUES}),
+    "sliding-circle": ("", {"scipy-lsoda": CLOSED, "scipy-bdf": CLOSED}),
+    "two-relays": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
     "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),
 }
 

@@ -10,6 +10,7 @@ from typing import Any
 VOCABULARY = (
     "contacts",
     "located",
+    "sliding",
     "transitions",
     "nonlinear",
     "functions",
@@ -17,6 +18,7 @@ VOCABULARY = (
     "scheduled",
     "multiple-roots",
     "accumulation",
+    "tangent-exit",
     "exact-stick",
     "backward",
     "corners",

@@ -13,6 +13,7 @@ import mpmath
 from engine.multiple_precision import evaluate
 
 from hybridsim.model import Model
+from hybridsim.model.switching import ATTRACTION
 
 
 class ByHand:
@@ -43,6 +44,7 @@ class ByHand:
             self.guards[component.name] = [g.expr.text for g in mode.guards]
             if component.surface and mode.name == component.surface.hold:
                 self.holding[component.surface.unknown] = component.surface.function.text
+        self.attraction: dict[str, Any] = {}  # how strongly each unknown pulls towards its own surface
         self.unknown: dict[str, Any] = {}
         self.unknown = self.solve()
 
@@ -79,6 +81,7 @@ class ByHand:
             column = rates([mpmath.mpf(int(i == j)) for i in range(n)]) - at_rest
             for i in range(n):
                 effect[i, j] = column[i]
+        self.attraction = {f"{ATTRACTION}{name}": -effect[i, i] for i, name in enumerate(names)}
         solution = mpmath.lu_solve(effect, -at_rest)
         return {name: solution[i] for i, name in enumerate(names)}
 
@@ -88,7 +91,7 @@ class Names(Mapping[str, Any]):
 
     def __init__(self, by_hand: ByHand, t: Any, x: Mapping[str, Any]) -> None:
         self.by_hand = by_hand
-        self.given = {"t": t, **by_hand.known, **x, **by_hand.unknown}
+        self.given = {"t": t, **by_hand.known, **x, **by_hand.unknown, **by_hand.attraction}
 
     def __getitem__(self, name: str) -> Any:
         if name not in self.given:

@@ -48,7 +48,7 @@ def everything() -> hs.Model:
             hs.State("x", "x_start", "v", unit="m", nominal=1e-3),
             hs.State("v", 0, "(u1 + u2 + u3 + u4 - f1 - f2 - k*x)/m"),
             hs.State("w", 0.5, "-r - w + n"),
-            hs.State("T", 15, "(heat - T)/10", unit="degC"),
+            hs.State("T", 15, "(heat - T)/10 - leak - side/50", unit="degC"),
         ],
         parameters=[
             hs.Parameter("m", 2, "kg", "mass"),
@@ -61,6 +61,7 @@ def everything() -> hs.Model:
         ],
         discrete=[hs.Discrete("n", 0), hs.Discrete("scale", "q/30", "K")],
         components=[relay, held],
+        surfaces=[hs.SwitchingSurface("side", "T - 19", above={"leak": "T/100"}, below={"leak": "scale/9"})],
         contacts=[
             hs.Contact("f1", "v", "m*9.81", sticky, {"mu": 0.3, "v_s": "P/100"}),
             hs.Contact("f2", "v - 0.1*cos(3*t)", "max(0, 1 + load)", plain, {"mu": "0.1 + P"}),

@@ -108,8 +108,8 @@ def test_names_of_the_law_and_of_the_model_do_not_mix() -> None:
 
 
 def test_components_come_in_order_of_declaration() -> None:
-    assert [part.name for part in everything().all_components()] == ["f1", "f2", "relay", "hold"]
-    assert everything().all_components()[3].variables == ("r",)
+    assert [part.name for part in everything().all_components()] == ["f1", "f2", "side", "relay", "hold"]
+    assert everything().all_components()[4].variables == ("r",)
 
 
 def test_velocity_of_a_moving_base() -> None:

@@ -13,7 +13,7 @@ from hybridsim.model.library import list_laws, models_folder
 WANTED = {
     "dfcs", "dfcs-stribeck", "belt", "free-decay", "static-kinetic", "bouncing-ball", "thermostat", "square-wave",
     "sampled-servo", "base-isolation", "feeny-moon", "blade-damper", "drill-string", "pid-servo", "valve-stiction",
-    "lugre-presliding", "clutches",
+    "lugre-presliding", "clutches", "relay-control", "sliding-circle", "relay-spiral", "relay-pair", "chua",
 }  # fmt: skip
 
 

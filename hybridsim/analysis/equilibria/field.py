@@ -32,7 +32,7 @@ class Field:
         self.guards = np.flatnonzero(system.active(z))
         self._tape = TangentTape(system, z, tuple(self.guards.tolist()))
         self._seeds = np.eye(system.n + 1 + len(self.p), system.n)
-        self.held = [system.pins[c] for c in system.pins if z[c] == system.automata[c].hold]
+        self.held = system.evaluated(z)
         self.free = [i for i in range(system.n) if i not in self.held]
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

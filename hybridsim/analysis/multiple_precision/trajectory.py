@@ -57,6 +57,12 @@ def multiple_precision_trajectory(
 
     if not _FEWEST <= digits <= _MOST:
         raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_FEWEST} to {_MOST}")
+    if model.surfaces:
+        names = ", ".join(surface.name for surface in model.surfaces)
+        raise UsageError(
+            f"model {model.name} has switching surfaces ({names}): the multiple-precision run does not slide",
+            remedy="compare with another integrator at a tight tolerance, or with a closed form",
+        )
     if not t_span[1] > t_span[0]:
         raise UsageError(
             f"the multiple-precision run goes forward, and t_span is {t_span}", remedy="let t1 be after t0"

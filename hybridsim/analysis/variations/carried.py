@@ -352,7 +352,7 @@ class Carrier:
     ) -> np.ndarray:
         """Derivatives of the states with the held ones on their constraints."""
         system, k = self.system, -1 if at_end else 0
-        if not any(segment.z[c] == system.automata[c].hold for c in system.pins):
+        if not system.holds(segment.z):
             return Y
         x, p = self._lifted(segment, segment.x[k], Y, Yd, G)
         out: list[Any] = [0.0] * system.n
@@ -374,7 +374,7 @@ def at_start(solution: Solution) -> list[Occurrence]:
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
     """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
     rates = system.flow(s, x, p, z)
-    if not any(z[c] == system.automata[c].hold for c in system.pins):
+    if not system.holds(z):
         return rates
     out: list[Any] = [0.0] * system.n
     module: Any = system.code.module

@@ -1,0 +1,129 @@
+"""Where switching surfaces meet: whether one motion alone is admissible, and whether the surfaces keep it.
+
+On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix),
+one choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and
+Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000). On two surfaces the motion is then
+drawn to where they meet: a turn around it shrinks by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2) times the same
+of the other; surfaces to which all fields point (nodal attractivity) are among these. On more of them it is the one
+that slides, though others may spiral about it. Where -B is no such matrix, a motion that slides along several surfaces
+is one of many.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.decide import FINE
+from hybridsim.engine.jets import UNIT
+from hybridsim.model.meanings import Meanings
+
+if TYPE_CHECKING:
+    from hybridsim.engine.settle import Settling
+
+_SAME = 64.0 * UNIT  # two series of one motion differ by the rounding of a few operations
+
+
+def rivals(
+    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+) -> np.ndarray:
+    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion.
+
+    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the
+    side that moves no more.
+    """
+    unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
+    fine = candidates[verdicts == FINE]
+    if len(np.unique(fine[:, unique], axis=0)) < 2:
+        return fine[:0]
+    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in fine]
+    sizes = np.abs(motions).max(axis=0)
+    same = all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
+    return fine[:0] if same else fine
+
+
+def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
+    """Why a motion that slides along several surfaces may not be the only one; empty where it is."""
+    automata = settling.system.automata
+    sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
+    if len(sliding) < 2:
+        return ""
+    pull = _pull(settling, sliding, z)
+    for size in range(1, len(sliding) + 1):
+        for chosen in combinations(range(len(sliding)), size):
+            block = pull[np.ix_(chosen, chosen)]
+            largest = float(np.prod(np.abs(block).sum(axis=1)))  # no minor is above this
+            if not np.linalg.det(block) > 8.0 * size * UNIT * largest:
+                names = " and ".join(automata[sliding[i]].name for i in chosen)
+                return (
+                    f"the surfaces {names} do not keep a motion that slides along both: it is one of many"
+                    if size > 1
+                    else f"the surface {names} does not attract where others are slid along"
+                )
+    return ""
+
+
+def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
+    """-B: by how much the rate of each surface falls from one side of each to the other."""
+    automata, order = settling.system.automata, settling.system.surface_of
+    rows = [order.index(c) for c in sliding]
+    found = np.empty((len(sliding), len(sliding)))
+    trial = z.copy()
+    trial[sliding] = [automata[c].above for c in sliding]
+    for j, c in enumerate(sliding):
+        rates = []
+        for side in (automata[c].below, automata[c].above):
+            other = trial.copy()
+            other[c] = side
+            series: Any = settling.series_of(other)
+            rates.append(series.surfaces[rows, 1])
+        found[:, j] = 0.5 * (rates[0] - rates[1])
+    return found
+
+
+def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
+    """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
+    system = settling.system
+    unique = [c for c in members if system.automata[c].is_unique]
+    slow = [c for c in unique if c not in system.pins and c not in system.projected]
+    if slow:
+        names = ", ".join(system.automata[c].name for c in slow)
+        return "inconsistent", (
+            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it "
+            "is of a higher order, which is not followed"
+        )
+    pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
+    if (pull < 0.0).any():
+        names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
+        return "nonunique", (
+            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there "
+            "are directions"
+        )
+    return "inconsistent", message
+
+
+def words_on_cascade(settling: Settling) -> str:
+    """What to do about two modes of an automaton that push against each other across one surface; empty for others."""
+    model, last = settling.system.model, settling.changes[-2:]
+    if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
+        return ""
+    component = model.all_components()[last[0].component]
+    meanings = Meanings(model)
+    guards = [
+        guard
+        for change in last
+        for guard in component.modes[change.source].guards
+        if guard.name == change.guard
+    ]
+    if component.surface or len(guards) != 2:
+        return ""
+    (one, sign), (other, opposite) = (meanings.family(guard.expr.tree) for guard in guards)
+    if one != other or sign != -opposite:
+        return ""
+    names = " and ".join(component.modes[change.source].name for change in last)
+    return (
+        f". Modes {names} push against each other across one surface: the motion slides along it if it is declared as "
+        f'one, [surfaces.NAME] expr = "{guards[0].expr.text}", NAME being +1 on one side and -1 on the other'
+    )

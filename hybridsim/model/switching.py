@@ -1,0 +1,104 @@
+"""A switching surface: fields that differ on its sides, crossed or slid along by Filippov's convention."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from hybridsim.expr import Expression, parse, substitute
+from hybridsim.model.component import Component, Guard, Mode, Surface
+from hybridsim.model.declared import Declared
+from hybridsim.model.frozen_map import FrozenMap
+
+ABOVE, BELOW, SLIDING = "above", "below", "sliding"
+ATTRACTION = "__attraction_"  # before the unknown: how strongly it pulls towards its surface; no model's name begins so
+
+
+@dataclass(frozen=True)
+class SwitchingSurface(Declared):
+    """A surface expr = 0 on which rates jump; its name u is the sign of expr, and the weight of the sides in sliding.
+
+        u = +1            where expr > 0
+        u = -1            where expr < 0
+        -1 <= u <= +1     while the motion slides along expr = 0, solved for from d(expr)/dt = 0
+
+    A rate that uses u is so (1 + u)/2 times the rate above plus (1 - u)/2 times the one below: Filippov's convex
+    combination of the two, Utkin's equivalent control. u has to enter the rates linearly.
+
+    The motion crosses where both sides lead the same way, slides where both lead to the surface, and leaves where u
+    comes to +1 or -1. Where both lead away (a start on a surface that repels) the run ends with status ``nonunique``.
+
+    Parameters
+    ----------
+    expr : the switching function h(t, x), smooth, in any unit.
+    above, below : values of further variables on either side, with the same names in both; in sliding
+        (1 + u)/2 above + (1 - u)/2 below. For whole fields that are not written with a sign.
+
+    Errors
+    ------
+    UsageError for names on one side only.
+
+    When to use
+    -----------
+    A relay, a controller of variable structure, a field given on each side of a border. For dry friction a `Contact`,
+    which knows static friction; for hysteresis a `Component`; for a corner, at which nothing jumps, `abs` and `max`.
+
+    Source: A. F. Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988),
+    doi:10.1007/978-94-015-7793-9; V. I. Utkin, IEEE Trans. Autom. Control 22 (1977) 212, doi:10.1109/TAC.1977.1101446.
+
+    Examples
+    --------
+    >>> SwitchingSurface("u", "x + 2*v").component().modes[0].guards
+    (Guard(name='side', expr=Expression(text='x + 2*v'), then=(), fatal=None),)
+    """
+
+    name: str
+    expr: Expression
+    above: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    below: Mapping[str, Expression] = field(default_factory=FrozenMap)
+
+    def __post_init__(self) -> None:
+        self._texts("name")
+        self._expressions("expr")
+        self._maps("above", "below")
+        if single := sorted(set(self.above) ^ set(self.below)):
+            side, other = ("above", "below") if single[0] in self.above else ("below", "above")
+            raise self._fault(
+                f"'{single[0]}' has a value {side} and none {other}", f"write {single[0]} = ... in {other}"
+            )
+
+    def component(self) -> Component:
+        """Its automaton, of the modes ``above``, ``below`` and ``sliding``."""
+        return self._component
+
+    @cached_property
+    def _component(self) -> Component:
+        sides = {BELOW: "-1", ABOVE: "1"}
+        one = {side: FrozenMap({self.name: parse(value)}) for side, value in sides.items()}
+        upper, lower = Guard("upper", parse(f"1 - {self.name}")), Guard("lower", parse(f"1 + {self.name}"))
+        attracts = Guard("attracts", _reserved(ATTRACTION + self.name))
+        minus = substitute(parse("-h", self.expr.place), {"h": self.expr})
+        modes = (
+            Mode(ABOVE, (Guard("side", self.expr),), set={**one[ABOVE], **self.above}),
+            Mode(BELOW, (Guard("side", minus),), set={**one[BELOW], **self.below}),
+            Mode(SLIDING, (upper, lower, attracts), set=self.blends()),
+        )
+        nothing = parse(0)
+        surface = Surface(self.expr, self.name, ABOVE, BELOW, SLIDING, nothing, nothing, unique=True)
+        return Component(self.name, modes, surface=surface, place=self.place)
+
+    def blends(self) -> dict[str, Expression]:
+        """Its further variables as they are in sliding; with u = +1 and -1 these are their values on the sides."""
+        form = parse("(above + below)/2 + u*(above - below)/2", self.place)
+        unknown = parse(self.name)
+        return {
+            name: substitute(form, {"above": value, "below": self.below[name], "u": unknown})
+            for name, value in self.above.items()
+        }
+
+
+def _reserved(name: str) -> Expression:
+    """A name that no declaration can have, as an expression."""
+    return Expression(name, frozenset({name}), None, ast.Name(name, ast.Load()))

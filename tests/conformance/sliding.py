@@ -1,0 +1,224 @@
+"""Scenes of switching surfaces: crossed, slid along, left, met by others, and refused where many motions fit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from conformance.checks import equals, says
+from conformance.facts import CASES, TRUTHS
+from conformance.scene import END, Check, Scene, Truth
+
+NEEDS = frozenset({"sliding"})
+SLIDING = "sliding"
+
+
+def scenes() -> tuple[Scene, ...]:
+    """All of them."""
+    return (
+        *_published(),
+        _circle(),
+        _along_the_circle(),
+        _decay(),
+        _two_relays(),
+        *_refused(),
+    )
+
+
+def stays(component: str, *terms: str) -> Check:
+    """While it slides, a sum of outputs that is 1 or 0 there is so to rounding."""
+
+    def check(solution: Any) -> list[str]:
+        for interval in solution.modes[component]:
+            if interval.mode == SLIDING:
+                times = np.linspace(interval.t0, interval.t1, 101)[1:-1]
+                x = dict(zip([s.name for s in solution.model.states], solution(times), strict=True))
+                value = sum(
+                    x[name] if power == "1" else x[name] ** 2 for name, power in map(str.split, terms)
+                )
+                target = 1.0 if any(term.endswith("2") for term in terms) else 0.0
+                if np.abs(value - target).max() > 1e-14:
+                    return [f"off the surface of {component} by {np.abs(value - target).max():.2g}"]
+        return []
+
+    return check
+
+
+def _published() -> tuple[Scene, ...]:
+    """Cases of other tools, and those that are also scenes with modes."""
+    exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
+    at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
+    crossings = CASES["SIC-filippov"]["expected"]["first_crossings"]
+    spiral = tuple((t, tuple(x)) for t, x in crossings)
+    relay = TRUTHS["SIC-relayosc"]
+    events = tuple((t, f"s:{'above' if mode == 'plus' else 'below'}") for t, _, mode in relay["events"])
+    states = tuple((row[0], tuple(row[1:])) for row in relay["states"])
+    circle = CASES["NOS-osc"]["expected"]
+    inside = (math.exp(-0.5) * math.cos(math.pi), math.exp(-0.5) * math.sin(math.pi))
+    return (
+        Scene(
+            "NOS-leave",
+            "leave",
+            (0.0, 1.5),
+            Truth(((1.0, "u:above"),), ((1.5, (0.125,)),), checks=(("", equals(0.5, x=0.0)),)),
+            NEEDS,
+            **exact,
+        ),
+        Scene(
+            "SIC-relay2",
+            "relay-pair",
+            (0.0, 1.0),
+            Truth(((0.5, "u1:sliding"), (0.5, "u2:sliding")), ((0.25, (0.5, -0.5)),), checks=at_rest),
+            NEEDS,
+            **exact,
+        ),
+        Scene(
+            "SIC-filippov",
+            "spiral",
+            (0.0, 2.0),
+            Truth(
+                None,
+                (*spiral, (END, (0.0, 0.0))),
+                checks=(("", spirals_in), ("", equals(2.0, x1=0.0, x2=0.0))),
+            ),
+            NEEDS,
+            **exact,
+        ),
+        Scene(
+            "SIC-relayosc-surface",
+            "relay-surface",
+            (0.0, 100.0),
+            Truth(events, states),
+            NEEDS,
+            unit=1.83,
+            tol_t=1e-9,
+            speed=0.5,
+            effort=10_000,
+        ),
+        Scene(
+            "NOS-cross-surface",
+            "crossing-surface",
+            (0.0, 1.5),
+            Truth(((0.5, "side:above"),), ((0.25, (-0.5,)), (1.5, (0.2,)))),
+            NEEDS,
+            **exact,
+        ),
+        Scene(
+            "NOS-osc-surface",
+            "circle-surface",
+            (0.0, math.pi / 2),
+            Truth(((1.0, "s:above"),), ((0.5, inside), (math.pi / 2, tuple(circle["x_end"])))),
+            NEEDS,
+            tol_t=1e-10,
+            tol_x=1e-9,
+        ),
+    )
+
+
+def spirals_in(solution: Any) -> list[str]:
+    """|x1| + |x2| = 6 - 4t up to 1.5, where both surfaces are reached, by ever faster crossings until then."""
+    times = np.linspace(0.0, 1.5, 301)
+    off = np.abs(np.abs(solution(times)).sum(axis=0) - (6 - 4 * times)).max()
+    wrong = [f"|x1| + |x2| is off by {off:.2g}"] if off > 1e-8 else []  # the rates are constant in between
+    reached = [event.t for event in solution.events if event.target == SLIDING]
+    if len(reached) != 2 or any(abs(t - 1.5) > 1e-6 for t in reached):
+        wrong.append(f"sliding begins at {reached}, not at 1.5 along both")
+    return wrong
+
+
+def _along_the_circle() -> Scene:
+    """The same up to t = 3.5, where it still slides."""
+    scene = _circle()
+    truth = replace(scene.truth, events=scene.truth.events[:1], states=scene.truth.states[:2])
+    return replace(scene, name="along-the-circle", span=(0.0, 3.5), truth=truth, needs=NEEDS)
+
+
+def _circle() -> Scene:
+    """x + iy = r exp(it) with (ln r)' = t/4 - u: r = 1 from 4 - sqrt(16 - 8 ln 2) to 4, where u = t/4 reaches 1."""
+    onto, off = 4 - math.sqrt(16 - 8 * math.log(2)), 4.0
+
+    def at(t: float, log_r: float) -> tuple[float, tuple[float, float]]:
+        return t, (math.exp(log_r) * math.cos(t), math.exp(log_r) * math.sin(t))
+
+    states = (at(0.5, math.log(2) + 1 / 32 - 0.5), at(2.0, 0.0), at(4.0, 0.0), at(5.0, 1 / 8), at(6.0, 1 / 2))
+    return Scene(
+        "sliding-circle",
+        "sliding-circle",
+        (0.0, 6.0),
+        Truth(((onto, "u:sliding"), (off, "u:above")), states, checks=(("", stays("u", "x 2", "y 2")),)),
+        NEEDS | {"tangent-exit"},
+        unit=6.0,
+        tol_t=1e-9,
+    )
+
+
+def _decay() -> Scene:
+    """v = -t and x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1, then both decay with exp(-t)."""
+    onto = math.sqrt(3) - 1
+    states = [(0.5, (0.875, -0.5))]
+    states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
+    return Scene(
+        "sliding-mode",
+        "sliding-mode",
+        (0.0, 5.0),
+        Truth(((onto, "u:sliding"),), tuple(states), checks=(("", stays("u", "x 1", "v 1")),)),
+        NEEDS,
+        tol_t=1e-9,
+    )
+
+
+def _two_relays() -> Scene:
+    """With u = 1, w = -1 y = 3t - 1/2; then w = 1/2, x' = t - 3/2; along both u = 2t/3, w = t/3; u = 1 at 3/2."""
+    first, both, off = 1 / 6, 1.5 - math.sqrt(0.75), 1.5
+
+    def x(t: float) -> float:
+        return t**2 / 2 - 1.5 * t + 0.75
+
+    states = ((0.1, (0.705, -0.2)), (0.4, (x(0.4), 0.0)), (1.0, (0.0, 0.0)), (2.5, (0.5, 0.0)))
+    return Scene(
+        "two-relays",
+        "two-relays",
+        (0.0, 2.5),
+        Truth(
+            ((first, "w:sliding"), (both, "u:sliding"), (off, "u:above")),
+            states,
+            checks=(("", equals(1.0, x=0.0, y=0.0)), ("", equals(2.0, y=0.0))),
+        ),
+        NEEDS,
+        tol_t=1e-9,
+    )
+
+
+def _refused() -> tuple[Scene, ...]:
+    """More than one motion is admissible: the run stops there and names the surfaces."""
+    return (
+        Scene(
+            "ambiguous-meeting",
+            "ambiguous",
+            (0.0, 1.0),
+            Truth(
+                (),
+                ((0.2, (0.4, 0.4)),),
+                status="nonunique",
+                end=1 / 3,
+                checks=(("", says("u: above, w: below", "u: below, w: above", "u: sliding, w: sliding")),),
+            ),
+            NEEDS,
+        ),
+        Scene(
+            "repelling-start",
+            "repelling",
+            (0.0, 1.0),
+            Truth(
+                (),
+                ((END, (0.0,)),),
+                status="nonunique",
+                end=0.0,
+                checks=(("", says("u: above", "u: below")),),
+            ),
+            NEEDS,
+        ),
+    )
