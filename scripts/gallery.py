@@ -29,9 +29,9 @@ PICTURES: dict[str, Callable[[hs.Solution], Any]] = {
 
 HEAD = """# Gallery
 
-Every model that comes with the package: `hybridsim run NAME` runs one over its own duration, `hybridsim check NAME` says
-where it is from and what to look at, `hs.load("NAME")` gives it to Python. What each says is held by a test: closed forms,
-balances, matrix exponentials. The page and its pictures are made by `scripts/gallery.py`.
+Every model that comes with the package: `hybridsim run NAME` runs one over its own duration, `hybridsim check NAME`
+says where it is from and what to look at, `hs.load("NAME")` gives it to Python. Tests hold them against closed forms,
+balances and matrix exponentials. The page and its pictures are made by `scripts/gallery.py`.
 
 """
 

@@ -52,7 +52,9 @@ class Accumulation:
         self.last: Instant | None = None
         self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
         self.longest = 0.0  # interval since which they shrink
-        self.forecast: tuple[float, float] | None = None  # limit of the series so far, and how far ahead it was
+        self.forecast: tuple[float, float] | None = (
+            None  # limit of the series so far, and how far ahead it was
+        )
 
     def is_under_way(self) -> bool:
         """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
