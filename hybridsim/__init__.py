@@ -36,7 +36,11 @@ _HOME = {
     "list_models": "hybridsim.model",
     "load": "hybridsim.model",
     "load_law": "hybridsim.model",
+    "Harmonic": "hybridsim.mechanics.system",
+    "MechanicalContact": "hybridsim.mechanics.system",
+    "MechanicalSystem": "hybridsim.mechanics.system",
     # running
+    "MechanicalSolution": "hybridsim.mechanics.solution",
     "Event": "hybridsim.solution",
     "Solution": "hybridsim.solution",
     "list_integrators": "hybridsim.integrators",

@@ -151,7 +151,7 @@ def _lanes(plant: Any, laws: Any, state: Any, room: Any, nc: int, orders: int) -
     room.lane_ptr[tapes], room.place[tapes] = used, at
 
 
-@kernel
+@inlined
 def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k: int) -> None:
     """Coefficient k of the forces of all that slips, from that of the relative velocities."""
     for t in range(laws.registers.shape[0]):
@@ -169,41 +169,78 @@ def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k
             room.F[k, i] = state.mode[room.cons[i]] * room.V[out + j]
 
 
-@kernel
+@inlined
 def _relative(plant: Any, state: Any, room: Any, nc: int, k: int) -> None:
     """Coefficient k of the relative velocities; exactly zero in stick."""
+    cons, loc, mode, ptr, col, val = room.cons, room.loc, state.mode, plant.w_ptr, plant.w_col, plant.w_val
+    q, r, f = room.Q[k + 1], room.R[k], room.F[k]
     for i in range(nc):
-        c = room.cons[i]
+        c = cons[i]
         total = 0.0
-        if state.mode[c] != STICK:
-            for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-                total += plant.w_val[e] * room.Q[k + 1, room.loc[plant.w_col[e]]]
+        if mode[c] != STICK:
+            for e in range(ptr[c], ptr[c + 1]):
+                total += val[e] * q[loc[col[e]]]
             total = (k + 1) * total - base_coefficient(plant, room, c, k)
-        room.R[k, i] = total
-        room.F[k, i] = 0.0
+        r[i], f[i] = total, 0.0
         if k == 0 and state.held[c] != 0:
-            room.F[0, i] = plant.limits[c, 0] if state.held[c] > 0 else -plant.limits[c, 1]
+            f[i] = plant.limits[c, 0] if state.held[c] > 0 else -plant.limits[c, 1]
 
 
-@kernel
+@inlined
 def _accelerate(plant: Any, room: Any, nd: int, k: int) -> None:
     """Coefficient k of the accelerations, with the forces of what slips and none of what sticks."""
-    C_any, rates = plant.c_col.shape[0] > 0, plant.rates.shape[0] > 0
+    dofs, loc, lcon, acc = room.dofs, room.loc, room.lcon, room.acc
+    q, v, f = room.Q[k], room.Q[k + 1], room.F[k]
+    k_ptr, k_col, k_val, b_ptr, b_col, b_val = (
+        plant.k_ptr, plant.k_col, plant.k_val, plant.b_ptr, plant.b_col, plant.b_val,
+    )  # fmt: skip
     for a in range(nd):
-        x = room.dofs[a]
+        x = dofs[a]
         total = plant.still[x] if k == 0 else 0.0
-        for e in range(plant.k_ptr[x], plant.k_ptr[x + 1]):
-            total -= plant.k_val[e] * room.Q[k, room.loc[plant.k_col[e]]]
-        if C_any:
+        for e in range(k_ptr[x], k_ptr[x + 1]):
+            total -= k_val[e] * q[loc[k_col[e]]]
+        for e in range(b_ptr[x], b_ptr[x + 1]):
+            total -= b_val[e] * f[lcon[b_col[e]]]
+        acc[a] = total
+    if plant.c_col.shape[0] > 0:
+        for a in range(nd):
+            x, total = dofs[a], 0.0
             for e in range(plant.c_ptr[x], plant.c_ptr[x + 1]):
-                total -= plant.c_val[e] * (k + 1) * room.Q[k + 1, room.loc[plant.c_col[e]]]
-        if rates:
+                total += plant.c_val[e] * v[loc[plant.c_col[e]]]
+            acc[a] -= (k + 1) * total
+    if plant.rates.shape[0] > 0:
+        for a in range(nd):
+            x = dofs[a]
             for e in range(plant.h_ptr[x], plant.h_ptr[x + 1]):
                 r = plant.h_rate[e]
-                total += plant.h_val[e, 0] * room.trig[r, 0, k] + plant.h_val[e, 1] * room.trig[r, 1, k]
-        for e in range(plant.b_ptr[x], plant.b_ptr[x + 1]):
-            total -= plant.b_val[e] * room.F[k, room.lcon[plant.b_col[e]]]
-        room.acc[a] = total
+                acc[a] += plant.h_val[e, 0] * room.trig[r, 0, k] + plant.h_val[e, 1] * room.trig[r, 1, k]
+
+
+@inlined
+def _advance(plant: Any, state: Any, room: Any, nd: int, k: int) -> None:
+    """Coefficient k + 2 of the positions from the accelerations; that of a coordinate that sticks from its base."""
+    dofs, acc, pin, q, divisor = room.dofs, room.acc, state.pin, room.Q[k + 2], float((k + 1) * (k + 2))
+    for a in range(nd):
+        c = pin[dofs[a]]
+        if c < 0:
+            q[a] = acc[a] / divisor
+        elif plant.base_rate[c] < 0:
+            q[a] = 0.0
+        else:
+            q[a] = base_coefficient(plant, room, c, k + 1) / plant.w_val[plant.w_ptr[c]] / (k + 2)
+
+
+@inlined
+def _hold_one(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
+    """`_hold` for a node whose only contact sticks."""
+    c, total = plant.node_con[j], 0.0
+    for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
+        total += plant.w_val[e] * room.acc[room.loc[plant.w_col[e]]]
+    force = state.pinv[plant.g_ptr[j]] * (total - (k + 1) * base_coefficient(plant, room, c, k + 1))
+    room.F[k, room.lcon[c]] = force
+    for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
+        if plant.b_ptr[x] < plant.b_ptr[x + 1]:
+            room.acc[room.loc[x]] -= plant.b_val[plant.b_ptr[x]] * force
 
 
 @kernel
@@ -243,14 +280,11 @@ def expand(
         _forces_of_slip(plant, laws, state, room, top + 1, k)
         _accelerate(plant, room, nd, k)
         for i in range(count):
-            if state.holds[room.nodes[i]] > 0:
-                _hold(plant, state, room, room.nodes[i], k)
-        for a in range(nd):
-            room.Q[k + 2, a] = room.acc[a] / ((k + 1) * (k + 2))
-        for a in range(nd):
-            c = state.pin[room.dofs[a]]
-            if c >= 0:
-                room.Q[k + 2, a] = (
-                    base_coefficient(plant, room, c, k + 1) / plant.w_val[plant.w_ptr[c]] / (k + 2)
-                )
+            j = room.nodes[i]
+            if state.holds[j] > 0:
+                if plant.node_con[j + 1] - plant.node_con[j] == 1:
+                    _hold_one(plant, state, room, j, k)
+                else:
+                    _hold(plant, state, room, j, k)
+        _advance(plant, state, room, nd, k)
     _relative(plant, state, room, nc, top - 1)

@@ -19,19 +19,25 @@ from hybridsim.engine.tape import (
 @inlined
 def _product(V: Any, out: int, a: int, b: int, k: int, first: int, last: int, n: int, factor: float) -> None:
     """V[out] += factor * sum_{i=first}^{last} a_i b_{k-i}; a, b, out are places of coefficient 0 (out: of k)."""
+    total = V[out : out + n]
     for i in range(first, last + 1):
-        x, y = a + i * n, b + (k - i) * n
-        for j in range(n):
-            V[out + j] += factor * V[x + j] * V[y + j]
+        _add_product(total, V[a + i * n : a + i * n + n], V[b + (k - i) * n : b + (k - i) * n + n], n, factor)
+
+
+@inlined
+def _add_product(total: Any, x: Any, y: Any, n: int, factor: float) -> None:
+    """total += factor x y, lane by lane; views of their own, so that the loop becomes one of vectors."""
+    for j in range(n):
+        total[j] += factor * (x[j] * y[j])
 
 
 @inlined
 def _weighted(V: Any, out: int, a: int, b: int, k: int, last: int, n: int, factor: float) -> None:
     """V[out] += factor * sum_{i=1}^{last} i a_i b_{k-i}."""
+    total = V[out : out + n]
     for i in range(1, last + 1):
-        x, y, w = a + i * n, b + (k - i) * n, factor * i
-        for j in range(n):
-            V[out + j] += w * V[x + j] * V[y + j]
+        x, y = V[a + i * n : a + i * n + n], V[b + (k - i) * n : b + (k - i) * n + n]
+        _add_product(total, x, y, n, factor * i)
 
 
 @kernel
@@ -90,46 +96,50 @@ def advance_lanes(rows: Any, V: Any, base: int, orders: int, n: int, k: int) -> 
     for r in range(rows.shape[0]):
         op, flag, kind = rows[r, 0], rows[r, 2], rows[r, 3]
         a, b, out = base + rows[r, 1] * size, base + rows[r, 2] * size, base + rows[r, 4] * size
-        o, ak, bk = out + k * n, a + k * n, b + k * n
+        o, at, bt = out + k * n, a + k * n, b + k * n
+        z, x, y, c = V[o : o + n], V[at : at + n], V[bt : bt + n], V[b : b + n]
         if op == SCALE:
             for j in range(n):
-                V[o + j] = V[ak + j] * V[b + j]
+                z[j] = x[j] * c[j]
         elif op == ADD:
             for j in range(n):
-                V[o + j] = V[ak + j] + V[bk + j]
+                z[j] = x[j] + y[j]
         elif op == SUB:
             for j in range(n):
-                V[o + j] = V[ak + j] - V[bk + j]
+                z[j] = x[j] - y[j]
         elif op == MUL:
             for j in range(n):
-                V[o + j] = 0.0
+                z[j] = 0.0
             _product(V, o, a, b, k, 0, k, n, 1.0)
         elif op == DIVIDE_BY:
             for j in range(n):
-                V[o + j] = V[ak + j] / V[b + j]
+                z[j] = x[j] / c[j]
         elif op == DIV:
             for j in range(n):
-                V[o + j] = V[ak + j]
+                z[j] = x[j]
             _product(V, o, out, b, k, 0, k - 1, n, -1.0)
             for j in range(n):
-                V[o + j] /= V[b + j]
+                z[j] /= c[j]
         elif op == NEG:
             for j in range(n):
-                V[o + j] = -V[ak + j]
+                z[j] = -x[j]
         elif op == ADD_CONSTANT or op == SUB_CONSTANT or op == CONSTANT_SUB:
+            sign, other = -1.0 if op == CONSTANT_SUB else 1.0, -1.0 if op == SUB_CONSTANT else 1.0
             for j in range(n):
-                u, c = V[ak + j], V[b + j] if k == 0 else 0.0
-                V[o + j] = u + c if op == ADD_CONSTANT else (u - c if op == SUB_CONSTANT else c - u)
+                z[j] = sign * x[j]
+            if k == 0:
+                for j in range(n):
+                    z[j] += other * c[j]
         elif op == SQRT:
             if k == 0:
                 for j in range(n):
-                    V[o + j] = math.sqrt(V[ak + j]) if V[ak + j] >= 0.0 else math.nan
+                    z[j] = math.sqrt(x[j]) if x[j] >= 0.0 else math.nan
             else:
                 for j in range(n):
-                    V[o + j] = 0.5 * V[ak + j]
+                    z[j] = 0.5 * x[j]
                 _product(V, o, out, out, k, 1, k - 1, n, -0.5)
                 for j in range(n):
-                    V[o + j] = 0.0 if V[out + j] == 0.0 and V[o + j] == 0.0 else V[o + j] / V[out + j]
+                    z[j] = 0.0 if V[out + j] == 0.0 and z[j] == 0.0 else z[j] / V[out + j]
         elif k == 0:
             _leading(op, V, a, b, flag, kind, out, out + size, n)
         else:

@@ -15,7 +15,7 @@ from hybridsim.mechanics.arrays import (
     CASCADE, DONE, FULL, INCONSISTENT, LOST, NONUNIQUE, OPEN_END, Record, Room, State,
 )  # fmt: skip
 from hybridsim.mechanics.loop import FRESH, LAST, RADIUS, WHERE, run, settle_start
-from hybridsim.mechanics.plant import Built, Laws, Plant
+from hybridsim.mechanics.plant import Built
 
 STATUS = {
     DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
@@ -33,7 +33,8 @@ class MechanicalRun:
                  max_step: float, keep: bool) -> None:  # fmt: skip
         self.built, self.span = built, span
         self.rtol, self.keep = max(rtol, _TIGHTEST), keep
-        self.order = series_order(self.rtol, built.is_linear)
+        # coupled coordinates make the linear part of a series the dearer one, as where there is no convolution at all
+        self.order = series_order(self.rtol, linear=True)
         self.max_step = max_step
         self.state = new_state(built, self.order)
         self.room = new_room(built, self.order)
@@ -138,4 +139,3 @@ def new_room(built: Built, order: int) -> Room:
     )  # fmt: skip
 
 
-__all__ = ["STATUS", "Laws", "MechanicalRun", "Plant", "new_room", "new_state"]

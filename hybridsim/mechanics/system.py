@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import sparse
 
 from hybridsim.errors import UsageError
 from hybridsim.expr import Expression
@@ -235,6 +234,8 @@ class MechanicalSystem:
 
 def _matrix(given: Any, what: str, n: int | None) -> Any:
     """A square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
+    from scipy import sparse
+
     if given is None and n is not None:
         return sparse.csr_array((n, n))
     if sparse.issparse(given):

@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import phase_of
 from hybridsim.mechanics.clusters import factorise, project
-from hybridsim.mechanics.expansion import value_and_slope
+from hybridsim.mechanics.expansion import expand, value_and_slope, whole
 
 
 @kernel
@@ -36,15 +36,31 @@ def evaluate(
 
 
 @kernel
-def meet_constraints(
-    plant: Any, state: Any, room: Any, when: Any, event: Any, first: Any, times: Any, order: Any, right: bool, out: Any
+def quantities(
+    plant: Any,
+    laws: Any,
+    state: Any,
+    room: Any,
+    when: Any,
+    event: Any,
+    first: Any,
+    times: Any,
+    order: Any,
+    right: bool,
+    out: Any,
+    forces: Any,
+    velocities: Any,
 ) -> None:
-    """Make velocities meet the constraints of what sticks at each time; order sorts the times, first: initial modes."""
-    n, at = out.shape[1] // 2, 0
+    """Make velocities meet the constraints of what sticks at each time; forces and relative velocities (k, m) there.
+
+    order sorts the times; first: modes at the start; out (k, 2n): states, velocities changed in place.
+    """
+    n, at, nodes = out.shape[1] // 2, 0, plant.node_dof.shape[0] - 1
     for c in range(first.shape[0]):
         state.mode[c], state.held[c] = first[c], 0
-    for j in range(plant.node_dof.shape[0] - 1):
+    for j in range(nodes):
         factorise(plant, state, room, j)
+        state.origin[j] = 0.0
     for i in order:
         while at < when.shape[0] and (when[at] < times[i] or (right and when[at] == times[i])):
             c = event[at, 0]
@@ -53,9 +69,15 @@ def meet_constraints(
             at += 1
         for r in range(plant.rates.shape[0]):
             state.phase[r] = phase_of(times[i], 0.0, plant.rates[r], 0.0)
-        for j in range(plant.node_dof.shape[0] - 1):
+        for j in range(nodes):
             if state.holds[j] > 0:
                 project(plant, state, room, j, 0.0, out[i, n:])
+        for x in range(n):
+            state.x[0, x], state.x[1, x] = out[i, x], out[i, n + x]
+        nd, nc = whole(plant, state, room)
+        expand(plant, laws, state, room, nodes, nd, nc, 0.0, 2)
+        for c in range(nc):
+            forces[i, c], velocities[i, c] = room.F[0, c], room.R[0, c]
 
 
 class Pieces:
