@@ -11,6 +11,11 @@ VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that r
 DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop came back
 
 
+COUNT, DOFS, CONS, ORDER, NODE, FIRED = range(6)  # numbers that a kernel reached by its address is given
+AT, LONGEST, RTOL, LENGTH = range(4)  # and real ones; the length of a stretch comes back
+EXPAND, STRETCH, DECIDE = range(3)  # these kernels
+
+
 class State(NamedTuple):
     """Where a run is; P1 = order + 1.
 
@@ -21,7 +26,8 @@ class State(NamedTuple):
     Delassus matrices of what sticks, node by node. holds (nn,): how many stick. pin (n,): contact that fixes a coordinate,
     or -1. anchor (m,): coordinate that is evaluated from a contact's constraint, or -1. tree: tournament of the next times.
     clock: origin of the step (high, low), its length, last event. phase: angles at the origin. flags: see `loop`. counts:
-    steps, events, restarts of patches, nodes restarted, undecided, grazings.
+    steps, events, restarts of patches, nodes restarted, undecided, grazings. kernels, whole, real: addresses of the large
+    kernels, and what they are given.
     """
 
     x: np.ndarray
@@ -43,6 +49,9 @@ class State(NamedTuple):
     flags: np.ndarray
     counts: np.ndarray
     tolerance: np.ndarray
+    kernels: np.ndarray
+    whole: np.ndarray
+    real: np.ndarray
 
 
 class Room(NamedTuple):

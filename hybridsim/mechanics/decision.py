@@ -13,10 +13,10 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.decide import open_question, side_after
-from hybridsim.engine.jit import kernel
-from hybridsim.mechanics.arrays import INCONSISTENT, STICK, UPPER, VELOCITY
+from hybridsim.engine.jit import call_kernel, inlined, kernel
+from hybridsim.mechanics.arrays import AT, DECIDE, FIRED, INCONSISTENT, NODE, STICK, UPPER, VELOCITY
 from hybridsim.mechanics.clusters import factorise, project
-from hybridsim.mechanics.expansion import base_coefficient, base_speed, expand, gather, value_and_slope
+from hybridsim.mechanics.expansion import base_coefficient, base_speed, expanded, gather, value_and_slope
 
 _SHORT = 4  # order of the series in q that decide: accelerations and their first two derivatives
 _UNIT = 2.0**-53
@@ -25,12 +25,19 @@ _BLOCK = 8  # rounds in which all violations are changed at once
 DECIDED = 0
 
 
-@kernel
-def decide(plant: Any, laws: Any, state: Any, room: Any, j: int, tau: float, fired: int) -> int:
+@inlined
+def decided(plant: Any, laws: Any, state: Any, room: Any, j: int, tau: float, fired: int) -> int:
     """Settle node j at tau, where contact `fired` (-1: none) has reached the end of its mode; DECIDED or INCONSISTENT.
 
     The node's series are replaced by its positions and velocities at tau, velocities exact.
     """
+    state.whole[NODE], state.whole[FIRED], state.real[AT] = j, fired, tau
+    return call_kernel(state.kernels[DECIDE], plant, laws, state, room)
+
+
+def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """See `decided`."""
+    j, fired, tau = state.whole[NODE], state.whole[FIRED], state.real[AT]
     first, last = plant.node_con[j], plant.node_con[j + 1]
     _stop_at(plant, state, j, tau)
     count = 0
@@ -55,7 +62,7 @@ def decide(plant: Any, laws: Any, state: Any, room: Any, j: int, tau: float, fir
         factorise(plant, state, room, j)
         room.nodes[0] = j
         nd, nc = gather(plant, state, room, 1, tau, _SHORT)
-        expand(plant, laws, state, room, 1, nd, nc, tau, _SHORT)
+        expanded(plant, laws, state, room, 1, nd, nc, tau, _SHORT)
         _bounds(plant, state, room, j, nd, tau)
         violations = _judge(plant, state, room, count)
         if violations == 0:

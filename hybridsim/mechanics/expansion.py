@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import inlined, kernel
-from hybridsim.mechanics.arrays import STICK
+from hybridsim.engine.jit import call_kernel, inlined, kernel
+from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, ORDER, STICK
 from hybridsim.mechanics.lanes import advance_lanes
 
 
@@ -268,11 +268,10 @@ def _hold(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
                 room.acc[room.loc[x]] -= plant.b_val[e] * room.F[k, room.lcon[c]]
 
 
-@kernel
-def expand(
-    plant: Any, laws: Any, state: Any, room: Any, count: int, nd: int, nc: int, tau: float, top: int
-) -> None:
-    """Series to order `top` of the patch that has been gathered: Q (positions), R (relative velocities), F (forces)."""
+def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """Series of the patch that has been gathered: Q (positions), R (relative velocities), F (forces); see `expanded`."""
+    count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
+    tau = state.real[AT]
     _angles(plant, state, room, tau, top)
     _lanes(plant, laws, state, room, nc, top + 1)
     for k in range(top - 1):
@@ -288,3 +287,14 @@ def expand(
                     _hold(plant, state, room, j, k)
         _advance(plant, state, room, nd, k)
     _relative(plant, state, room, nc, top - 1)
+    return 0
+
+
+@inlined
+def expanded(
+    plant: Any, laws: Any, state: Any, room: Any, count: int, nd: int, nc: int, tau: float, top: int
+) -> None:
+    """Expand the patch of so many nodes, coordinates and contacts about tau, to order `top` of its positions."""
+    state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER] = count, nd, nc, top
+    state.real[AT] = tau
+    call_kernel(state.kernels[EXPAND], plant, laws, state, room)

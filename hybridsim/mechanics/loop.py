@@ -8,16 +8,15 @@ are; the patch is made larger until what it would change outside is below a shar
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from hybridsim.engine.jit import inlined, kernel
+from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import phase_of, two_sum
-from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END, STICK
-from hybridsim.mechanics.clusters import factorise, project
-from hybridsim.mechanics.decision import decide
-from hybridsim.mechanics.expansion import expand, gather, shift, value_and_slope, whole
-from hybridsim.mechanics.steps import first_leaf, set_time, stretch
+from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END
+from hybridsim.mechanics.clusters import project
+from hybridsim.mechanics.decision import decided
+from hybridsim.mechanics.expansion import expanded, gather, shift, value_and_slope, whole
+from hybridsim.mechanics.steps import first_leaf, set_time, stretched
 
 # flags: a step is to be begun; it is the last; radius of patches; events at one instant; node of the last event
 FRESH, LAST, RADIUS, ROUNDS, WHERE = range(5)
@@ -37,9 +36,9 @@ def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, contr
         if state.holds[j] > 0:
             project(plant, state, room, j, 0.0, state.x[1])
     nd, nc = whole(plant, state, room)
-    expand(plant, laws, state, room, count, nd, nc, 0.0, top)
+    expanded(plant, laws, state, room, count, nd, nc, 0.0, top)
     limit = min(left, longest)
-    h = stretch(plant, laws, state, room, nd, nc, 0.0, limit, top, rtol)
+    h = stretched(plant, laws, state, room, limit, rtol)
     if not h > 0.0:
         return False
     state.flags[LAST] = 1 if h >= left else 0
@@ -151,7 +150,7 @@ def _restart(plant: Any, laws: Any, state: Any, room: Any, record: Any, control:
         if count < 0 or not left > 0.0:
             return 0
         nd, nc = gather(plant, state, room, count, tau, top)
-        expand(plant, laws, state, room, count, nd, nc, tau, top)
+        expanded(plant, laws, state, room, count, nd, nc, tau, top)
         outside = 0.0
         if outer < count and 2 * radius + 2 <= top:
             outside = _changes_outside(plant, state, room, count, outer, nd, tau, left, top, rtol)
@@ -162,7 +161,7 @@ def _restart(plant: Any, laws: Any, state: Any, room: Any, record: Any, control:
         break
     if outside < 1e-3 * _SHARE:
         state.flags[RADIUS] = max(radius - 1, 1)
-    h = stretch(plant, laws, state, room, nd, nc, tau, left, top, rtol)
+    h = stretched(plant, laws, state, room, left, rtol)
     if not h > 0.0:
         return -1
     for a in range(nd):
@@ -236,7 +235,7 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
             continue
         fired = first_leaf(state.tree)
         j, kind = plant.con_node[fired], state.guard[fired]
-        code = decide(plant, laws, state, room, j, tau, fired)
+        code = decided(plant, laws, state, room, j, tau, fired)
         state.flags[WHERE] = j
         if code != 0:
             return code
@@ -250,39 +249,3 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
             return LOST
         if done == 0:
             _end_step(plant, state, tau)
-
-
-@kernel
-def settle_start(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Modes at the start: by the sign of what moves, decided where it does not."""
-    for j in range(plant.node_dof.shape[0] - 1):
-        for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            for k in range(state.series.shape[1]):
-                state.series[x, k] = 0.0
-            state.series[x, 0], state.series[x, 1] = state.x[0, x], state.x[1, x]
-        state.origin[j] = 0.0
-    for r in range(plant.rates.shape[0]):
-        state.phase[r] = phase_of(state.clock[0], state.clock[1], plant.rates[r], 0.0)
-    for c in range(plant.con_node.shape[0]):
-        total = -_base(plant, state, c)
-        for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-            total += plant.w_val[e] * state.x[1, plant.w_col[e]]
-        state.mode[c] = 1 if total > 0.0 else (-1 if total < 0.0 else STICK)
-        state.held[c] = 0
-    for j in range(plant.node_dof.shape[0] - 1):
-        factorise(plant, state, room, j)
-        code = decide(plant, laws, state, room, j, 0.0, -1)
-        if code != 0:
-            state.flags[WHERE] = j
-            return code
-        for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            state.x[0, x], state.x[1, x] = state.series[x, 0], state.series[x, 1]
-    return DONE
-
-
-@inlined
-def _base(plant: Any, state: Any, c: int) -> float:
-    r = plant.base_rate[c]
-    if r < 0:
-        return plant.base[c, 0]
-    return plant.base[c, 1] * math.sin(state.phase[r]) + plant.base[c, 2] * math.cos(state.phase[r])

@@ -8,14 +8,20 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
+from hybridsim.engine.jit import call_kernel, kernel, kernel_address
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
+from hybridsim.engine.timepair import phase_of
 from hybridsim.mechanics.arrays import (
-    CASCADE, DONE, FULL, INCONSISTENT, LOST, NONUNIQUE, OPEN_END, Record, Room, State,
+    AT, CASCADE, DECIDE, DONE, FIRED, FULL, INCONSISTENT, LOST, NODE, NONUNIQUE, OPEN_END, Record, Room, State,
 )  # fmt: skip
-from hybridsim.mechanics.loop import FRESH, LAST, RADIUS, WHERE, run, settle_start
+from hybridsim.mechanics.decision import decide
+from hybridsim.mechanics.expansion import expand
+from hybridsim.mechanics.loop import FRESH, LAST, RADIUS, WHERE, run
 from hybridsim.mechanics.plant import Built
+from hybridsim.mechanics.steps import stretch
 
 STATUS = {
     DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
@@ -52,7 +58,8 @@ class MechanicalRun:
         plant, laws = packed(self.built.plant), packed(self.built.laws)
         state, room = packed(self.state), packed(self.room)
         began = perf_counter()
-        self.code = settle_start(plant, laws, state, room)
+        reach_kernels(self.state, plant, laws, state, room)
+        self.code = self._settle_start(plant, laws, state, room)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
         control = (self.rtol, self.max_step, self.order, self.keep)
@@ -66,6 +73,24 @@ class MechanicalRun:
             if progress is not None:
                 progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
         self.kernel_time = perf_counter() - began
+
+    def _settle_start(self, *packs: Any) -> int:
+        """Modes at the start: by the sign of what moves, decided where it does not."""
+        plant, state = self.built.plant, self.state
+        state.series[:, :2] = state.x.T
+        for r, rate in enumerate(plant.rates):
+            state.phase[r] = phase_of(state.clock[0], 0.0, rate, 0.0)
+        weights = csr_array((plant.w_val, plant.w_col, plant.w_ptr), shape=(len(plant.con_node), len(plant.dof_node)))
+        turns = state.phase[plant.base_rate] if len(plant.rates) else 0.0
+        base = plant.base[:, 0] + plant.base[:, 1] * np.sin(turns) + plant.base[:, 2] * np.cos(turns)
+        state.mode[:] = np.sign(weights @ state.x[1] - base)
+        for j in range(len(plant.node_dof) - 1):
+            state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
+            if code := call_from_python(state.kernels[DECIDE], *packs):
+                state.flags[WHERE] = j
+                return code
+        state.x[:] = state.series[:, :2].T
+        return DONE
 
     @property
     def time(self) -> float:
@@ -101,6 +126,22 @@ class MechanicalRun:
         self.when.append(record.when[:events].copy())
 
 
+@kernel
+def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """Call a kernel of packs."""
+    return call_kernel(address, plant, laws, state, room)
+
+
+_addresses: list[int] = []
+
+
+def reach_kernels(arrays: State, *packs: Any) -> None:
+    """Compile the large kernels if need be, and put their addresses where the others find them."""
+    if not _addresses:
+        _addresses.extend(kernel_address(function, *packs) for function in (expand, stretch, decide))
+    arrays.kernels[:] = _addresses
+
+
 def new_state(built: Built, order: int) -> State:
     """A state of zeros."""
     plant = built.plant
@@ -114,6 +155,7 @@ def new_state(built: Built, order: int) -> State:
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
         tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
         flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
+        kernels=np.zeros(3, **ints), whole=np.zeros(6, **ints), real=np.zeros(4),
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.engine.packs import packed
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LOST
-from hybridsim.mechanics.run import STATUS, new_room, new_state
+from hybridsim.mechanics.run import STATUS, new_room, new_state, reach_kernels
 from hybridsim.mechanics.trajectory import Pieces, instants, quantities
 from hybridsim.solution import Event, ModeInterval
 
@@ -133,8 +133,10 @@ class MechanicalSolution:
         built, (state, room) = self._run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.model.contacts)))
         order = np.argsort(times, kind="stable")
+        packs = (packed(built.plant), packed(built.laws), packed(state), packed(room))
+        reach_kernels(state, *packs)
         quantities(
-            packed(built.plant), packed(built.laws), packed(state), packed(room), self._when, self._event,
+            *packs, self._when, self._event,
             self._run.first_modes, times, order, right, states, forces, velocities,
         )  # fmt: skip
         return forces, velocities

@@ -6,8 +6,10 @@ import math
 from typing import Any
 
 from hybridsim.engine.first_exit import FOUND, OPEN, first_exit
-from hybridsim.engine.jit import inlined, kernel
-from hybridsim.mechanics.arrays import LOWER, OPEN_END, STICK, UPPER, VELOCITY
+from hybridsim.engine.jit import call_kernel, inlined, kernel
+from hybridsim.mechanics.arrays import (
+    AT, CONS, DOFS, LENGTH, LONGEST, LOWER, OPEN_END, ORDER, RTOL, STICK, STRETCH, UPPER, VELOCITY,
+)  # fmt: skip
 from hybridsim.mechanics.lanes import advance_lanes
 
 _UNIT = 2.0**-53
@@ -148,16 +150,15 @@ def _law_holds(plant: Any, laws: Any, state: Any, room: Any, h: float, top: int,
     return True
 
 
-@kernel
-def stretch(
-    plant: Any, laws: Any, state: Any, room: Any, nd: int, nc: int, tau: float, longest: float, top: int, rtol: float
-) -> float:
-    """How far the series of the patch are used, with the exits of its contacts up to there; NaN where they are none."""
+def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """See `stretched`."""
+    nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
+    tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
     h = reach(plant, state, room, nd, nc, top, rtol, longest)
     scale = max(state.clock[2], longest)
     for _ in range(_SHRINKS):
         if not h > 0.0:
-            return math.nan
+            break
         outcome, theta = isolate(plant, state, room, nc, tau, h, top)
         if outcome == OPEN and h > _TINY * scale:
             h *= 0.5
@@ -165,6 +166,19 @@ def stretch(
         if outcome == OPEN:  # a touch: what comes within rounding and is not certainly negative does not fire
             state.counts[5] += 1
         if _law_holds(plant, laws, state, room, h, top, rtol):
-            return h
+            state.real[LENGTH] = h
+            return 0
         h *= 0.5
-    return math.nan
+    state.real[LENGTH] = math.nan
+    return 0
+
+
+@inlined
+def stretched(plant: Any, laws: Any, state: Any, room: Any, longest: float, rtol: float) -> float:
+    """How far the series of the patch just expanded are used, with the exits of its contacts up to there.
+
+    NaN where there are none.
+    """
+    state.real[LONGEST], state.real[RTOL] = longest, rtol
+    call_kernel(state.kernels[STRETCH], plant, laws, state, room)
+    return state.real[LENGTH]
