@@ -60,6 +60,7 @@ def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
     _project_all(plant, state, room, j, tau)
     for round in range(_BLOCK + 4 * count * count + 8):
         factorise(plant, state, room, j)
+        _hold_at_limits(plant, state, room, j, count)
         room.nodes[0] = j
         nd, nc = gather(plant, state, room, 1, tau, _SHORT)
         expanded(plant, laws, state, room, 1, nd, nc, tau, _SHORT)
@@ -72,7 +73,7 @@ def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
             for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
                 state.series[x, 1] = state.x[1, x]
             return DECIDED
-        _change(plant, state, room, j, count, round < _BLOCK)
+        _change(state, room, count, round < _BLOCK)
     return INCONSISTENT
 
 
@@ -219,11 +220,8 @@ def _judge(plant: Any, state: Any, room: Any, count: int) -> int:
 
 
 @kernel
-def _change(plant: Any, state: Any, room: Any, j: int, count: int, together: bool) -> None:
-    """Give the contacts that violate their next mode: all of them, or the last one in the order of the contacts.
-
-    What is held by others although its own force is at the limit does not slip: its force stays there.
-    """
+def _change(state: Any, room: Any, count: int, together: bool) -> None:
+    """Give the contacts that violate their next mode: all of them, or the last one in the order of the contacts."""
     if not together:
         kept = -1
         for z in range(count):
@@ -234,16 +232,24 @@ def _change(plant: Any, state: Any, room: Any, j: int, count: int, together: boo
                 room.next[room.zero[z]] = state.mode[room.zero[z]]
     for z in range(count):
         c = room.zero[z]
-        room.kinds[c] = state.mode[c]
         if state.mode[c] == STICK and room.next[c] != STICK:
-            state.mode[c] = room.next[c]  # out of the set whose span is asked for
-    factorise(plant, state, room, j)
+            state.mode[c] = room.next[c]
+        elif state.mode[c] != STICK and room.next[c] == STICK:
+            state.mode[c], state.held[c] = STICK, 0
+
+
+@kernel
+def _hold_at_limits(plant: Any, state: Any, room: Any, j: int, count: int) -> None:
+    """What would slip and is held by others sticks, its force at the limit; what others no longer hold slips."""
     for z in range(count):
         c = room.zero[z]
-        if room.kinds[c] == STICK and room.next[c] != STICK and _is_held(plant, state, j, c):
-            state.mode[c], state.held[c] = STICK, room.next[c]
-        elif room.kinds[c] != STICK and room.next[c] == STICK:
-            state.mode[c], state.held[c] = STICK, 0
+        if state.mode[c] == STICK and state.held[c] == 0:
+            continue
+        direction = state.held[c] if state.mode[c] == STICK else state.mode[c]
+        if state.holds[j] > 0 and _is_held(plant, state, j, c):
+            state.mode[c], state.held[c] = STICK, direction
+        else:
+            state.mode[c], state.held[c] = direction, 0
 
 
 @kernel

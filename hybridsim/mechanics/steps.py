@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.first_exit import FOUND, OPEN, first_exit
+from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import (
     AT, CONS, DOFS, LENGTH, LONGEST, LOWER, OPEN_END, ORDER, RTOL, STICK, STRETCH, UPPER, VELOCITY,
@@ -15,6 +15,7 @@ from hybridsim.mechanics.lanes import advance_lanes
 _UNIT = 2.0**-53
 _DEFECT = 100.0  # as in the taylor integrator: how far the law may be from its series, in tolerances
 _SHRINKS = 200  # halvings of a reach
+_SHORT = 2.0**-12  # of the step: as far as a touch is looked at for what follows it
 _TINY = 2.0**-40  # of the step: what is still open on so short a stretch is a touch
 
 
@@ -72,19 +73,30 @@ def reach(plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: f
 
 
 @kernel
-def _exit_of(room: Any, size: int, h: float, order: int, slack: float) -> tuple[int, float]:
-    """First time in (0, h] at which the polynomial in room.poly[:size] goes negative, in units of h."""
-    power, total = 1.0, 0.0
+def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
+    """First time in (0, h] at which the polynomial in room.poly[:size] goes negative, in units of h.
+
+    Where it is zero all along it does not. On a stretch that is short already a touch is passed if it is positive after it.
+    """
+    power, total, end = 1.0, 0.0, 0.0
     for k in range(size):
         room.poly[k] *= power
         total += abs(room.poly[k])
+        end += room.poly[k]
         power *= h
+    if total == 0.0:
+        return NEVER, 1.0
     error = 2.0 * (abs(room.poly[size - 1]) + abs(room.poly[size - 2])) + 8.0 * _UNIT * total + slack
-    return first_exit(room.poly[:size], error, order, room.bern, room.stack)
+    outcome, theta = first_exit(room.poly[:size], error, order, room.bern, room.stack)
+    if outcome == OPEN and is_short and end > error:
+        outcome = NEVER
+    return outcome, theta
 
 
 @kernel
-def isolate(plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int) -> tuple[int, float]:
+def isolate(
+    plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
+) -> tuple[int, float]:
     """First exit of each contact of the patch over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
     for i in range(nc):
         c = room.cons[i]
@@ -94,7 +106,7 @@ def isolate(plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, to
             sigma = float(state.mode[c])
             for k in range(top):
                 room.poly[k] = sigma * room.R[k, i]
-            outcome, theta = _exit_of(room, top, h, state.decree[c, 0] if fresh else 0, 0.0)
+            outcome, theta = _exit_of(room, top, h, state.decree[c, 0] if fresh else 0, 0.0, is_short)
             if outcome == OPEN:
                 return OPEN, theta
             if outcome == FOUND:
@@ -108,7 +120,7 @@ def isolate(plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, to
                     room.poly[k] = -sigma * room.F[k, i]
                 room.poly[0] += limit
                 slack = 8.0 * _UNIT * max(limit, size)
-                outcome, theta = _exit_of(room, top - 1, h, state.decree[c, side] if fresh else 0, slack)
+                outcome, theta = _exit_of(room, top - 1, h, state.decree[c, side] if fresh else 0, slack, is_short)
                 if outcome == OPEN:
                     return OPEN, theta
                 if outcome == FOUND and theta * h < room.exits[i]:
@@ -159,7 +171,7 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
     for _ in range(_SHRINKS):
         if not h > 0.0:
             break
-        outcome, theta = isolate(plant, state, room, nc, tau, h, top)
+        outcome, theta = isolate(plant, state, room, nc, tau, h, top, h <= _SHORT * scale)
         if outcome == OPEN and h > _TINY * scale:
             h *= 0.5
             continue
