@@ -39,6 +39,9 @@ _HOME = {
     "Harmonic": "hybridsim.mechanics.system",
     "MechanicalContact": "hybridsim.mechanics.system",
     "MechanicalSystem": "hybridsim.mechanics.system",
+    "chain_on_belt": "hybridsim.mechanics.scenes",
+    "three_coupled_blocks": "hybridsim.mechanics.scenes",
+    "two_blocks_on_belt": "hybridsim.mechanics.scenes",
     # running
     "MechanicalSolution": "hybridsim.mechanics.solution",
     "Event": "hybridsim.solution",

@@ -27,8 +27,8 @@ class Plant(NamedTuple):
     node_dof, node_con: first coordinate and contact of each node. k, c: M^-1 K and M^-1 C; b: M^-1 W^T (rows: coordinates,
     columns: contacts); w: W (rows: contacts); g: W M^-1 W^T of each node, dense, one after another. near: neighbours.
     still: constant acceleration. h: harmonics of each coordinate: number of the rate, amplitudes of sine and cosine. base:
-    (m, 3) constant, sine, cosine of the base's speed; base_rate: -1 where it is constant. limits, onsets (m, 2): most
-    force in stick and force at the onset of slip, forward and backward; smooth (m, 2): whether these agree by algebra.
+    (m, 3) constant, sine, cosine of the base's speed; base_rate: -1 where it is constant. limits (m, 2), smooth (m, 2): most
+    force in stick, forward and backward, and whether that at the onset of slip agrees with it by algebra.
     tape (m, 2): number of the tape of slip. par (m, p): its constants. unit: contacts with one weight only.
     """
 
@@ -278,8 +278,6 @@ def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarr
                 except ModelError as fault:
                     raise ModelError(f"law '{contact.law.name}': {fault.message}", remedy=fault.remedy) from None
             number[i, side] = known[key]
-    if not tapes:
-        tapes = []
     laws = Laws(
         *_rows([t.rows for t in tapes]), *_rows([t.constant_rows for t in tapes]),
         _ints([t.registers for t in tapes]), _ints([t.moving[0] for t in tapes]), _ints([t.out for t in tapes]),
