@@ -24,9 +24,13 @@ if TYPE_CHECKING:
 
 
 @overload
-def simulate(model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any) -> MechanicalSolution: ...
+def simulate(
+    model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any
+) -> MechanicalSolution: ...
 @overload
-def simulate(model: Model | str | PathLike[str], t_span: tuple[float, float], **arguments: Any) -> Solution: ...
+def simulate(
+    model: Model | str | PathLike[str], t_span: tuple[float, float], **arguments: Any
+) -> Solution: ...
 def simulate(
     model: Model | MechanicalSystem | str | PathLike[str],
     t_span: tuple[float, float],
@@ -48,7 +52,8 @@ def simulate(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which runs by
+    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`,
+    which runs by
         Taylor series of its own.
     t_span : (t0, t1); t1 < t0 runs backward in time.
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.

@@ -2,8 +2,8 @@
 
     python studies/chain.py [OUT_DIR]
 
-Beside hybridsim runs what one would write in an afternoon: fixed-step RK4 in numba, every step checked for contacts that
-stop or are torn loose, the earliest found by bisection, and the whole system restarted there.
+Beside hybridsim runs what one would write in an afternoon: fixed-step RK4 in numba, every step checked for
+contacts that stop or are torn loose, the earliest found by bisection, and the whole system restarted there.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ H, DELTA, BELT, COUPLING, LEAF = 0.01, 3.0, 0.2, 1.0, 1.0
 
 @numba.njit(cache=False)
 def springs(x, i):
+    """Force of the springs on block i."""
     n = x.shape[0]
     force = -LEAF * x[i]
     if i > 0:
@@ -37,6 +38,7 @@ def springs(x, i):
 
 @numba.njit
 def rates(x, v, mode, dx, dv):
+    """Rates of positions and velocities; mode 0 sticks, else the direction of slip."""
     for i in range(x.shape[0]):
         dx[i] = v[i]
         if mode[i] == 0:
@@ -47,6 +49,7 @@ def rates(x, v, mode, dx, dv):
 
 @numba.njit
 def rk4(x, v, mode, h, k, x1, v1, y, w):
+    """One classical step of length h."""
     rates(x, v, mode, k[0], k[1])
     y[:], w[:] = x + 0.5 * h * k[0], v + 0.5 * h * k[1]
     rates(y, w, mode, k[2], k[3])
@@ -60,6 +63,7 @@ def rk4(x, v, mode, h, k, x1, v1, y, w):
 
 @numba.njit
 def fired(x, v, mode):
+    """The first block that has left its mode, or -1."""
     for i in range(x.shape[0]):
         if mode[i] == 0:
             if abs(springs(x, i)) > 1.0:
@@ -71,6 +75,7 @@ def fired(x, v, mode):
 
 @numba.njit
 def rk4_bisection(x, v, mode, end):
+    """Run to the end; the number of events."""
     n, t, events = x.shape[0], 0.0, 0
     k, x1, v1, y, w = np.empty((8, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     while t < end:
@@ -125,6 +130,7 @@ def theirs(n: int) -> tuple[float, int]:
 
 
 def main() -> None:
+    """Measure, draw, write the page."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent / "docs" / "studies"
     rows = []
     for n in SIZES:
@@ -142,7 +148,9 @@ def main() -> None:
     axes[0].set(xlabel="blocks n", ylabel="time per event / us")
     axes[1].loglog(sizes, [row[1][0] for row in rows], "o-", color="#0072B2", label="hybridsim, rtol 1e-9")
     axes[1].loglog(sizes, [row[2][0] for row in rows], "s--", color="#56B4E9", label="hybridsim, rtol 1e-6")
-    axes[1].loglog(sizes, [row[3][0] for row in rows], "^:", color="#D55E00", label="RK4 with bisection, h = 0.01")
+    axes[1].loglog(
+        sizes, [row[3][0] for row in rows], "^:", color="#D55E00", label="RK4 with bisection, h = 0.01"
+    )
     axes[1].set(xlabel="blocks n", ylabel="ms per unit of time")
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
@@ -156,21 +164,22 @@ def main() -> None:
         f"""# A chain of blocks: what an event costs
 
 `hs.chain_on_belt(n)`: blocks of mass 1 on a belt of speed {BELT}, leaf springs {LEAF}, coupling {COUPLING}, friction
-1/(1 + {DELTA:g}|v|), from random positions. Made by `studies/chain.py`; every run finished. Times are those of the compiled loops on one
-core, the best of three (two for RK4); they depend on the machine, their ratios less.
+1/(1 + {DELTA:g}|v|), from random positions. Made by `studies/chain.py`; every run finished. Times are those of
+the compiled loops on one core, the best of three (two for RK4); they depend on the machine, their ratios less.
 
-| n | events per unit of time | us per event, rtol 1e-9 | ms per unit, rtol 1e-9 | rtol 1e-6 | RK4 with bisection, h = 0.01 |
-| --- | --- | --- | --- | --- | --- |
+| n | events per unit of time | us per event, rtol 1e-9 | ms per unit, rtol 1e-9 | rtol 1e-6 | RK4 with
+bisection, h = 0.01 | | --- | --- | --- | --- | --- | --- |
 {table}
 
 ![Time per event and per unit of simulated time against the number of blocks](chain.png)
 
-The time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose series it changes by more than a
-tenth of the tolerance; all blocks are expanded together only at the end of a step, which all events of the step share. RK4 with
-bisection restarts everything at each event: with n times the events, each n times as dear.
+The time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose
+series it changes by more than a tenth of the tolerance; all blocks are expanded together only at the end of a
+step, which all events of the step share. RK4 with bisection restarts everything at each event: with n times
+the events, each n times as dear.
 
-The series control their error; RK4 with h = 0.01 does not: its force law is stepped over at each event, and its bisection ends
-within 1e-14 of the step.
+The series control their error; RK4 with h = 0.01 does not: its force law is stepped over at each event, and
+its bisection ends within 1e-14 of the step.
 """,
         encoding="utf-8",
     )

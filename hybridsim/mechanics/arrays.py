@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-STICK, OPEN_END = 0, 2.0**1000  # mode of a contact at rest (+1, -1: slip forward, backward); no event in sight
+STICK, OPEN_END = (
+    0,
+    2.0**1000,
+)  # mode of a contact at rest (+1, -1: slip forward, backward); no event in sight
 VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that reaches no further
 DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop came back
 
@@ -20,13 +23,14 @@ class State(NamedTuple):
     """Where a run is; P1 = order + 1.
 
     x: (2, n) positions and velocities at the origin of the present step. series (n, P1): of each coordinate, from the
-    node's origin (within the step). mode (m,): 0 stick, else direction of slip. held (m,): -1 or +1 where the force of a
-    contact at rest stays at its limit because others hold it. decree (m, 2), stamp (m,): leading coefficients of its guards
-    that are zero just after an event, and when. until, guard (m,): next exit and its kind. pinv: pseudo-inverses of the
-    Delassus matrices of what sticks, node by node. holds (nn,): how many stick. pin (n,): contact that fixes a coordinate,
-    or -1. anchor (m,): coordinate that is evaluated from a contact's constraint, or -1. tree: tournament of the next times.
-    clock: origin of the step (high, low), its length, last event. phase: angles at the origin. flags: see `loop`. counts:
-    steps, events, restarts of patches, nodes restarted, undecided, grazings. kernels, whole, real: addresses of the large
+    node's origin (within the step). mode (m,): 0 stick, else direction of slip. held (m,): -1 or +1 where the
+    force of a contact at rest stays at its limit because others hold it. decree (m, 2), stamp (m,): leading
+    coefficients of its guards that are zero just after an event, and when. until, guard (m,): next exit and
+    its kind. pinv: pseudo-inverses of the Delassus matrices of what sticks, node by node. holds (nn,): how
+    many stick. pin (n,): contact that fixes a coordinate, or -1. anchor (m,): coordinate that is evaluated
+    from a contact's constraint, or -1. tree: tournament of the next times. clock: origin of the step (high,
+    low), its length, last event. phase: angles at the origin. flags: see `loop`. counts: steps, events,
+    restarts of patches, nodes restarted, undecided, grazings. kernels, whole, real: addresses of the large
     kernels, and what they are given.
     """
 

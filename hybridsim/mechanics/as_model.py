@@ -20,7 +20,9 @@ def as_model(system: MechanicalSystem) -> Model:
 
     n, inverse = system.n, np.linalg.inv(system.M.toarray())
     K, C = inverse @ system.K.toarray(), inverse @ system.C.toarray()
-    B = np.array([[sum(inverse[i, j] * w for j, w in c.direction) for c in system.contacts] for i in range(n)])
+    B = np.array(
+        [[sum(inverse[i, j] * w for j, w in c.direction) for c in system.contacts] for i in range(n)]
+    )
     rates = sorted(
         {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
         | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)}
@@ -55,7 +57,10 @@ def _signal(terms: Any, omega: dict[float, str]) -> str:
     parts = []
     for term in terms:
         if isinstance(term, Harmonic):
-            parts += [_term(term.sin, f"sin({omega[term.omega]}*t)"), _term(term.cos, f"cos({omega[term.omega]}*t)")]
+            parts += [
+                _term(term.sin, f"sin({omega[term.omega]}*t)"),
+                _term(term.cos, f"cos({omega[term.omega]}*t)"),
+            ]
         else:
             parts.append(f" + ({float(term)!r})")
     return "".join(parts) or "0"

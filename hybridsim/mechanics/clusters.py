@@ -1,8 +1,8 @@
 """What sticks together: the pseudo-inverse of its Delassus matrix, and velocities that meet its constraints.
 
 A set of contacts that stick may be redundant (two in one direction, more than there are coordinates). The motion is
-unique all the same; of the forces those of least norm are taken, f = G^+ g (A. Ben-Israel, T. N. E. Greville, Generalized
-Inverses, 2nd ed., Springer 2003, section 7.6: full-rank factors).
+unique all the same; of the forces those of least norm are taken, f = G^+ g (A. Ben-Israel, T. N. E. Greville,
+Generalized Inverses, 2nd ed., Springer 2003, section 7.6: full-rank factors).
 """
 
 from __future__ import annotations
@@ -30,12 +30,11 @@ def factorise(plant: Any, state: Any, room: Any, j: int) -> None:
         state.pin[x] = -1
     for c in range(first, last):
         state.anchor[c] = -1
-        if state.mode[c] == STICK:
+        if state.mode[c] == STICK and state.held[c] == 0:
+            room.order[size] = c - first
+            size += 1
             if plant.unit[c]:
                 state.pin[plant.w_col[plant.w_ptr[c]]] = c
-            if state.held[c] == 0:
-                room.order[size] = c - first
-                size += 1
     state.holds[j] = size
     if size == 0:
         return
@@ -85,7 +84,7 @@ def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int
         for b in range(size):
             P[a, b] = G[order[a] * m + order[b]]
     rank = 0
-    for step in range(size):  # the pivots stay where they are; a used row is marked by a negative diagonal
+    for _ in range(size):  # the pivots stay where they are; a used row is marked by a negative diagonal
         pivot, best = -1, 0.0
         for a in range(size):
             scale = G[order[a] * m + order[a]]

@@ -1,11 +1,12 @@
 """Which contacts of a node stick, slip or release: one complementarity problem, decided by the derivatives that tell.
 
-A candidate gives each contact at zero relative velocity a mode. It is admissible when, just after the instant, the force of
-everything that sticks stays within its limits and everything that slips moves the way it says; the signs come from short
-series by the rules of `hybridsim.engine.decide`, with zeros by decree. From "all hold" the contacts that violate are changed
-together (block principal pivoting, J. J. Judice and F. M. Pires, Computers & Operations Research 21 (1994) 587,
-doi:10.1016/0305-0548(94)90106-6), and one by one where that does not settle, which cannot cycle for positive definite
-Delassus matrices (K. G. Murty, Mathematical Programming 7 (1974) 26). Nothing is enumerated.
+A candidate gives each contact at zero relative velocity a mode. It is admissible when, just after the instant,
+the force of everything that sticks stays within its limits and everything that slips moves the way it says;
+the signs come from short series by the rules of `hybridsim.engine.decide`, with zeros by decree. From "all
+hold" the contacts that violate are changed together (block principal pivoting, J. J. Judice and F. M. Pires,
+Computers & Operations Research 21 (1994) 587, doi:10.1016/0305-0548(94)90106-6), and one by one where that
+does not settle, which cannot cycle for positive definite Delassus matrices (K. G. Murty, Mathematical
+Programming 7 (1974) 26). Nothing is enumerated.
 """
 
 from __future__ import annotations
@@ -139,7 +140,9 @@ def _bounds(plant: Any, state: Any, room: Any, j: int, nd: int, tau: float) -> N
                 total += abs(plant.c_val[e] * (k + 1) * room.Q[k + 1, room.loc[plant.c_col[e]]])
             for e in range(plant.h_ptr[x], plant.h_ptr[x + 1]):
                 r = plant.h_rate[e]
-                total += abs(plant.h_val[e, 0] * room.trig[r, 0, k]) + abs(plant.h_val[e, 1] * room.trig[r, 1, k])
+                total += abs(plant.h_val[e, 0] * room.trig[r, 0, k]) + abs(
+                    plant.h_val[e, 1] * room.trig[r, 1, k]
+                )
             for e in range(plant.b_ptr[x], plant.b_ptr[x + 1]):
                 total += abs(plant.b_val[e] * room.F[k, room.lcon[plant.b_col[e]]])
             room.err[k, a] = _TERMS * _UNIT * total
@@ -264,5 +267,7 @@ def _is_held(plant: Any, state: Any, j: int, c: int) -> bool:
             for b in range(m):
                 part = state.pinv[at + a * m + b]
                 if part != 0.0:
-                    left -= plant.g_val[at + (c - first) * m + a] * part * plant.g_val[at + b * m + (c - first)]
+                    left -= (
+                        plant.g_val[at + (c - first) * m + a] * part * plant.g_val[at + b * m + (c - first)]
+                    )
     return left <= 1e3 * m * _UNIT * own

@@ -1,8 +1,8 @@
 """Taylor series of a patch of nodes: coordinates, relative velocities and friction forces, order by order.
 
-Within a patch everything is expanded together; the nodes around it enter by the series they already have. With q to order
-k + 1 known, the relative velocities have their coefficient k, the laws give the forces of what slips, and those of what
-sticks follow from w . q'' = base'. That gives coefficient k + 2 of q.
+Within a patch everything is expanded together; the nodes around it enter by the series they already have. With
+q to order k + 1 known, the relative velocities have their coefficient k, the laws give the forces of what
+slips, and those of what sticks follow from w . q'' = base'. That gives coefficient k + 2 of q.
 """
 
 from __future__ import annotations
@@ -269,7 +269,7 @@ def _hold(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
 
 
 def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Series of the patch that has been gathered: Q (positions), R (relative velocities), F (forces); see `expanded`."""
+    """Series of the gathered patch: Q (positions), R (relative velocities), F (forces); see `expanded`."""
     count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau = state.real[AT]
     _angles(plant, state, room, tau, top)

@@ -10,9 +10,30 @@ import math
 from typing import Any
 
 from hybridsim.engine.jit import inlined, kernel
-from hybridsim.engine.lean_tape import ADD_CONSTANT, CONSTANT_SUB, DIVIDE_BY, SCALE, SINCOS_LINEAR, SUB_CONSTANT
+from hybridsim.engine.lean_tape import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+)
 from hybridsim.engine.tape import (
-    ACOS, ADD, ASIN, ATAN, DIV, EXP, INTEGRAL, LOG, MUL, NEG, SINCOS, SINHCOSH, SQRT, SUB, TANGENT,
+    ACOS,
+    ADD,
+    ASIN,
+    ATAN,
+    DIV,
+    EXP,
+    INTEGRAL,
+    LOG,
+    MUL,
+    NEG,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
 )  # fmt: skip
 
 
@@ -123,7 +144,7 @@ def advance_lanes(rows: Any, V: Any, base: int, orders: int, n: int, k: int) -> 
         elif op == NEG:
             for j in range(n):
                 z[j] = -x[j]
-        elif op == ADD_CONSTANT or op == SUB_CONSTANT or op == CONSTANT_SUB:
+        elif op in (ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB):
             sign, other = -1.0 if op == CONSTANT_SUB else 1.0, -1.0 if op == SUB_CONSTANT else 1.0
             for j in range(n):
                 z[j] = sign * x[j]

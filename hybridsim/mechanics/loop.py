@@ -104,7 +104,16 @@ def _grow(plant: Any, room: Any, j: int, radius: int, most: int) -> tuple[int, i
 
 @kernel
 def _changes_outside(
-    plant: Any, state: Any, room: Any, count: int, outer: int, nd: int, tau: float, h: float, top: int, rtol: float
+    plant: Any,
+    state: Any,
+    room: Any,
+    count: int,
+    outer: int,
+    nd: int,
+    tau: float,
+    h: float,
+    top: int,
+    rtol: float,
 ) -> float:
     """What the new series of the outermost nodes change outside the patch over a time h, in tolerances."""
     worst = 0.0
@@ -139,15 +148,17 @@ def _changes_outside(
 
 
 @kernel
-def _restart(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, j: int, tau: float) -> int:
+def _restart(
+    plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, j: int, tau: float
+) -> int:
     """Expand a patch around node j at tau: 1 done, 0 it would be most of the system, -1 there are no series."""
-    rtol, longest, top, keep = control
+    rtol, _, top, keep = control
     nodes = plant.node_dof.shape[0] - 1
     left = state.clock[2] - tau
     radius = max(state.flags[RADIUS], 1)
     while True:
         count, outer = _grow(plant, room, j, radius, nodes // 2)
-        if count < 0 or not left > 0.0:
+        if not (0 <= count <= nodes // 2 and left > 0.0):
             return 0
         nd, nc = gather(plant, state, room, count, tau, top)
         expanded(plant, laws, state, room, count, nd, nc, tau, top)
@@ -235,13 +246,12 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
             continue
         fired = first_leaf(state.tree)
         j, kind = plant.con_node[fired], state.guard[fired]
+        state.flags[ROUNDS] = state.flags[ROUNDS] + 1 if tau == state.clock[3] else 0
+        state.flags[WHERE], state.clock[3] = j, tau
         code = decided(plant, laws, state, room, j, tau, fired)
-        state.flags[WHERE] = j
         if code != 0:
             return code
         _note(plant, state, room, record, j, tau, fired, kind)
-        state.flags[ROUNDS] = state.flags[ROUNDS] + 1 if tau == state.clock[3] else 0
-        state.clock[3] = tau
         if state.flags[ROUNDS] > _ROUNDS + m:
             return CASCADE
         done = _restart(plant, laws, state, room, record, control, j, tau)

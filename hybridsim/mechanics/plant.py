@@ -1,12 +1,14 @@
-"""A mechanical system as arrays for the kernels: accelerations per coordinate, Delassus matrices per cluster, laws as tapes.
+"""A mechanical system as arrays for the kernels: accelerations, Delassus matrices of clusters, laws as tapes.
 
 Coordinates that are coupled in the mass matrix, or by a common contact, form a *node*; coordinates and contacts are
-renumbered so that those of a node are neighbours. Accelerations jump within a node only, so that an event is decided there.
+renumbered so that those of a node are neighbours. Accelerations jump within a node only, so that an event is
+decided there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,12 +26,13 @@ MOST_COUPLED = 3000  # coordinates coupled in the mass matrix whose inverse is m
 class Plant(NamedTuple):
     """What does not change in a run; sparse matrices are (ptr, col, val), rows in the plant's own order.
 
-    node_dof, node_con: first coordinate and contact of each node. k, c: M^-1 K and M^-1 C; b: M^-1 W^T (rows: coordinates,
-    columns: contacts); w: W (rows: contacts); g: W M^-1 W^T of each node, dense, one after another. near: neighbours.
-    still: constant acceleration. h: harmonics of each coordinate: number of the rate, amplitudes of sine and cosine. base:
-    (m, 3) constant, sine, cosine of the base's speed; base_rate: -1 where it is constant. limits (m, 2), smooth (m, 2): most
-    force in stick, forward and backward, and whether that at the onset of slip agrees with it by algebra.
-    tape (m, 2): number of the tape of slip. par (m, p): its constants. unit: contacts with one weight only.
+    node_dof, node_con: first coordinate and contact of each node. k, c: M^-1 K and M^-1 C; b: M^-1 W^T (rows:
+    coordinates, columns: contacts); w: W (rows: contacts); g: W M^-1 W^T of each node, dense, one after
+    another. near: neighbours. still: constant acceleration. h: harmonics of each coordinate: number of the
+    rate, amplitudes of sine and cosine. base: (m, 3) constant, sine, cosine of the base's speed; base_rate: -1
+    where it is constant. limits (m, 2), smooth (m, 2): most force in stick, forward and backward, and whether
+    that at the onset of slip agrees with it by algebra. tape (m, 2): number of the tape of slip. par (m, p):
+    its constants. unit: contacts with one weight only.
     """
 
     node_dof: np.ndarray
@@ -124,7 +127,7 @@ def build(system: MechanicalSystem) -> Built:
     node_dof = np.searchsorted(node_of, np.arange(count + 1))
     node_con = np.searchsorted(con_node, np.arange(count + 1))
     sizes = np.diff(node_con)
-    blocks = [G[a:b, a:b].toarray().ravel() for a, b in zip(node_con[:-1], node_con[1:], strict=True)]
+    blocks = [G[a:b, a:b].toarray().ravel() for a, b in pairwise(node_con)]
     rates = sorted({t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
                    | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})  # fmt: skip
     still, harmonics = _forcing(system, inverse, dofs, rates)
@@ -161,7 +164,7 @@ def _inverse(system: MechanicalSystem) -> Any:
     order = np.argsort(label, kind="stable")
     ends = np.concatenate([[0], np.cumsum(np.bincount(label))])
     parts = []
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         block = M[order[a:b]][:, order[a:b]].toarray()
         _require_positive(system, bool(np.linalg.eigvalsh(block)[0] > 0.0))
         parts.append(np.linalg.inv(block))
@@ -276,14 +279,16 @@ def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarr
                 try:
                     tapes.append(scalar_tape(slip, ("v",), ("N", *names), "v"))
                 except ModelError as fault:
-                    raise ModelError(f"law '{contact.law.name}': {fault.message}", remedy=fault.remedy) from None
+                    raise ModelError(
+                        f"law '{contact.law.name}': {fault.message}", remedy=fault.remedy
+                    ) from None
             number[i, side] = known[key]
     laws = Laws(
         *_rows([t.rows for t in tapes]), *_rows([t.constant_rows for t in tapes]),
         _ints([t.registers for t in tapes]), _ints([t.moving[0] for t in tapes]), _ints([t.out for t in tapes]),
         *_flat([t.constants for t in tapes]),
-        _ints([r for t in tapes for r, _ in t.numbers]), np.array([x for t in tapes for _, x in t.numbers], dtype=float),
-        _ints(np.concatenate([[0], np.cumsum([len(t.numbers) for t in tapes])])),
+        _ints([r for t in tapes for r, _ in t.numbers]), np.array([x for t in tapes for _, x in t.numbers],
+        dtype=float), _ints(np.concatenate([[0], np.cumsum([len(t.numbers) for t in tapes])])),
     )  # fmt: skip
     return laws, number, par, not any(len(t.rows) for t in tapes)
 
@@ -294,4 +299,6 @@ def _rows(parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _flat(parts: list[tuple[int, ...]]) -> tuple[np.ndarray, np.ndarray]:
-    return _ints([r for p in parts for r in p]), _ints(np.concatenate([[0], np.cumsum([len(p) for p in parts])]))
+    return _ints([r for p in parts for r in p]), _ints(
+        np.concatenate([[0], np.cumsum([len(p) for p in parts])])
+    )

@@ -15,7 +15,20 @@ from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
 from hybridsim.engine.timepair import phase_of
 from hybridsim.mechanics.arrays import (
-    AT, CASCADE, DECIDE, DONE, FIRED, FULL, INCONSISTENT, LOST, NODE, NONUNIQUE, OPEN_END, Record, Room, State,
+    AT,
+    CASCADE,
+    DECIDE,
+    DONE,
+    FIRED,
+    FULL,
+    INCONSISTENT,
+    LOST,
+    NODE,
+    NONUNIQUE,
+    OPEN_END,
+    Record,
+    Room,
+    State,
 )  # fmt: skip
 from hybridsim.mechanics.decision import decide
 from hybridsim.mechanics.expansion import expand
@@ -80,7 +93,9 @@ class MechanicalRun:
         state.series[:, :2] = state.x.T
         for r, rate in enumerate(plant.rates):
             state.phase[r] = phase_of(state.clock[0], 0.0, rate, 0.0)
-        weights = csr_array((plant.w_val, plant.w_col, plant.w_ptr), shape=(len(plant.con_node), len(plant.dof_node)))
+        weights = csr_array(
+            (plant.w_val, plant.w_col, plant.w_ptr), shape=(len(plant.con_node), len(plant.dof_node))
+        )
         turns = state.phase[plant.base_rate] if len(plant.rates) else 0.0
         base = plant.base[:, 0] + plant.base[:, 1] * np.sin(turns) + plant.base[:, 2] * np.cos(turns)
         state.mode[:] = np.sign(weights @ state.x[1] - base)
@@ -121,7 +136,9 @@ class MechanicalRun:
     def _collect(self, record: Record) -> None:
         pieces, rows, events = record.used
         if pieces:
-            self.pieces.append((record.piece[:pieces].copy(), record.start[:pieces].copy(), record.series[:rows].copy()))
+            self.pieces.append(
+                (record.piece[:pieces].copy(), record.start[:pieces].copy(), record.series[:rows].copy())
+            )
         self.events.append(record.event[:events].copy())
         self.when.append(record.when[:events].copy())
 
@@ -179,5 +196,3 @@ def new_room(built: Built, order: int) -> Room:
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
         line=np.zeros(columns),
     )  # fmt: skip
-
-

@@ -55,7 +55,9 @@ def simulate_mechanical(
             )
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
-        raise UsageError(f"t_span is {t_span!r}", remedy="a MechanicalSystem runs forward only; to_model() backward")
+        raise UsageError(
+            f"t_span is {t_span!r}", remedy="a MechanicalSystem runs forward only; to_model() backward"
+        )
     if save not in ("all", "events", "nothing"):
         raise UsageError(f"save is {save!r}", remedy="a MechanicalSystem keeps 'all', 'events' or 'nothing'")
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)

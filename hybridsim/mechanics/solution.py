@@ -117,7 +117,9 @@ class MechanicalSolution:
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
         if len(times) and not ((times >= self.t_start) & (times <= self.t_end)).all():
             bad = times[~((times >= self.t_start) & (times <= self.t_end))][0]
-            raise UsageError(f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}")
+            raise UsageError(
+                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
+            )
         x = self._states(times, side == "+")
         return x[0] if np.ndim(t) == 0 else x.T
 
@@ -128,7 +130,9 @@ class MechanicalSolution:
             self._quantities(times, right, out)
         return out[:, self._columns]
 
-    def _quantities(self, times: np.ndarray, right: bool, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _quantities(
+        self, times: np.ndarray, right: bool, states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Forces and relative velocities (k, m) of the contacts; the states are made to meet what sticks."""
         built, (state, room) = self._run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.model.contacts)))
@@ -158,7 +162,8 @@ class MechanicalSolution:
             if own not in contacts:
                 known = [*self.names, *contacts, *(f"v_rel({c})" for c in contacts)]
                 raise UsageError(
-                    f"{self.model.name} has no quantity {name!r}", remedy=nearest(name, known, kind="quantities")
+                    f"{self.model.name} has no quantity {name!r}",
+                    remedy=nearest(name, known, kind="quantities"),
                 )
             right = side == "+"
             column = int(np.argsort(self._contact_of)[contacts.index(own)])
@@ -198,7 +203,9 @@ class MechanicalSolution:
 
     def _require_events(self) -> None:
         if self._save == "nothing":
-            raise UsageError("the run was made with save='nothing', which keeps no events", remedy="save='events'")
+            raise UsageError(
+                "the run was made with save='nothing', which keeps no events", remedy="save='events'"
+            )
 
     # -- how it went ----------------------------------------------------------------------------------------
 
@@ -227,8 +234,9 @@ class MechanicalSolution:
         names = [self.model.contacts[i].name for i in self._run.node_contacts]
         shown = ", ".join(names[:8]) + (f", ... ({len(names)} contacts)" if len(names) > 8 else "")
         reasons = {
-            INCONSISTENT: "no combination of stick and slip is admissible just after it: each asks for a force beyond its "
-            "limit or for a motion against its direction; look for a law whose slip force at v = 0 is above its stick limit",
+            INCONSISTENT: "no combination of stick and slip is admissible just after it: each asks for a force "
+            "beyond its limit or for a motion against its direction; look for a law whose slip force at v = 0 is "
+            "above its stick limit",
             CASCADE: "events follow each other without time going on",
             LOST: "the series have no step from here: a law is no number, or changes too fast at v = 0",
         }
@@ -238,7 +246,10 @@ class MechanicalSolution:
     def warnings(self) -> tuple[str, ...]:
         """What the user should know: decisions inside rounding, touches of a limit."""
         *_, undecided, touches = self._run.state.counts.tolist()
-        texts = {f"undecided at rounding ({undecided} times)": undecided, f"near-grazing ({touches} times)": touches}
+        texts = {
+            f"undecided at rounding ({undecided} times)": undecided,
+            f"near-grazing ({touches} times)": touches,
+        }
         return tuple(text for text, count in texts.items() if count)
 
     @property

@@ -8,7 +8,19 @@ from typing import Any
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import (
-    AT, CONS, DOFS, LENGTH, LONGEST, LOWER, OPEN_END, ORDER, RTOL, STICK, STRETCH, UPPER, VELOCITY,
+    AT,
+    CONS,
+    DOFS,
+    LENGTH,
+    LONGEST,
+    LOWER,
+    OPEN_END,
+    ORDER,
+    RTOL,
+    STICK,
+    STRETCH,
+    UPPER,
+    VELOCITY,
 )  # fmt: skip
 from hybridsim.mechanics.lanes import advance_lanes
 
@@ -43,7 +55,9 @@ def first_leaf(tree: Any) -> int:
 
 
 @kernel
-def reach(plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float) -> float:
+def reach(
+    plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
+) -> float:
     """The time over which the last two terms of each series stay below its tolerance; NaN where one is no number."""
     h = longest
     for k in range(top - 1, top + 1):
@@ -76,7 +90,7 @@ def reach(plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: f
 def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
     """First time in (0, h] at which the polynomial in room.poly[:size] goes negative, in units of h.
 
-    Where it is zero all along it does not. On a stretch that is short already a touch is passed if it is positive after it.
+    Where it is zero all along it does not. On a short stretch a touch is passed if it is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
     for k in range(size):
@@ -97,7 +111,7 @@ def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short:
 def isolate(
     plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
-    """First exit of each contact of the patch over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
+    """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
     for i in range(nc):
         c = room.cons[i]
         room.exits[i], room.kinds[i] = OPEN_END, VELOCITY
@@ -120,7 +134,9 @@ def isolate(
                     room.poly[k] = -sigma * room.F[k, i]
                 room.poly[0] += limit
                 slack = 8.0 * _UNIT * max(limit, size)
-                outcome, theta = _exit_of(room, top - 1, h, state.decree[c, side] if fresh else 0, slack, is_short)
+                outcome, theta = _exit_of(
+                    room, top - 1, h, state.decree[c, side] if fresh else 0, slack, is_short
+                )
                 if outcome == OPEN:
                     return OPEN, theta
                 if outcome == FOUND and theta * h < room.exits[i]:
@@ -171,7 +187,7 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
     for _ in range(_SHRINKS):
         if not h > 0.0:
             break
-        outcome, theta = isolate(plant, state, room, nc, tau, h, top, h <= _SHORT * scale)
+        outcome, _ = isolate(plant, state, room, nc, tau, h, top, h <= _SHORT * scale)
         if outcome == OPEN and h > _TINY * scale:
             h *= 0.5
             continue

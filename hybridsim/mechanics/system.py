@@ -1,4 +1,4 @@
-"""The declaration of a mechanical system: matrices, harmonic forcing, and contacts with a direction and a friction law."""
+"""The declaration of a mechanical system: matrices, harmonic forcing, contacts with direction and friction law."""
 
 from __future__ import annotations
 
@@ -120,7 +120,8 @@ class MechanicalSystem:
 
     Parameters
     ----------
-    M, C, K : arrays (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K may be None.
+    M, C, K : arrays (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K
+    may be None.
     forcing : None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from coordinates.
     contacts : `MechanicalContact` objects.
     q0, v0 : initial positions and velocities (n,), zero if not given.
@@ -184,7 +185,7 @@ class MechanicalSystem:
                 if not isinstance(term, Harmonic) and not isinstance(term, int | float | np.number):
                     raise UsageError(
                         f"{self.name}: forcing of coordinate {i} holds {term!r}",
-                        remedy="give numbers and hs.Harmonic(omega, sin=..., cos=...); write other functions of t in an hs.Model",
+                        remedy="give numbers and hs.Harmonic(omega, ...); write others in an hs.Model",
                     )
             kept = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
             if kept:
@@ -203,10 +204,14 @@ class MechanicalSystem:
         every = [*self.names, *self.velocities, *(c.name for c in self.contacts)]
         twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
         if twice:
-            raise UsageError(f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own")
+            raise UsageError(
+                f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own"
+            )
         for contact in self.contacts:
             if not isinstance(contact, MechanicalContact):
-                raise UsageError(f"{self.name}: contacts hold {contact!r}", remedy="give hs.MechanicalContact(...) objects")
+                raise UsageError(
+                    f"{self.name}: contacts hold {contact!r}", remedy="give hs.MechanicalContact(...) objects"
+                )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
@@ -217,7 +222,8 @@ class MechanicalSystem:
     def with_(self, **changes: Any) -> MechanicalSystem:
         """A copy with some arguments of the constructor changed."""
         own: dict[str, Any] = {
-            key: getattr(self, key) for key in ("M", "C", "K", "forcing", "contacts", "q0", "v0", "name", "title", "source")
+            key: getattr(self, key)
+            for key in ("M", "C", "K", "forcing", "contacts", "q0", "v0", "name", "title", "source")
         }
         own["names"] = None if self.velocities[0] == "v1" else self.names
         return MechanicalSystem(**{**own, **changes})
@@ -243,7 +249,9 @@ def _matrix(given: Any, what: str, n: int | None) -> Any:
     else:
         dense = np.array(given, dtype=float)
         if dense.ndim not in (1, 2):
-            raise UsageError(f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal")
+            raise UsageError(
+                f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal"
+            )
         matrix = sparse.csr_array(sparse.diags_array(dense) if dense.ndim == 1 else dense)
     if matrix.shape[0] != matrix.shape[1] or (n is not None and matrix.shape[0] != n):
         raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"give ({n or 'n'}, {n or 'n'})")

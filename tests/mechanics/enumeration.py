@@ -1,7 +1,8 @@
 """The admissible sets of sticking and slipping contacts after an event, found by trying them all in 40 digits.
 
-Another route than the engine's: no Delassus operator, no pivoting, no short series, but the whole system of accelerations and
-forces [[M, W_S^T], [W_S, 0]] solved in mpmath for each combination, and for the two derivatives after it.
+Another route than the engine's: no Delassus operator, no pivoting, no short series, but the whole system of
+accelerations and forces [[M, W_S^T], [W_S, 0]] solved in mpmath for each combination, and for the two
+derivatives after it.
 """
 
 from __future__ import annotations
@@ -62,8 +63,10 @@ class Enumeration:
                     out[0][i] += mp.mpf(term)
         return out
 
-    def admissible(self, t: float, q: np.ndarray, v: np.ndarray) -> tuple[list[int], list[tuple[int, ...]], list[int]]:
-        """Contacts at rest; how these move just after (0, +1, -1) by each admissible candidate; modes of all the others."""
+    def admissible(
+        self, t: float, q: np.ndarray, v: np.ndarray
+    ) -> tuple[list[int], list[tuple[int, ...]], list[int]]:
+        """Contacts at rest; how these move just after by each admissible candidate; modes of the others."""
         with mp.workdps(DIGITS):
             relative = [
                 mp.fsum(mp.mpf(w) * mp.mpf(x) for w, x in zip(self.W[c], v, strict=True))
@@ -86,7 +89,9 @@ class Enumeration:
                     continue
                 if not self._is_plausible(modes, at_rest, relative, force[0], q, v):
                     continue
-                motion = self._motion(modes, at_rest, relative, force, mp.matrix(q.tolist()), mp.matrix(v.tolist()))
+                motion = self._motion(
+                    modes, at_rest, relative, force, mp.matrix(q.tolist()), mp.matrix(v.tolist())
+                )
                 if motion is not None and motion not in found:
                     found.append(motion)
             return at_rest, found, others
@@ -103,12 +108,14 @@ class Enumeration:
         x = np.linalg.solve(A, np.concatenate([right, np.zeros(len(stuck))]))
         a, forces = self.W @ x[: self.n], dict(zip(stuck, x[self.n :], strict=True))
         return all(
-            abs(forces[c]) <= float(limit(self.system.contacts[c])) + 1e-6 if modes[c] == 0 else modes[c] * a[c] >= -1e-6
+            abs(forces[c]) <= float(limit(self.system.contacts[c])) + 1e-6
+            if modes[c] == 0
+            else modes[c] * a[c] >= -1e-6
             for c in at_rest
         )
 
     def _redundant(self, modes, stuck, at_rest, relative, force, q, v) -> tuple[int, ...] | None:
-        """The motion where more stick than needed: some forces within the limits must hold, found as a linear program."""
+        """The motion where more stick than needed: forces within the limits must exist, a linear program."""
         right = np.array([float(x) for x in force]) - self.C @ v - self.K @ q
         for c in range(self.m):
             if modes[c] != 0:
@@ -116,7 +123,9 @@ class Enumeration:
                 right -= self.W[c] * float(slip_series(self.system.contacts[c], speed, modes[c])[0])
         inverse = np.linalg.inv(self.M)
         G, g = self.W[stuck] @ inverse @ self.W[stuck].T, self.W[stuck] @ inverse @ right
-        bounds = [(-float(limit(self.system.contacts[c])), float(limit(self.system.contacts[c]))) for c in stuck]
+        bounds = [
+            (-float(limit(self.system.contacts[c])), float(limit(self.system.contacts[c]))) for c in stuck
+        ]
         U, values, _ = np.linalg.svd(G)
         span = U[:, values > 1e-9 * values[0]].T  # the equations that are independent
         solved = linprog(np.zeros(len(stuck)), A_eq=span @ G, b_eq=span @ g, bounds=bounds)

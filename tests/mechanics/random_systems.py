@@ -37,7 +37,9 @@ def random_system(seed: int, law: str, most: int = 12) -> hs.MechanicalSystem:
             hs.MechanicalContact(f"f{i + 1}", w, rng.uniform(0.3, 1.0), law, LAWS[law](rng), base=base)
         )
     forcing = {0: hs.Harmonic(rng.uniform(0.5, 2.0), sin=rng.uniform(0.5, 2.0)), n - 1: 0.3}
-    return hs.MechanicalSystem(M, 0.03 * K, K, forcing, contacts, q0=rng.normal(size=n), v0=rng.normal(size=n))
+    return hs.MechanicalSystem(
+        M, 0.03 * K, K, forcing, contacts, q0=rng.normal(size=n), v0=rng.normal(size=n)
+    )
 
 
 def reordered(system: hs.MechanicalSystem, seed: int) -> tuple[hs.MechanicalSystem, np.ndarray]:
@@ -46,7 +48,9 @@ def reordered(system: hs.MechanicalSystem, seed: int) -> tuple[hs.MechanicalSyst
     dofs, contacts = rng.permutation(system.n), rng.permutation(len(system.contacts))
     place = np.argsort(dofs)
     moved = [
-        hs.MechanicalContact(c.name, {int(place[i]): w for i, w in c.direction}, c.normal, c.law, c.arguments, c.base)
+        hs.MechanicalContact(
+            c.name, {int(place[i]): w for i, w in c.direction}, c.normal, c.law, c.arguments, c.base
+        )
         for c in (system.contacts[k] for k in contacts)
     ]
     dense = [matrix.toarray()[np.ix_(dofs, dofs)] for matrix in (system.M, system.C, system.K)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_systems import random_system
+from mechanics.random_systems import random_system
 
 import hybridsim as hs
 
@@ -16,7 +16,7 @@ def states_of_model(system: hs.MechanicalSystem) -> list[int]:
 
 @pytest.mark.parametrize(
     "system",
-    [hs.two_blocks_on_belt(), hs.three_coupled_blocks(), random_system(5, "static-kinetic", 3)],
+    [hs.two_blocks_on_belt(), hs.three_coupled_blocks(), random_system(8, "static-kinetic", 3)],
     ids=lambda system: system.name,
 )
 def test_same_motion_and_events(system: hs.MechanicalSystem) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from enumeration import Enumeration
-from random_systems import LAWS, random_system, reordered
+from mechanics.enumeration import Enumeration
+from mechanics.random_systems import LAWS, random_system, reordered
 
 import hybridsim as hs
 
@@ -14,7 +14,9 @@ MODES = {"stick": 0, "slip+": 1, "slip-": -1}
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", [4, 9, 13])
-def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_them(law: str, seed: int) -> None:
+def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_them(
+    law: str, seed: int
+) -> None:
     system = random_system(seed, law)
     sol = hs.simulate(system, (0, 6), rtol=1e-11)
     assert sol.success
@@ -32,10 +34,14 @@ def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_th
 
 def test_two_contacts_in_one_direction_share_the_load() -> None:
     """They stick up to the sum of their limits, whatever each alone would do: the closed form of one contact."""
-    both = [hs.MechanicalContact(f"f{i}", [1.0], load, "coulomb", {"mu": 1.0}) for i, load in ((1, 0.2), (2, 0.5))]
+    both = [
+        hs.MechanicalContact(f"f{i}", [1.0], load, "coulomb", {"mu": 1.0}) for i, load in ((1, 0.2), (2, 0.5))
+    ]
     one = [hs.MechanicalContact("f", [1.0], 0.7, "coulomb", {"mu": 1.0})]
     pull = [hs.Harmonic(0.5, sin=1.0)]
-    shared, single = (hs.simulate(hs.MechanicalSystem([1.0], None, None, pull, c), (0, 30)) for c in (both, one))
+    shared, single = (
+        hs.simulate(hs.MechanicalSystem([1.0], None, None, pull, c), (0, 30)) for c in (both, one)
+    )
     t = np.linspace(0, 30, 301)
     assert shared(t) == pytest.approx(single(t), abs=1e-12)
     released = next(e.t for e in shared.events if e.source == "stick" and e.target != "stick")
