@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.expr import parse
 from hybridsim.mechanics.system import Harmonic
 from hybridsim.model import Contact, Model, Parameter, State
 
@@ -35,16 +36,18 @@ def as_model(system: MechanicalSystem) -> Model:
         terms += [_term(-K[i, j], system.names[j]) for j in range(n)]
         terms += [_term(-C[i, j], system.velocities[j]) for j in range(n)]
         terms += [_term(-B[i, c], contact.name) for c, contact in enumerate(system.contacts)]
-        states += [State(x, float(system.q0[i]), v), State(v, float(system.v0[i]), "".join(terms) or 0)]
+        start, speed = parse(float(system.q0[i])), parse(float(system.v0[i]))
+        states += [State(x, start, parse(v)), State(v, speed, parse("".join(terms) or 0))]
     contacts = [
-        Contact(c.name, _velocity(system, c, omega), c.normal, c.law, c.arguments) for c in system.contacts
+        Contact(c.name, parse(_velocity(system, c, omega)), parse(c.normal), c.law, c.arguments)
+        for c in system.contacts
     ]
     return Model(
         name=system.name,
         title=system.title,
         source=system.source,
         states=tuple(states),
-        parameters=tuple(Parameter(name, rate) for rate, name in omega.items()),
+        parameters=tuple(Parameter(name, parse(rate)) for rate, name in omega.items()),
         contacts=tuple(contacts),
     )
 

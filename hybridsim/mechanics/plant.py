@@ -202,7 +202,9 @@ def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndar
     return _ints(graph.indptr), _ints(graph.indices)
 
 
-def _forcing(system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]) -> tuple[Any, Any]:
+def _forcing(
+    system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]
+) -> tuple[Any, tuple[Any, Any, Any]]:
     """Constant acceleration (n,), and (ptr, rate, [sine, cosine]) of each coordinate."""
     n, place = system.n, np.argsort(dofs)
     still = np.zeros(n)

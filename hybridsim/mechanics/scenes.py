@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from hybridsim.expr import parse
 from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
+from hybridsim.model.library import load_law
 
 
 def chain_on_belt(
@@ -43,8 +47,10 @@ def chain_on_belt(
     diagonal[0] -= coupling
     diagonal[-1] -= coupling
     beside = np.full(n - 1, -coupling)
-    law = {"mu": 1.0, "delta": delta}
-    contacts = [MechanicalContact(f"f{i + 1}", {i: 1.0}, 1.0, "hyperbolic", law, belt) for i in range(n)]
+    law: Any = {"mu": 1.0, "delta": delta}
+    contacts = [
+        MechanicalContact(f"f{i + 1}", {i: 1.0}, 1.0, load_law("hyperbolic"), law, belt) for i in range(n)
+    ]
     return MechanicalSystem(
         np.ones(n),
         None,
@@ -76,9 +82,12 @@ def two_blocks_on_belt(
     ------
     After U. Galvanetto, S. R. Bishop, L. Briseghella, Int. J. Bifurcation and Chaos 5 (1995) 637.
     """
-    law = {"mu": 1.0, "delta": delta}
+    law: Any = {"mu": 1.0, "delta": delta}
     loads = (1.0, second)
-    contacts = [MechanicalContact(f"f{i + 1}", {i: 1.0}, loads[i], "hyperbolic", law, belt) for i in range(2)]
+    contacts = [
+        MechanicalContact(f"f{i + 1}", {i: 1.0}, loads[i], load_law("hyperbolic"), law, belt)
+        for i in range(2)
+    ]
     stiffness = [[1.0 + coupling, -coupling], [-coupling, 1.0 + coupling]]
     return MechanicalSystem(
         np.ones(2), None, stiffness, None, contacts, name="two-blocks",
@@ -108,7 +117,7 @@ def three_coupled_blocks(
     """
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [
-        MechanicalContact(f"f{i + 1}", directions[i], load, "coulomb", {"mu": mu[i]})
+        MechanicalContact(f"f{i + 1}", directions[i], load, load_law("coulomb"), {"mu": parse(mu[i])})
         for i, load in enumerate((30.0, 20.0, 10.0))
     ]
     return MechanicalSystem(

@@ -66,10 +66,11 @@ class MechanicalContact(Declared):
     def __post_init__(self) -> None:
         self._texts("name")
         self._maps("arguments")
-        if isinstance(self.law, str):
-            object.__setattr__(self, "law", load_law(self.law))
-        elif not isinstance(self.law, FrictionLaw):
-            raise self._fault(f"law is {self.law!r}", "give hs.FrictionLaw(...), or the name of a law")
+        law: object = self.law
+        if isinstance(law, str):
+            object.__setattr__(self, "law", load_law(law))
+        elif not isinstance(law, FrictionLaw):
+            raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
             what = "tables" if self.law.tables else "a force of its own instead of slip and stick"
             raise self._fault(
