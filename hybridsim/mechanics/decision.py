@@ -41,24 +41,26 @@ def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
     j, fired, tau = state.whole[NODE], state.whole[FIRED], state.real[AT]
     first, last = plant.node_con[j], plant.node_con[j + 1]
     _stop_at(plant, state, j, tau)
-    count = 0
     for c in range(first, last):
         room.before[c], room.at_limit[c] = state.mode[c], 0
         state.decree[c, 0], state.decree[c, 1], state.stamp[c] = 0, 0, tau
-        is_zero = state.mode[c] == STICK or _is_zero(plant, state, room, c, tau)
-        if c == fired and state.guard[c] == VELOCITY:
-            is_zero = True
-        if is_zero:
+        state.held[c] = 0
+        if c == fired:
+            if state.guard[c] != VELOCITY:
+                room.at_limit[c] = 1 if state.guard[c] == UPPER else -1
+            state.mode[c] = STICK
+    _set_velocities(plant, state, room, j, tau)
+    count = 0
+    for c in range(first, last):  # what has come to rest with the others is known only now
+        if state.mode[c] == STICK or _is_zero(plant, state, c, tau):
             room.zero[count] = c
             count += 1
-            state.mode[c], state.held[c] = STICK, 0
-        if c == fired and state.guard[c] != VELOCITY:
-            room.at_limit[c] = 1 if state.guard[c] == UPPER else -1
-            state.mode[c] = room.at_limit[c]
+            state.mode[c] = STICK
     if count == 0:
-        factorise(plant, state, room, j)
         return DECIDED
-    _project_all(plant, state, room, j, tau)
+    _set_velocities(plant, state, room, j, tau)
+    if fired >= 0:
+        state.mode[fired] = room.at_limit[fired]
     for round in range(_BLOCK + 4 * count * count + 8):
         factorise(plant, state, room, j)
         _hold_at_limits(plant, state, room, j, count)
@@ -68,11 +70,6 @@ def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
         _bounds(plant, state, room, j, nd, tau)
         violations = _judge(plant, state, room, count)
         if violations == 0:
-            for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-                state.x[1, x] = state.series[x, 1]
-            project(plant, state, room, j, tau, state.x[1])
-            for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-                state.series[x, 1] = state.x[1, x]
             return DECIDED
         _change(state, room, count, round < _BLOCK)
     return INCONSISTENT
@@ -91,7 +88,7 @@ def _stop_at(plant: Any, state: Any, j: int, tau: float) -> None:
 
 
 @kernel
-def _is_zero(plant: Any, state: Any, room: Any, c: int, tau: float) -> bool:
+def _is_zero(plant: Any, state: Any, c: int, tau: float) -> bool:
     """Whether the relative velocity of a contact is zero as far as rounding tells."""
     base = base_speed(plant, state, c, tau)
     total, size = -base, abs(base)
@@ -103,22 +100,14 @@ def _is_zero(plant: Any, state: Any, room: Any, c: int, tau: float) -> bool:
 
 
 @kernel
-def _project_all(plant: Any, state: Any, room: Any, j: int, tau: float) -> None:
-    """Make the relative velocities of everything at zero exactly zero, whatever mode it will have."""
-    first, last = plant.node_con[j], plant.node_con[j + 1]
-    for c in range(first, last):
-        room.next[c] = state.mode[c]
-    for c in range(first, last):
-        if room.at_limit[c] != 0:
-            state.mode[c] = STICK
+def _set_velocities(plant: Any, state: Any, room: Any, j: int, tau: float) -> None:
+    """Make the velocities of a node meet the constraints of what is in stick."""
     factorise(plant, state, room, j)
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
         state.x[1, x] = state.series[x, 1]
     project(plant, state, room, j, tau, state.x[1])
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
         state.series[x, 1] = state.x[1, x]
-    for c in range(first, last):
-        state.mode[c] = room.next[c]
 
 
 @kernel

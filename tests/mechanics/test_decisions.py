@@ -13,15 +13,17 @@ MODES = {"stick": 0, "slip+": 1, "slip-": -1}
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("seed", [4, 9, 13])
+@pytest.mark.parametrize(
+    ("seed", "span"), [(4, 6.0), (9, 6.0), (17, 10.0)]
+)  # 17: two in one direction stop together
 def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_them(
     law: str, seed: int
 ) -> None:
     system = random_system(seed, law)
-    sol = hs.simulate(system, (0, 6), rtol=1e-11)
+    sol = hs.simulate(system, (0, span), rtol=1e-11)
     assert sol.success
     other, dofs = reordered(system, seed)
-    moved = hs.simulate(other, (0, 6), rtol=1e-11)
+    moved = hs.simulate(other, (0, span), rtol=1e-11)
     assert moved.x_end == pytest.approx(sol.x_end[np.r_[dofs, system.n + dofs]], abs=1e-11)
     trials = Enumeration(system)
     for t in {e.t for e in sol.events}:
