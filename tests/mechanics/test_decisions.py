@@ -17,7 +17,7 @@ MODES = {"stick": 0, "slip+": 1, "slip-": -1}
     ("seed", "span"), [(4, 6.0), (9, 6.0), (17, 10.0)]
 )  # 17: two in one direction stop together
 def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_them(
-    law: str, seed: int
+    law: str, seed: int, span: float
 ) -> None:
     system = random_system(seed, law)
     sol = hs.simulate(system, (0, span), rtol=1e-11)
