@@ -75,9 +75,10 @@ admissible. And each system runs again with its coordinates and contacts declare
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
 
-With one coefficient at rest the motion is unique; that several combinations are counted now and then is the judge's, who
-looks at two derivatives, at none for redundant sets, and takes 1e-9 for zero. With static friction above kinetic there
-may be several outcomes; the run begins with all that may stick and lets go of what cannot hold. Differences among orders are rounding, grown as the motion itself makes neighbouring states part.
+With one coefficient at rest the motion is unique; that several combinations are counted now and then is the
+judge's, who looks at two derivatives, at none for redundant sets, and takes 1e-9 for zero. With static friction above
+kinetic there may be several outcomes; the run begins with all that may stick and lets go of what cannot hold.
+Differences among orders are rounding, grown as the motion itself makes neighbouring states part.
 """,
         encoding="utf-8",
     )
