@@ -6,23 +6,33 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from hybridsim import arguments
 from hybridsim.errors import UsageError
+from hybridsim.mechanics.system import MechanicalSystem
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
     from hybridsim.engine.python_code import PythonCode
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
+    from hybridsim.mechanics.solution import MechanicalSolution
     from hybridsim.solution import Solution
 
 
+@overload
 def simulate(
-    model: Model | str | PathLike[str],
+    model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any
+) -> MechanicalSolution: ...
+@overload
+def simulate(
+    model: Model | str | PathLike[str], t_span: tuple[float, float], **arguments: Any
+) -> Solution: ...
+def simulate(
+    model: Model | MechanicalSystem | str | PathLike[str],
     t_span: tuple[float, float],
     *,
     params: Mapping[str, Any] | None = None,
@@ -37,12 +47,14 @@ def simulate(
     save: str | float = "all",
     progress: Callable[[float], None] | None = None,
     **options: Any,
-) -> Solution:
+) -> Solution | MechanicalSolution:
     """Run a model from t0 to t1 and return its trajectory, its events and its cost.
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`,
+    which runs by
+        Taylor series of its own.
     t_span : (t0, t1); t1 < t0 runs backward in time.
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.
@@ -77,6 +89,13 @@ def simulate(
     >>> sol.status
     'finished'
     """
+    if isinstance(model, MechanicalSystem):
+        from hybridsim.mechanics.simulate import simulate_mechanical
+
+        return simulate_mechanical(
+            model, t_span, x0=x0, integrator=integrator, rtol=rtol, atol=atol, max_step=max_step, t_eval=t_eval,
+            save=save, progress=progress, params=params, z0=z0, first_step=first_step, **options,
+        )  # fmt: skip
     model = arguments.chosen_model(model, params)
     x0_states, model = arguments.start_values(model, x0)
     span = arguments.time_span(t_span)

@@ -83,3 +83,15 @@ def test_the_page_on_own_laws_runs_and_keeps_them_short(tmp_path: Path) -> None:
     sol = runpy.run_path(str(script))["sol"]
     assert (tmp_path / "fading.png").stat().st_size > 10_000
     assert sol(12.0) == pytest.approx(solutions[1](12.0), rel=1e-9)
+
+
+def test_the_page_on_many_contacts_runs_and_is_short(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (code,) = blocks(ROOT / "docs" / "how-to" / "many-contacts.md", "python")
+    assert len(code.splitlines()) < 30
+    script = tmp_path / "shown.py"
+    script.write_text(code, encoding="utf-8")
+    sol = runpy.run_path(str(script))["sol"]
+    assert capsys.readouterr().out == "finished slip+\n"
+    assert len(sol.modes) == 3

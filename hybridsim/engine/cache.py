@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_KERNEL_FLOORS = ("engine", "integrators")  # the floors that define kernels
+_KERNEL_FLOORS = ("engine", "integrators", "mechanics")  # the floors that define kernels
 
 
 def cache_root() -> Path:

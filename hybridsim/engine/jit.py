@@ -23,6 +23,7 @@ ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 
 
 _NOTICED = 1.0  # seconds of compiling that a person wonders about
+_reached: list[Any] = []  # by address, and kept alive
 
 
 def _fill_nan(out: Any) -> None:
@@ -128,6 +129,33 @@ if ENABLED:
         kept = path.with_name(f"{path.stem}.{name}.{machine_name()}.o")
         return compile_text(path.read_text(encoding="utf-8"), name, kept)
 
+    def kernel_address(function: Callable[..., int], *packs: Any) -> int:
+        """Compile a kernel of packs that returns a whole number; its address, for `call_kernel`.
+
+        A kernel that calls others is compiled together with them, again for each caller; large ones that are reached
+        by their address are compiled once.
+        """
+        made = _with_cache_folder(
+            str(kernel_folder()),
+            lambda: numba.cfunc(
+                types.int64(*(pack.numba_type for pack in packs)), cache=True, error_model="numpy", _nrt=False
+            )(function),
+        )
+        _reached.append(made)
+        return int(made.address)
+
+    @intrinsic
+    def call_kernel(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+        """Call the kernel of four packs at an address."""
+        signature = types.int64(types.int64, a, b, c, d)
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            word = ir.IntType(64)
+            kind = ir.FunctionType(word, [word] * 4)
+            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), list(args[1:]))
+
+        return signature, generate
+
     @intrinsic
     def call(typingctx: Any, function: Any, t: Any, x: Any, p: Any, z: Any, out: Any) -> Any:
         """Call the model function at an address with contiguous arrays; return its status."""
@@ -158,6 +186,16 @@ else:
     def seconds_compiling() -> float:
         """None: nothing is compiled."""
         return 0.0
+
+    def kernel_address(function: Callable[..., int], *packs: Any) -> int:
+        """A number by which `call_kernel` finds the function."""
+        if function not in _reached:
+            _reached.append(function)
+        return _reached.index(function)
+
+    def call_kernel(address: int, *packs: Any) -> int:
+        """Call a function of packs."""
+        return int(_reached[address](*packs))
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""

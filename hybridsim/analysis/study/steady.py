@@ -130,7 +130,7 @@ def solve_by_steps(
         integrator=variant.integrator,
         save=last * point.period,
         steps_per_period=float(steps),
-        **options,  # type: ignore[arg-type]
+        **options,
     )
 
 

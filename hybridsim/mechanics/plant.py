@@ -1,0 +1,306 @@
+"""A mechanical system as arrays for the kernels: accelerations, Delassus matrices of clusters, laws as tapes.
+
+Coordinates that are coupled in the mass matrix, or by a common contact, form a *node*; coordinates and contacts are
+renumbered so that those of a node are neighbours. Accelerations jump within a node only, so that an event is
+decided there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from hybridsim.engine.scalar_tape import ScalarTape, is_same, scalar_tape
+from hybridsim.errors import ModelError, UsageError
+from hybridsim.expr.evaluate import evaluate
+from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
+
+MOST_COUPLED = 3000  # coordinates coupled in the mass matrix whose inverse is made: 72 MB
+
+
+class Plant(NamedTuple):
+    """What does not change in a run; sparse matrices are (ptr, col, val), rows in the plant's own order.
+
+    node_dof, node_con: first coordinate and contact of each node. k, c: M^-1 K and M^-1 C; b: M^-1 W^T (rows:
+    coordinates, columns: contacts); w: W (rows: contacts); g: W M^-1 W^T of each node, dense, one after
+    another. near: neighbours. still: constant acceleration. h: harmonics of each coordinate: number of the
+    rate, amplitudes of sine and cosine. base: (m, 3) constant, sine, cosine of the base's speed; base_rate: -1
+    where it is constant. limits (m, 2), smooth (m, 2): most force in stick, forward and backward, and whether
+    that at the onset of slip agrees with it by algebra. tape (m, 2): number of the tape of slip. par (m, p):
+    its constants. unit: contacts with one weight only.
+    """
+
+    node_dof: np.ndarray
+    node_con: np.ndarray
+    dof_node: np.ndarray
+    con_node: np.ndarray
+    k_ptr: np.ndarray
+    k_col: np.ndarray
+    k_val: np.ndarray
+    c_ptr: np.ndarray
+    c_col: np.ndarray
+    c_val: np.ndarray
+    b_ptr: np.ndarray
+    b_col: np.ndarray
+    b_val: np.ndarray
+    w_ptr: np.ndarray
+    w_col: np.ndarray
+    w_val: np.ndarray
+    g_ptr: np.ndarray
+    g_val: np.ndarray
+    near_ptr: np.ndarray
+    near: np.ndarray
+    still: np.ndarray
+    h_ptr: np.ndarray
+    h_rate: np.ndarray
+    h_val: np.ndarray
+    rates: np.ndarray
+    base: np.ndarray
+    base_rate: np.ndarray
+    limits: np.ndarray
+    smooth: np.ndarray
+    tape: np.ndarray
+    par: np.ndarray
+    unit: np.ndarray
+
+
+class Laws(NamedTuple):
+    """The tapes of all laws: rows of each one after another, registers of what goes in and comes out."""
+
+    rows: np.ndarray
+    row_ptr: np.ndarray
+    constant_rows: np.ndarray
+    constant_ptr: np.ndarray
+    registers: np.ndarray
+    speed: np.ndarray
+    out: np.ndarray
+    par_reg: np.ndarray
+    par_ptr: np.ndarray
+    number_reg: np.ndarray
+    number_val: np.ndarray
+    number_ptr: np.ndarray
+
+
+@dataclass(frozen=True)
+class Built:
+    """The arrays, and where the system's coordinates and contacts are in them (new number -> old)."""
+
+    plant: Plant
+    laws: Laws
+    dofs: np.ndarray
+    contacts: np.ndarray
+    is_linear: bool
+
+
+def build(system: MechanicalSystem) -> Built:
+    """Arrange a system for the kernels.
+
+    Errors
+    ------
+    UsageError where the mass matrix is not symmetric and positive definite, or couples too many coordinates.
+    """
+    n, m = system.n, len(system.contacts)
+    rows = np.repeat(np.arange(m), [len(c.direction) for c in system.contacts]).astype(np.int64)
+    pairs = [pair for c in system.contacts for pair in c.direction]
+    cols = np.array([i for i, _ in pairs], dtype=np.int64)
+    W = sparse.csr_array((np.array([w for _, w in pairs]), (rows, cols)), shape=(m, n))
+    inverse = _inverse(system)
+    together = abs(W).T @ abs(W) + abs(inverse)
+    count, label = connected_components(together, directed=False)
+    first = np.full(count, n)
+    np.minimum.at(first, label, np.arange(n))
+    rank = np.argsort(np.argsort(first))  # nodes in the order of their first coordinate
+    dofs = np.lexsort((np.arange(n), rank[label]))
+    node_of = rank[label][dofs]
+    owner = rank[label][W.indices[W.indptr[:-1]]] if m else np.zeros(0, dtype=np.int64)
+    contacts = np.lexsort((np.arange(m), owner))
+    W, inverse = W[contacts][:, dofs], inverse[dofs][:, dofs]
+    K, C = inverse @ system.K[dofs][:, dofs], inverse @ system.C[dofs][:, dofs]
+    B = sparse.csr_array(inverse @ W.T)
+    G = sparse.csr_array(W @ B)
+    con_node = owner[contacts].astype(np.int64)
+    node_dof = np.searchsorted(node_of, np.arange(count + 1))
+    node_con = np.searchsorted(con_node, np.arange(count + 1))
+    sizes = np.diff(node_con)
+    blocks = [G[a:b, a:b].toarray().ravel() for a, b in pairwise(node_con)]
+    rates = sorted({t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
+                   | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})  # fmt: skip
+    still, harmonics = _forcing(system, inverse, dofs, rates)
+    ordered = [system.contacts[i] for i in contacts]
+    laws, tape, par, is_linear = _laws(ordered)
+    base, base_rate = _bases(ordered, rates)
+    limits, smooth = _limits(ordered)
+    plant = Plant(
+        _ints(node_dof), _ints(node_con), _ints(node_of), _ints(con_node),
+        *_parts(K), *_parts(C), *_parts(B), *_parts(W),
+        _ints(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
+        *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates),
+        base, base_rate, limits, smooth, tape, par, _ints(np.diff(W.indptr) == 1),
+    )  # fmt: skip
+    return Built(plant, laws, dofs, contacts, is_linear)
+
+
+def _inverse(system: MechanicalSystem) -> Any:
+    """M^-1, block by block: sparse where M falls into small blocks."""
+    M = system.M
+    if abs(M - M.T).max() > 1e-12 * abs(M).max():
+        raise UsageError(f"{system.name}: M is not symmetric", remedy="give a symmetric mass matrix")
+    count, label = connected_components(M, directed=False)
+    largest = np.bincount(label).max()
+    if largest > MOST_COUPLED:
+        raise UsageError(
+            f"{system.name}: the mass matrix couples {largest} coordinates, {MOST_COUPLED} are allowed",
+            remedy="lump the masses, so that M is diagonal or falls into blocks",
+        )
+    if count == system.n:
+        diagonal = M.diagonal()
+        _require_positive(system, bool((diagonal > 0).all()))
+        return sparse.csr_array(sparse.diags_array(1.0 / diagonal))
+    order = np.argsort(label, kind="stable")
+    ends = np.concatenate([[0], np.cumsum(np.bincount(label))])
+    parts = []
+    for a, b in pairwise(ends):
+        block = M[order[a:b]][:, order[a:b]].toarray()
+        _require_positive(system, bool(np.linalg.eigvalsh(block)[0] > 0.0))
+        parts.append(np.linalg.inv(block))
+    back = np.argsort(order)
+    return sparse.csr_array(sparse.block_diag(parts, format="csr"))[back][:, back]
+
+
+def _require_positive(system: MechanicalSystem, is_positive: bool) -> None:
+    if not is_positive:
+        raise UsageError(
+            f"{system.name}: M is not positive definite", remedy="give every coordinate a mass above zero"
+        )
+
+
+def _ints(values: Any) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=np.int64)
+
+
+def _parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    matrix = sparse.csr_array(matrix)
+    matrix.eliminate_zeros()
+    matrix.sort_indices()
+    return _ints(matrix.indptr), _ints(matrix.indices), np.ascontiguousarray(matrix.data, dtype=float)
+
+
+def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes that act on each other through stiffness or damping."""
+    entries = sparse.coo_array(coupling)
+    kept = entries.data != 0
+    a, b = node_of[entries.row[kept]], node_of[entries.col[kept]]
+    apart = a != b
+    graph = sparse.csr_array((np.ones(2 * apart.sum()), (np.r_[a[apart], b[apart]], np.r_[b[apart], a[apart]])),
+                             shape=(count, count))  # fmt: skip
+    graph.sum_duplicates()
+    return _ints(graph.indptr), _ints(graph.indices)
+
+
+def _forcing(
+    system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]
+) -> tuple[Any, tuple[Any, Any, Any]]:
+    """Constant acceleration (n,), and (ptr, rate, [sine, cosine]) of each coordinate."""
+    n, place = system.n, np.argsort(dofs)
+    still = np.zeros(n)
+    entries: dict[tuple[int, int], np.ndarray] = {}
+    for dof, terms in system.forcing.items():
+        for term in terms:
+            if isinstance(term, Harmonic):
+                entry = entries.setdefault((int(place[dof]), rates.index(term.omega)), np.zeros(2))
+                entry += (term.sin, term.cos)
+            else:
+                still[place[dof]] += term
+    shape = (n, len(rates))
+    both = []
+    for part in range(2):
+        keys = list(entries)
+        matrix = sparse.csr_array(
+            (np.array([entries[k][part] for k in keys]), ([k[0] for k in keys], [k[1] for k in keys])), shape=shape
+        ) if keys else sparse.csr_array(shape)  # fmt: skip
+        both.append((inverse @ matrix).toarray() if keys else np.zeros(shape))
+    used = (both[0] != 0) | (both[1] != 0)
+    ptr = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    val = np.stack([both[0][used], both[1][used]], axis=1)
+    return inverse @ still, (_ints(ptr), _ints(np.nonzero(used)[1]), np.ascontiguousarray(val))
+
+
+def _bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
+    for i, contact in enumerate(contacts):
+        if isinstance(contact.base, Harmonic):
+            base[i, 1:], rate[i] = (contact.base.sin, contact.base.cos), rates.index(contact.base.omega)
+        else:
+            base[i, 0] = contact.base
+    return base, rate
+
+
+def _limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
+    """Most force in stick, forward and backward, and whether the force at the onset of slip is the same."""
+    limits = np.zeros((len(contacts), 2))
+    smooth = np.zeros((len(contacts), 2), dtype=np.int64)
+    for i, contact in enumerate(contacts):
+        law, given = contact.law, {"N": contact.normal, **contact.values()}
+        for side, (slip, stick) in enumerate(_sides(law)):
+            limits[i, side] = evaluate(stick, given)
+            onset = evaluate(slip, {**given, "v": 0.0})
+            smooth[i, side] = onset == limits[i, side] or is_same(slip, stick, "v")
+            if limits[i, side] < 0.0 or onset < 0.0:
+                raise ModelError(
+                    f"contact {contact.name}: the law '{law.name}' gives a negative force at rest",
+                    remedy="give magnitudes: slip and stick are >= 0",
+                )
+    return limits, smooth
+
+
+def _sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """(slip, stick), forward and backward."""
+    return (law.slip, law.stick), (law.slip_backward or law.slip, law.stick_backward or law.stick)
+
+
+def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
+    """Tapes, their number for each contact and side, and the constants of each contact."""
+    tapes: list[ScalarTape] = []
+    known: dict[tuple[str, str], int] = {}
+    number = np.zeros((len(contacts), 2), dtype=np.int64)
+    width = max([len(c.law.parameters) for c in contacts], default=0) + 1
+    par = np.zeros((len(contacts), width))
+    for i, contact in enumerate(contacts):
+        names = tuple(contact.law.parameters)
+        values = contact.values()
+        par[i, : len(names) + 1] = [contact.normal, *(values[name] for name in names)]
+        for side, (slip, _) in enumerate(_sides(contact.law)):
+            key = (contact.law.name + "/".join(names), slip.text)
+            if key not in known:
+                known[key] = len(tapes)
+                try:
+                    tapes.append(scalar_tape(slip, ("v",), ("N", *names), "v"))
+                except ModelError as fault:
+                    raise ModelError(
+                        f"law '{contact.law.name}': {fault.message}", remedy=fault.remedy
+                    ) from None
+            number[i, side] = known[key]
+    laws = Laws(
+        *_rows([t.rows for t in tapes]), *_rows([t.constant_rows for t in tapes]),
+        _ints([t.registers for t in tapes]), _ints([t.moving[0] for t in tapes]), _ints([t.out for t in tapes]),
+        *_flat([t.constants for t in tapes]),
+        _ints([r for t in tapes for r, _ in t.numbers]), np.array([x for t in tapes for _, x in t.numbers],
+        dtype=float), _ints(np.concatenate([[0], np.cumsum([len(t.numbers) for t in tapes])])),
+    )  # fmt: skip
+    return laws, number, par, not any(len(t.rows) for t in tapes)
+
+
+def _rows(parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    stacked = np.concatenate([np.zeros((0, 5), dtype=np.int64), *parts])
+    return _ints(stacked), _ints(np.concatenate([[0], np.cumsum([len(p) for p in parts])]))
+
+
+def _flat(parts: list[tuple[int, ...]]) -> tuple[np.ndarray, np.ndarray]:
+    return _ints([r for p in parts for r in p]), _ints(
+        np.concatenate([[0], np.cumsum([len(p) for p in parts])])
+    )

@@ -1,0 +1,198 @@
+"""Runs a mechanical system: arrays out, kernels called until the end, pieces and events collected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from hybridsim.engine.jit import call_kernel, kernel, kernel_address
+from hybridsim.engine.packs import packed
+from hybridsim.engine.series import series_order
+from hybridsim.engine.timepair import phase_of
+from hybridsim.mechanics.arrays import (
+    AT,
+    CASCADE,
+    DECIDE,
+    DONE,
+    FIRED,
+    FULL,
+    INCONSISTENT,
+    LOST,
+    NODE,
+    NONUNIQUE,
+    OPEN_END,
+    Record,
+    Room,
+    State,
+)  # fmt: skip
+from hybridsim.mechanics.decision import decide
+from hybridsim.mechanics.expansion import expand
+from hybridsim.mechanics.loop import FRESH, LAST, RADIUS, WHERE, run
+from hybridsim.mechanics.plant import Built
+from hybridsim.mechanics.steps import stretch
+
+STATUS = {
+    DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
+}  # fmt: skip
+_ROOM = 1 << 20  # doubles for the series of one call
+_EVENTS = 4096  # events that one call has room for, beside those of one node
+_TIGHTEST = 1e-15
+_RADIUS = 2  # of the first patch; it adapts
+
+
+class MechanicalRun:
+    """One run; `go` carries it out."""
+
+    def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
+                 max_step: float, keep: bool) -> None:  # fmt: skip
+        self.built, self.span = built, span
+        self.rtol, self.keep = max(rtol, _TIGHTEST), keep
+        # coupled coordinates make the linear part of a series the dearer one, as where there is no convolution at all
+        self.order = series_order(self.rtol, linear=True)
+        self.max_step = max_step
+        self.state = new_state(built, self.order)
+        self.room = new_room(built, self.order)
+        self.state.x[:] = x.reshape(2, -1)[:, built.dofs]
+        self.state.tolerance[:] = np.maximum(atol.reshape(2, -1)[:, built.dofs], 1e-300)
+        self.state.clock[0] = span[0]
+        self.pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.events: list[np.ndarray] = []
+        self.when: list[np.ndarray] = []
+        self.first_modes = np.zeros(0, dtype=np.int64)
+        self.code, self.kernel_time = DONE, 0.0
+
+    def go(self, progress: Callable[[float], None] | None) -> None:
+        """Run to the end of the span, or to where nothing can follow."""
+        plant, laws = packed(self.built.plant), packed(self.built.laws)
+        state, room = packed(self.state), packed(self.room)
+        began = perf_counter()
+        reach_kernels(self.state, plant, laws, state, room)
+        self.code = self._settle_start(plant, laws, state, room)
+        self.first_modes = self.state.mode.copy()
+        self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
+        control = (self.rtol, self.max_step, self.order, self.keep)
+        target = np.array([self.span[1], 0.0])
+        while self.code in (DONE, FULL):
+            record = self._record()
+            self.code = run(plant, laws, state, room, packed(record), control, target)
+            self._collect(record)
+            if self.code != FULL:
+                break
+            if progress is not None:
+                progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
+        self.kernel_time = perf_counter() - began
+
+    def _settle_start(self, *packs: Any) -> int:
+        """Modes at the start: by the sign of what moves, decided where it does not."""
+        plant, state = self.built.plant, self.state
+        state.series[:, :2] = state.x.T
+        for r, rate in enumerate(plant.rates):
+            state.phase[r] = phase_of(state.clock[0], 0.0, rate, 0.0)
+        weights = csr_array(
+            (plant.w_val, plant.w_col, plant.w_ptr), shape=(len(plant.con_node), len(plant.dof_node))
+        )
+        turns = state.phase[plant.base_rate] if len(plant.rates) else 0.0
+        base = plant.base[:, 0] + plant.base[:, 1] * np.sin(turns) + plant.base[:, 2] * np.cos(turns)
+        state.mode[:] = np.sign(weights @ state.x[1] - base)
+        for j in range(len(plant.node_dof) - 1):
+            state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
+            if code := call_from_python(state.kernels[DECIDE], *packs):
+                state.flags[WHERE] = j
+                return code
+        state.x[:] = state.series[:, :2].T
+        return DONE
+
+    @property
+    def time(self) -> float:
+        """Where the run is."""
+        clock = self.state.clock
+        return float(clock[0] + clock[1] + (0.0 if self.state.flags[FRESH] else clock[3]))
+
+    @property
+    def node_contacts(self) -> list[int]:
+        """The contacts (old numbers) of the node where the run stopped."""
+        j, plant = int(self.state.flags[WHERE]), self.built.plant
+        return [int(self.built.contacts[c]) for c in range(plant.node_con[j], plant.node_con[j + 1])]
+
+    def _record(self) -> Record:
+        plant, columns = self.built.plant, self.order + 1
+        nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
+        rows = max(_ROOM // columns, 2 * n) if self.keep else 0
+        pieces = max(rows * nodes // n, 2 * nodes) if self.keep else 0
+        return Record(
+            np.empty((pieces, 2), dtype=np.int64),
+            np.empty((pieces, 3)),
+            np.empty((rows, columns)),
+            np.empty((_EVENTS + 2 * m, 4), dtype=np.int64),
+            np.empty((_EVENTS + 2 * m, 3)),
+            np.zeros(3, dtype=np.int64),
+        )
+
+    def _collect(self, record: Record) -> None:
+        pieces, rows, events = record.used
+        if pieces:
+            self.pieces.append(
+                (record.piece[:pieces].copy(), record.start[:pieces].copy(), record.series[:rows].copy())
+            )
+        self.events.append(record.event[:events].copy())
+        self.when.append(record.when[:events].copy())
+
+
+@kernel
+def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """Call a kernel of packs."""
+    return call_kernel(address, plant, laws, state, room)
+
+
+_addresses: list[int] = []
+
+
+def reach_kernels(arrays: State, *packs: Any) -> None:
+    """Compile the large kernels if need be, and put their addresses where the others find them."""
+    if not _addresses:
+        _addresses.extend(kernel_address(function, *packs) for function in (expand, stretch, decide))
+    arrays.kernels[:] = _addresses
+
+
+def new_state(built: Built, order: int) -> State:
+    """A state of zeros."""
+    plant = built.plant
+    nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
+    leaves = 1 << max(m, 1).bit_length()
+    ints: dict[str, Any] = {"dtype": np.int64}
+    return State(
+        x=np.zeros((2, n)), series=np.zeros((n, order + 1)), origin=np.zeros(nodes), mode=np.zeros(m, **ints),
+        held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
+        until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(plant.g_val), 1)),
+        holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
+        tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
+        flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
+        kernels=np.zeros(3, **ints), whole=np.zeros(6, **ints), real=np.zeros(4),
+    )  # fmt: skip
+
+
+def new_room(built: Built, order: int) -> Room:
+    """Scratch arrays."""
+    plant, laws = built.plant, built.laws
+    nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
+    widest = max(int(np.diff(plant.node_con).max(initial=0)), 2)
+    columns, tapes = order + 1, len(laws.registers)
+    registers = int(laws.registers.max(initial=0))
+    ints: dict[str, Any] = {"dtype": np.int64}
+    return Room(
+        nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
+        lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints), Q=np.zeros((columns, n)),
+        R=np.zeros((columns, m)), F=np.zeros((columns, m)), acc=np.zeros(n),
+        trig=np.zeros((len(plant.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
+        place=np.zeros(tapes + 1, **ints), V=np.zeros(registers * m * (columns + 1)), poly=np.zeros(columns),
+        bern=np.zeros(columns), stack=np.zeros((64, columns + 2)), before=np.zeros(m, **ints),
+        zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
+        err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
+        tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
+        line=np.zeros(columns),
+    )  # fmt: skip

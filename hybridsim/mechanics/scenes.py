@@ -1,0 +1,126 @@
+"""Known systems of several blocks with friction, with the number of blocks and their values as arguments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridsim.expr import parse
+from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
+from hybridsim.model.library import load_law
+
+
+def chain_on_belt(
+    n: int,
+    *,
+    coupling: float = 1.0,
+    leaf: float = 1.0,
+    delta: float = 3.0,
+    belt: float = 0.2,
+    spread: float = 0.5,
+    seed: int = 0,
+) -> MechanicalSystem:
+    """A chain of n blocks on a moving belt, each held by a leaf spring: the model of Burridge and Knopoff.
+
+        x_i'' + leaf x_i + coupling (2 x_i - x_{i-1} - x_{i+1}) = - f_i,   |f_i| = 1/(1 + delta |x_i' - belt|)
+
+    Parameters
+    ----------
+    n : number of blocks, of mass 1; the ends are free.
+    coupling, leaf : stiffness between neighbours, and of each block to the frame.
+    delta, belt : how fast friction falls with speed, and the belt's speed.
+    spread, seed : the blocks start at rest, at random within +-spread.
+
+    Look at
+    -------
+    Events that run along the chain; with one block it is the model ``belt``.
+
+    Source
+    ------
+    R. Burridge, L. Knopoff, Bull. Seismol. Soc. Am. 57 (1967) 341; velocity weakening as J. M. Carlson, J. S. Langer,
+    Phys. Rev. A 40 (1989) 6470, doi:10.1103/PhysRevA.40.6470.
+    """
+    from scipy import sparse
+
+    diagonal = np.full(n, leaf + 2.0 * coupling)
+    diagonal[0] -= coupling
+    diagonal[-1] -= coupling
+    beside = np.full(n - 1, -coupling)
+    law: Any = {"mu": 1.0, "delta": delta}
+    contacts = [
+        MechanicalContact(f"f{i + 1}", {i: 1.0}, 1.0, load_law("hyperbolic"), law, belt) for i in range(n)
+    ]
+    return MechanicalSystem(
+        np.ones(n),
+        None,
+        sparse.diags_array([diagonal, beside, beside], offsets=[0, 1, -1]),
+        None,
+        contacts,
+        q0=np.random.default_rng(seed).uniform(-spread, spread, n),
+        name=f"chain-{n}",
+        title="Chain of blocks on a belt",
+        source="R. Burridge, L. Knopoff, Bull. Seismol. Soc. Am. 57 (1967) 341",
+    )
+
+
+def two_blocks_on_belt(
+    *, coupling: float = 1.2, second: float = 1.3, delta: float = 3.0, belt: float = 0.3
+) -> MechanicalSystem:
+    """Two blocks on a moving belt, joined by a spring; the second has the larger friction.
+
+    Parameters
+    ----------
+    coupling : stiffness between the blocks; each has a spring of stiffness 1 to the frame, and mass 1.
+    second : load of the second block, that of the first is 1.
+
+    Look at
+    -------
+    Both stick together, the first is pulled off, and what it does then decides when the second follows.
+
+    Source
+    ------
+    After U. Galvanetto, S. R. Bishop, L. Briseghella, Int. J. Bifurcation and Chaos 5 (1995) 637.
+    """
+    law: Any = {"mu": 1.0, "delta": delta}
+    loads = (1.0, second)
+    contacts = [
+        MechanicalContact(f"f{i + 1}", {i: 1.0}, loads[i], load_law("hyperbolic"), law, belt)
+        for i in range(2)
+    ]
+    stiffness = [[1.0 + coupling, -coupling], [-coupling, 1.0 + coupling]]
+    return MechanicalSystem(
+        np.ones(2), None, stiffness, None, contacts, name="two-blocks",
+        title="Two blocks on a belt, joined by a spring",
+        source="after U. Galvanetto, S. R. Bishop, L. Briseghella, Int. J. Bifurcation and Chaos 5 (1995) 637",
+    )  # fmt: skip
+
+
+def three_coupled_blocks(
+    *, mu: tuple[float, float, float] = (0.15, 0.3, 0.2), amplitude: float = 12.0, omega: float = 1.5
+) -> MechanicalSystem:
+    """Three blocks on top of each other, the lowest on the ground, the middle one shaken: contacts share coordinates.
+
+    Parameters
+    ----------
+    mu : of the contacts from below; the blocks have mass 1 each and g = 10, so that the loads are 30, 20 and 10.
+    amplitude, omega : of the force on the middle block.
+
+    Look at
+    -------
+    Which of the three contacts slip is one question, since each force acts on two blocks; where two of them stick the
+    blocks have one velocity.
+
+    Source
+    ------
+    In the manner of the problems of D. E. Stewart, Numer. Math. 58 (1990) 299, doi:10.1007/BF01385627.
+    """
+    directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
+    contacts = [
+        MechanicalContact(f"f{i + 1}", directions[i], load, load_law("coulomb"), {"mu": parse(mu[i])})
+        for i, load in enumerate((30.0, 20.0, 10.0))
+    ]
+    return MechanicalSystem(
+        np.ones(3), None, None, [0, Harmonic(omega, sin=amplitude), 0], contacts, name="three-blocks",
+        title="Three blocks on top of each other", source="after D. E. Stewart, Numer. Math. 58 (1990) 299",
+    )  # fmt: skip

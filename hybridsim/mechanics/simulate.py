@@ -1,0 +1,110 @@
+"""`hs.simulate` for mechanical systems: arguments checked, arrays built, the kernels run."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.errors import UsageError, nearest
+
+if TYPE_CHECKING:
+    from hybridsim.mechanics.solution import MechanicalSolution
+    from hybridsim.mechanics.system import MechanicalSystem
+
+
+def simulate_mechanical(
+    system: MechanicalSystem,
+    t_span: tuple[float, float],
+    *,
+    x0: Mapping[str, float] | Sequence[float] | None = None,
+    integrator: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    max_step: float = math.inf,
+    t_eval: Sequence[float] | None = None,
+    save: str | float = "all",
+    progress: Callable[[float], None] | None = None,
+    **refused: Any,
+) -> MechanicalSolution:
+    """Run a `MechanicalSystem`; see `hybridsim.simulate.simulate` for the arguments.
+
+    Errors
+    ------
+    UsageError for what a mechanical system does not take: other integrators, params, z0, a first step, time backward.
+    """
+    from hybridsim.engine.jit import announce_compilation
+    from hybridsim.engine.keep import ALL
+    from hybridsim.mechanics.plant import build
+    from hybridsim.mechanics.run import MechanicalRun
+    from hybridsim.mechanics.solution import MechanicalSolution
+
+    name = arguments.integrator_name(integrator)
+    if name not in ("auto", "taylor"):
+        raise UsageError(
+            f"{name} does not run a MechanicalSystem", remedy=f"choose taylor, or run to_model() with {name}"
+        )
+    for argument, value in refused.items():
+        if value:
+            raise UsageError(
+                f"{argument} is given for a MechanicalSystem", remedy="give other arrays, or run to_model()"
+            )
+    span = arguments.time_span(t_span)
+    if span[1] < span[0]:
+        raise UsageError(
+            f"t_span is {t_span!r}", remedy="a MechanicalSystem runs forward only; to_model() backward"
+        )
+    if save not in ("all", "events", "nothing"):
+        raise UsageError(f"save is {save!r}", remedy="a MechanicalSystem keeps 'all', 'events' or 'nothing'")
+    start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
+    absolute = _absolute(system, atol, relative, start)
+    longest = arguments.step_bound(max_step, "max_step")
+    grid = None if t_eval is None else arguments.time_grid(t_eval, span, ALL, save)
+    callback = arguments.callback(progress)
+    announce_compilation()
+    began = time.perf_counter()
+    run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all")
+    built_in = time.perf_counter() - began
+    run.go(callback)
+    wall_time = time.perf_counter() - began - built_in
+    return MechanicalSolution(system, run, grid, str(save), wall_time, built_in)
+
+
+def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
+    names = (*system.names, *system.velocities)
+    start = np.concatenate([system.q0, system.v0])
+    if x0 is None:
+        return start
+    if isinstance(x0, Mapping):
+        for name, value in x0.items():
+            if name not in names:
+                raise UsageError(
+                    f"x0 names {name!r}, which is no state of {system.name}",
+                    remedy=nearest(str(name), names, kind="states"),
+                )
+            start[names.index(name)] = arguments.number(value, f"x0 of {name}")
+    else:
+        start = arguments.numbers(x0, "x0", f"give {len(names)} numbers: positions, then velocities")
+    if start.shape != (len(names),) or not np.isfinite(start).all():
+        raise UsageError(
+            f"x0 is {x0!r}", remedy=f"give {len(names)} finite numbers: positions, then velocities"
+        )
+    return start
+
+
+def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
+    """atol (2n,): a number, one for each state, or rtol * 1e-3 * |x0| (1 where that is zero)."""
+    if atol is None:
+        return 1e-3 * rtol * np.where(start == 0.0, 1.0, abs(start))
+    remedy = f"give a number >= 0, or {len(start)} of them"
+    if arguments.is_row(atol):
+        values = arguments.numbers(atol, "atol", remedy)
+    else:
+        values = np.full(len(start), arguments.number(atol, "atol", remedy))
+    if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
+        raise UsageError(f"atol is {atol!r}", remedy=remedy)
+    return values

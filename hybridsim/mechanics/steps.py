@@ -1,0 +1,212 @@
+"""How far the series of a patch reach, and when its contacts first leave their modes; the tournament of these times."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
+from hybridsim.engine.jit import call_kernel, inlined, kernel
+from hybridsim.mechanics.arrays import (
+    AT,
+    CONS,
+    DOFS,
+    LENGTH,
+    LONGEST,
+    LOWER,
+    OPEN_END,
+    ORDER,
+    RTOL,
+    STICK,
+    STRETCH,
+    UPPER,
+    VELOCITY,
+)  # fmt: skip
+from hybridsim.mechanics.lanes import advance_lanes
+
+_UNIT = 2.0**-53
+_DEFECT = 100.0  # as in the taylor integrator: how far the law may be from its series, in tolerances
+_SHRINKS = 200  # halvings of a reach
+_SHORT = 2.0**-12  # of the step: as far as a touch is looked at for what follows it
+_TINY = 2.0**-40  # of the step: what is still open on so short a stretch is a touch
+
+
+@kernel
+def set_time(tree: Any, leaf: int, t: float) -> None:
+    """Put a time into the tournament; tree[1] is the earliest of all."""
+    i = tree.shape[0] // 2 + leaf
+    tree[i] = t
+    i >>= 1
+    while i >= 1:
+        earliest = min(tree[2 * i], tree[2 * i + 1])
+        if tree[i] == earliest:
+            return
+        tree[i] = earliest
+        i >>= 1
+
+
+@kernel
+def first_leaf(tree: Any) -> int:
+    """The leaf with the earliest time."""
+    i, half = 1, tree.shape[0] // 2
+    while i < half:
+        i = 2 * i if tree[2 * i] == tree[i] else 2 * i + 1
+    return i - half
+
+
+@kernel
+def reach(
+    plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
+) -> float:
+    """The time over which the last two terms of each series stay below its tolerance; NaN where one is no number."""
+    h = longest
+    for k in range(top - 1, top + 1):
+        largest_q, largest_v = 0.0, 0.0
+        for a in range(nd):
+            x, size = room.dofs[a], abs(room.Q[k, a])
+            if not size < math.inf:
+                return math.nan
+            at_q = size / (state.tolerance[0, x] + rtol * abs(room.Q[0, a]))
+            at_v = k * size / (state.tolerance[1, x] + rtol * abs(room.Q[1, a]))
+            largest_q, largest_v = max(largest_q, at_q), max(largest_v, at_v)
+        if largest_q * h**k > 1.0:
+            h = largest_q ** (-1.0 / k)
+        if largest_v * h ** (k - 1) > 1.0:
+            h = largest_v ** (-1.0 / (k - 1))
+    for k in range(top - 3, top - 1):
+        largest = 0.0
+        for i in range(nc):
+            c = room.cons[i]
+            if state.mode[c] == STICK:
+                scale = rtol * max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
+                if abs(room.F[k, i]) > largest * scale:
+                    largest = abs(room.F[k, i]) / scale
+        if largest * h**k > 1.0:
+            h = largest ** (-1.0 / k)
+    return h
+
+
+@kernel
+def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
+    """First time in (0, h] at which the polynomial in room.poly[:size] goes negative, in units of h.
+
+    Where it is zero all along it does not. On a short stretch a touch is passed if it is positive after it.
+    """
+    power, total, end = 1.0, 0.0, 0.0
+    for k in range(size):
+        room.poly[k] *= power
+        total += abs(room.poly[k])
+        end += room.poly[k]
+        power *= h
+    if total == 0.0:
+        return NEVER, 1.0
+    error = 2.0 * (abs(room.poly[size - 1]) + abs(room.poly[size - 2])) + 8.0 * _UNIT * total + slack
+    outcome, theta = first_exit(room.poly[:size], error, order, room.bern, room.stack)
+    if outcome == OPEN and is_short and end > error:
+        outcome = NEVER
+    return outcome, theta
+
+
+@kernel
+def isolate(
+    plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
+) -> tuple[int, float]:
+    """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
+    for i in range(nc):
+        c = room.cons[i]
+        room.exits[i], room.kinds[i] = OPEN_END, VELOCITY
+        fresh = state.stamp[c] == tau
+        if state.mode[c] != STICK:
+            sigma = float(state.mode[c])
+            for k in range(top):
+                room.poly[k] = sigma * room.R[k, i]
+            outcome, theta = _exit_of(room, top, h, state.decree[c, 0] if fresh else 0, 0.0, is_short)
+            if outcome == OPEN:
+                return OPEN, theta
+            if outcome == FOUND:
+                room.exits[i] = theta * h
+        elif state.held[c] == 0:
+            for side in range(2):
+                sigma = 1.0 if side == 0 else -1.0
+                limit = plant.limits[c, side]
+                size = abs(room.F[0, i])
+                for k in range(top - 1):
+                    room.poly[k] = -sigma * room.F[k, i]
+                room.poly[0] += limit
+                slack = 8.0 * _UNIT * max(limit, size)
+                outcome, theta = _exit_of(
+                    room, top - 1, h, state.decree[c, side] if fresh else 0, slack, is_short
+                )
+                if outcome == OPEN:
+                    return OPEN, theta
+                if outcome == FOUND and theta * h < room.exits[i]:
+                    room.exits[i], room.kinds[i] = theta * h, UPPER if side == 0 else LOWER
+    return FOUND, 1.0
+
+
+@kernel
+def _law_holds(plant: Any, laws: Any, state: Any, room: Any, h: float, top: int, rtol: float) -> bool:
+    """Whether the forces of what slips are what their laws say at the end of the patch's series, or at their exits."""
+    used = 0
+    for t in range(laws.registers.shape[0]):
+        first, n = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t]
+        if n == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
+            continue
+        orders, at = top + 1, room.place[t]
+        for r in range(laws.registers[t]):  # order 0 of the registers, one after another
+            for j in range(n):
+                room.V[room.place[-1] + used + r * n + j] = room.V[at + r * orders * n + j]
+        base = room.place[-1] + used
+        for j in range(n):
+            i = room.lane[first + j]
+            d, v = min(h, room.exits[i]), 0.0
+            for k in range(top - 1, -1, -1):
+                v = v * d + room.R[k, i]
+            room.V[base + laws.speed[t] * n + j] = max(state.mode[room.cons[i]] * v, 0.0)
+        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, base, 1, n, 0)
+        for j in range(n):
+            i = room.lane[first + j]
+            d, f, size, power = min(h, room.exits[i]), 0.0, 0.0, 1.0
+            for k in range(top - 1):
+                term = room.F[k, i] * power
+                f += term
+                size = max(size, abs(term))
+                power *= d
+            law = state.mode[room.cons[i]] * room.V[base + laws.out[t] * n + j]
+            if not abs(f - law) <= (_DEFECT * rtol + 64.0 * _UNIT) * size:
+                return False
+    return True
+
+
+def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """See `stretched`."""
+    nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
+    tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
+    h = reach(plant, state, room, nd, nc, top, rtol, longest)
+    scale = max(state.clock[2], longest)
+    for _ in range(_SHRINKS):
+        if not h > 0.0:
+            break
+        outcome, _ = isolate(plant, state, room, nc, tau, h, top, h <= _SHORT * scale)
+        if outcome == OPEN and h > _TINY * scale:
+            h *= 0.5
+            continue
+        if outcome == OPEN:  # a touch: what comes within rounding and is not certainly negative does not fire
+            state.counts[5] += 1
+        if _law_holds(plant, laws, state, room, h, top, rtol):
+            state.real[LENGTH] = h
+            return 0
+        h *= 0.5
+    state.real[LENGTH] = math.nan
+    return 0
+
+
+@inlined
+def stretched(plant: Any, laws: Any, state: Any, room: Any, longest: float, rtol: float) -> float:
+    """How far the series of the patch just expanded are used, with the exits of its contacts up to there.
+
+    NaN where there are none.
+    """
+    state.real[LONGEST], state.real[RTOL] = longest, rtol
+    call_kernel(state.kernels[STRETCH], plant, laws, state, room)
+    return state.real[LENGTH]

@@ -1,0 +1,261 @@
+"""The declaration of a mechanical system: matrices, harmonic forcing, contacts with direction and friction law."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError
+from hybridsim.expr import Expression
+from hybridsim.expr.evaluate import resolve
+from hybridsim.model.declared import Declared
+from hybridsim.model.frozen_map import FrozenMap
+from hybridsim.model.law import FrictionLaw
+from hybridsim.model.library import load_law
+
+if TYPE_CHECKING:
+    from hybridsim.model import Model
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """sin*sin(omega t) + cos*cos(omega t): a force, or the speed of a base; its phase loses no digits over any time.
+
+    Parameters
+    ----------
+    omega : angular frequency, rad per unit of t.
+    sin, cos : amplitudes of the two parts.
+    """
+
+    omega: float
+    sin: float = 0.0
+    cos: float = 0.0
+
+
+@dataclass(frozen=True)
+class MechanicalContact(Declared):
+    """A dry contact of a `MechanicalSystem`: its force f acts as - direction f and opposes the relative velocity.
+
+        v_rel = direction . q' - base
+
+    Parameters
+    ----------
+    name : of the friction force.
+    direction : the weights w (n,), or a mapping from numbers of coordinates to weights.
+    normal : normal load, >= 0.
+    law : a set-valued `FrictionLaw` (``slip`` and ``stick``) without tables, or the name of one of the package.
+    arguments : the law's parameters, numbers.
+    base : speed of what the system slides on: a number, or a `Harmonic`.
+
+    Examples
+    --------
+    >>> MechanicalContact("f", {0: 1.0}, normal=10, law="coulomb", arguments={"mu": 0.3}).values()["mu"]
+    0.3
+    """
+
+    name: str
+    direction: Any
+    normal: float
+    law: FrictionLaw
+    arguments: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    base: float | Harmonic = 0.0
+
+    def __post_init__(self) -> None:
+        self._texts("name")
+        self._maps("arguments")
+        law: object = self.law
+        if isinstance(law, str):
+            object.__setattr__(self, "law", load_law(law))
+        elif not isinstance(law, FrictionLaw):
+            raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
+        if not self.law.is_set_valued or self.law.tables:
+            what = "tables" if self.law.tables else "a force of its own instead of slip and stick"
+            raise self._fault(
+                f"the law '{self.law.name}' has {what}",
+                "a mechanical system takes laws of slip and stick; write others as hs.Contact of an hs.Model",
+            )
+        object.__setattr__(self, "normal", self._number("normal", self.normal))
+        if not self.normal >= 0.0:
+            raise self._fault(f"normal is {self.normal!r}", "give a load >= 0")
+        if not isinstance(self.base, Harmonic):
+            object.__setattr__(self, "base", self._number("base", self.base))
+        weights = self.direction.items() if isinstance(self.direction, Mapping) else enumerate(self.direction)
+        pairs = tuple((int(i), self._number("direction", w)) for i, w in weights if w != 0)
+        if not pairs:
+            raise self._fault("the direction is zero", "give at least one weight that is not zero")
+        object.__setattr__(self, "direction", pairs)
+
+    def _number(self, what: str, value: Any) -> float:
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = np.nan
+        if not np.isfinite(number):
+            raise self._fault(f"{what} is {value!r}", "give finite numbers")
+        return number
+
+    def values(self) -> dict[str, float]:
+        """The law's parameters in numbers, defaults included.
+
+        Errors
+        ------
+        ModelError for a parameter that the law does not have, or one without a value.
+        """
+        from hybridsim.model.contact import Contact
+
+        checked = Contact(self.name, "v", self.normal, self.law, self.arguments).values()  # type: ignore[arg-type]
+        known = {name: value for name, value in checked.items() if name != "N"}
+        return resolve(known)
+
+
+class MechanicalSystem:
+    """A linear structure with dry contacts, as data for compiled kernels.
+
+        M q'' + C q' + K q = forcing(t) - sum_i w_i f_i,      f_i = law_i(w_i . q' - base_i)
+
+    Which contacts stick after an event is decided for all contacts that act on each other at once, as one
+    complementarity problem of their accelerations (of the derivatives after them, where these do not tell).
+
+    Parameters
+    ----------
+    M, C, K : arrays (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K
+    may be None.
+    forcing : None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from coordinates.
+    contacts : `MechanicalContact` objects.
+    q0, v0 : initial positions and velocities (n,), zero if not given.
+    names : of the coordinates, q1, q2, ... if not given; their velocities are v1, v2, ... or ``v_`` and the name.
+    name, title, source : as of a `Model`.
+
+    When to use
+    -----------
+    From a few contacts to thousands. The ordinary `Model` knows more laws, states and inputs, and is decided by trying
+    all combinations of modes; `to_model` makes one of a small system.
+
+    Errors
+    ------
+    UsageError for shapes that do not fit, a mass matrix that is not positive definite, names that are not unique.
+
+    Examples
+    --------
+    >>> f = MechanicalContact("f", [1.0], normal=1, law="coulomb", arguments={"mu": 0.5}, base=0.2)
+    >>> MechanicalSystem(M=[1.0], C=None, K=[1.0], forcing=None, contacts=[f]).n
+    1
+    """
+
+    def __init__(
+        self,
+        M: Any,
+        C: Any,
+        K: Any,
+        forcing: Any = None,
+        contacts: Iterable[MechanicalContact] = (),
+        *,
+        q0: Any = None,
+        v0: Any = None,
+        names: Sequence[str] | None = None,
+        name: str = "mechanical",
+        title: str = "",
+        source: str = "",
+    ) -> None:
+        self.name, self.title, self.source = name, title, source
+        self.M = _matrix(M, "M", None)
+        self.n = self.M.shape[0]
+        self.C, self.K = _matrix(C, "C", self.n), _matrix(K, "K", self.n)
+        self.contacts = tuple(contacts)
+        self.forcing = self._forces(forcing)
+        self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
+        self.names = tuple(names) if names is not None else tuple(f"q{i + 1}" for i in range(self.n))
+        self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
+        self._check()
+
+    def _forces(self, forcing: Any) -> dict[int, tuple[float | Harmonic, ...]]:
+        if forcing is None:
+            return {}
+        pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
+        found: dict[int, tuple[float | Harmonic, ...]] = {}
+        for i, given in pairs.items():
+            if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
+                raise UsageError(
+                    f"{self.name}: forcing names the coordinate {i!r} of {self.n}", remedy="count from 0"
+                )
+            terms = given if isinstance(given, tuple | list) else (given,)
+            for term in terms:
+                if not isinstance(term, Harmonic) and not isinstance(term, int | float | np.number):
+                    raise UsageError(
+                        f"{self.name}: forcing of coordinate {i} holds {term!r}",
+                        remedy="give numbers and hs.Harmonic(omega, ...); write others in an hs.Model",
+                    )
+            kept = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
+            if kept:
+                found[int(i)] = kept
+        return found
+
+    def _start(self, given: Any, what: str) -> np.ndarray:
+        values = np.zeros(self.n) if given is None else np.array(given, dtype=float)
+        if values.shape != (self.n,) or not np.isfinite(values).all():
+            raise UsageError(f"{self.name}: {what} is {given!r}", remedy=f"give {self.n} finite numbers")
+        return values
+
+    def _check(self) -> None:
+        if len(self.names) != self.n:
+            raise UsageError(f"{self.name}: {len(self.names)} names for {self.n} coordinates")
+        every = [*self.names, *self.velocities, *(c.name for c in self.contacts)]
+        twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
+        if twice:
+            raise UsageError(
+                f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own"
+            )
+        for contact in self.contacts:
+            if not isinstance(contact, MechanicalContact):
+                raise UsageError(
+                    f"{self.name}: contacts hold {contact!r}", remedy="give hs.MechanicalContact(...) objects"
+                )
+            for i, _ in contact.direction:
+                if not 0 <= i < self.n:
+                    raise UsageError(
+                        f"contact {contact.name}: its direction names the coordinate {i} of {self.n}",
+                        remedy="count from 0",
+                    )
+
+    def with_(self, **changes: Any) -> MechanicalSystem:
+        """A copy with some arguments of the constructor changed."""
+        own: dict[str, Any] = {
+            key: getattr(self, key)
+            for key in ("M", "C", "K", "forcing", "contacts", "q0", "v0", "name", "title", "source")
+        }
+        own["names"] = None if self.velocities[0] == "v1" else self.names
+        return MechanicalSystem(**{**own, **changes})
+
+    def to_model(self) -> Model:
+        """The same as an ordinary `Model`, in text: for other integrators, and to check one against the other."""
+        from hybridsim.mechanics.as_model import as_model
+
+        return as_model(self)
+
+    def __repr__(self) -> str:
+        return f"<MechanicalSystem {self.name}: {self.n} coordinates, {len(self.contacts)} contacts>"
+
+
+def _matrix(given: Any, what: str, n: int | None) -> Any:
+    """A square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
+    from scipy import sparse
+
+    if given is None and n is not None:
+        return sparse.csr_array((n, n))
+    if sparse.issparse(given):
+        matrix = sparse.csr_array(given, dtype=float)
+    else:
+        dense = np.array(given, dtype=float)
+        if dense.ndim not in (1, 2):
+            raise UsageError(
+                f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal"
+            )
+        matrix = sparse.csr_array(sparse.diags_array(dense) if dense.ndim == 1 else dense)
+    if matrix.shape[0] != matrix.shape[1] or (n is not None and matrix.shape[0] != n):
+        raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"give ({n or 'n'}, {n or 'n'})")
+    if not np.isfinite(matrix.data).all():
+        raise UsageError(f"{what} holds what is no finite number")
+    return matrix
