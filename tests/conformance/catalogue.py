@@ -1,4 +1,4 @@
-"""All conformance scenes, and the cases that are left to later work with the reason."""
+"""All conformance scenes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,6 @@ from conformance import corners, oscillators, sliding
 from conformance.checks import equals, exact_stick, says
 from conformance.facts import CASES, TRUTHS
 from conformance.scene import END, Scene, Truth
-
-LEFT_OUT = {
-    "FEENY": "the normal load depends on the state and vanishes: a contact that opens",
-}
 
 
 def needs(*capabilities: str) -> frozenset[str]:
@@ -69,7 +65,35 @@ def contacts() -> tuple[Scene, ...]:
         unit=5.0,
         start_is_event=False,
     )
-    return belt("LEINE-3", 3.0), belt("NOS-codim1", 1.0), stribeck, blocks
+    return belt("LEINE-3", 3.0), belt("NOS-codim1", 1.0), stribeck, blocks, lifting()
+
+
+def lifting() -> Scene:
+    """A contact that opens, in chaotic motion: what a fixed step does wrong grows."""
+    expected = CASES["FEENY"]["expected"]
+
+    def turns(solution: Any) -> list[float]:
+        return [e.t for e in solution.events if e.component == "f"]
+
+    def counted(solution: Any) -> list[str]:
+        found = len(turns(solution))
+        return [] if found == expected["n_events"] else [f"{found} events, not {expected['n_events']}"]
+
+    def nearest_to(t: float) -> Any:
+        return lambda solution: min(turns(solution), key=lambda found: abs(found - t))
+
+    times = [(nearest_to(t), t) for t in (*expected["events_t_first"], *expected["close_pair"])]
+    states = tuple((float(t), tuple(x)) for t, x in expected["samples"].items())
+    return Scene(
+        "FEENY",
+        "feeny",
+        (0.0, 40.0),
+        Truth(None, states, tuple(times), checks=(("", counted),)),
+        needs("contacts", "exact-stick", "transitions", "adaptive"),
+        unit=5.0,
+        tol_x=1e-7,
+        tol_t=1e-7,
+    )
 
 
 def ball() -> tuple[Scene, ...]:

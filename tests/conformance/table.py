@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import hybridsim as hs
-from conformance.catalogue import LEFT_OUT, SCENES
+from conformance.catalogue import SCENES
 from conformance.facts import CASES
 from conformance.native import MECHANISMS, mechanism
 from conformance.suite import Outcome, outcome
@@ -104,9 +104,8 @@ def page(names: Sequence[str]) -> str:
     if faults:
         parts += ["\n## What is wrong\n", rows(("integrator", "scene", "what"), faults)]
     parts += native(names)
-    sources = ((case, fact["name"], fact["source"]) for case, fact in CASES.items() if case not in LEFT_OUT)
+    sources = ((case, fact["name"], fact["source"]) for case, fact in CASES.items())
     parts += ["\n## Where the scenes come from\n", rows(("case", "what it is", "source"), sources)]
-    parts += ["\n## Cases left to later work\n", rows(("case", "why"), LEFT_OUT.items())]
     return "\n".join(parts) + "\n"
 
 
