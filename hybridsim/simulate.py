@@ -29,7 +29,21 @@ def simulate(
 ) -> MechanicalSolution: ...
 @overload
 def simulate(
-    model: Model | str | PathLike[str], t_span: tuple[float, float], **arguments: Any
+    model: Model | str | PathLike[str],
+    t_span: tuple[float, float],
+    *,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, float] | Sequence[float] | None = None,
+    z0: Mapping[str, str] | None = None,
+    integrator: str = "auto",
+    rtol: float | None = None,
+    atol: float | Mapping[str, float] | Sequence[float] | None = None,
+    max_step: float = math.inf,
+    first_step: float | None = None,
+    t_eval: Sequence[float] | None = None,
+    save: str | float = "all",
+    progress: Callable[[float], None] | None = None,
+    **options: Any,
 ) -> Solution: ...
 def simulate(
     model: Model | MechanicalSystem | str | PathLike[str],
@@ -52,9 +66,8 @@ def simulate(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`,
-    which runs by
-        Taylor series of its own.
+    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which
+        runs by Taylor series of its own.
     t_span : (t0, t1); t1 < t0 runs backward in time.
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -120,7 +120,7 @@ def solve_by_steps(
     eps_v: float | None = None,
 ) -> Solution:
     """A run of a fixed-step method from rest, of which the last periods are kept."""
-    options: dict[str, object] = dict(variant.options)
+    options: dict[str, Any] = dict(variant.options)
     if eps_v is not None:
         options["eps_v"] = eps_v
     return simulate(
