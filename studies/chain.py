@@ -1,4 +1,4 @@
-"""Cost of an event in a chain of blocks on a belt, against the number of blocks: writes docs/studies/chain.md and .png.
+"""Cost of an event in a chain of blocks on a belt, against the number of blocks: writes docs/studies/chain.md and its picture.
 
     python studies/chain.py [OUT_DIR]
 
@@ -131,7 +131,7 @@ def theirs(n: int) -> tuple[float, int]:
 
 def main() -> None:
     """Measure, draw, write the page."""
-    out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent / "docs" / "studies"
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent / "docs"
     rows = []
     for n in SIZES:
         fine, coarse, rival = ours(n, 1e-9), ours(n, 1e-6), theirs(n)
@@ -155,12 +155,12 @@ def main() -> None:
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
         axis.legend(fontsize=8)
-    figure.savefig(out / "chain.png", dpi=130)
+    figure.savefig(out / "images" / "chain.png", dpi=130)
     table = "\n".join(
         f"| {n} | {fine[1]:.3g} | {fine[2]:.3g} | {fine[0]:.3g} | {coarse[0]:.3g} | {rival[0]:.3g} |"
         for n, fine, coarse, rival in rows
     )
-    (out / "chain.md").write_text(
+    (out / "studies" / "chain.md").write_text(
         f"""# A chain of blocks: what an event costs
 
 `hs.chain_on_belt(n)`: blocks of mass 1 on a belt of speed {BELT}, leaf springs {LEAF}, coupling {COUPLING}, friction
@@ -171,7 +171,7 @@ the compiled loops on one core, the best of three (two for RK4); they depend on 
 bisection, h = 0.01 | | --- | --- | --- | --- | --- | --- |
 {table}
 
-![Time per event and per unit of simulated time against the number of blocks](chain.png)
+![Time per event and per unit of simulated time against the number of blocks](../images/chain.png)
 
 The time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose
 series it changes by more than a tenth of the tolerance; all blocks are expanded together only at the end of a
