@@ -1,4 +1,4 @@
-"""Cost of an event in a chain of blocks on a belt, against the number of blocks: writes docs/studies/chain.md and its picture.
+"""Cost of an event in a chain of blocks on a belt, against the number of blocks: docs/studies/chain.md, its picture.
 
     python studies/chain.py [OUT_DIR]
 
