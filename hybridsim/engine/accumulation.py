@@ -46,8 +46,9 @@ def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: fl
 class Accumulation:
     """Watches the intervals between events of one run."""
 
-    def __init__(self, resolution: float, shortest: float = 0.0) -> None:
-        self.resolution = resolution  # a rest of the series shorter than this is the end of it
+    def __init__(self, resolution: float = 0.0, shortest: float = 0.0) -> None:
+        # a rest of the series shorter than this, or than a few ulps of the time, is the end of it
+        self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
         self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
@@ -117,7 +118,8 @@ class Accumulation:
             rest = gaps[-1] * factor / (1.0 - factor)
             self.forecast = (float(float(instant) + rest), rest)
             steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
-            return self.forecast[0] if steady and rest <= self.resolution else None
+            end = max(self.resolution, _ULPS * math.ulp(float(instant)))
+            return self.forecast[0] if steady and rest <= end else None
         before, self.forecast = self.forecast, None
         if before is None or before[1] > _FAR_DOWN * self.longest:
             return None

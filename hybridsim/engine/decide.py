@@ -125,11 +125,21 @@ def decreed_zeros(is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool
 
     is_first: the first guard of a mode beside a surface is that surface. is_on: the surface is zero; is_holding: the
     candidate holds it; is_smooth: the component is released from it and all unknowns stay as they were, so that the
-    surface starts with a zero rate as well. is_fired: the guard was located at zero and its mode goes on.
+    surface starts with a zero rate as well. is_fired: the guard was located at zero, its mode goes on, and it is still
+    what was located: `is_decreed`.
     """
     if is_first and is_on and not is_holding:
         return 2 if is_smooth else 1
     return 1 if is_fired else 0
+
+
+@inlined
+def is_decreed(is_holding: bool, continuous: bool) -> bool:
+    """Whether a guard that was located at zero is zero in a candidate in which its mode goes on.
+
+    Those of a holding mode are limits of its unknown, which the jump of another unknown may have taken off the limit.
+    """
+    return continuous or not is_holding
 
 
 @kernel
@@ -147,8 +157,8 @@ def decree_orders(
         for j in range(guards_of.shape[1]):
             g = guards_of[c, j]
             if g >= 0:
-                smooth = released[c] and continuous
-                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, fired[g])
+                smooth, at_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
+                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero)
 
 
 def joint_candidates(sizes: list[int]) -> np.ndarray:

@@ -35,7 +35,15 @@ class HeldStates:
         self.states: list[Any] = lowering.states
         choices = {c: self._linear_in(s) for c, s in surfaces.items()}
         free = self._without_choice(choices)
-        self.pins = self._chosen({c: found for c, found in choices.items() if c not in free})
+        pins = self._chosen(choices, free)
+        if pins is None:
+            self._refuse_dependent(list(choices))
+            choices = {c: [] if lowering.components[c].surface.unique else i for c, i in choices.items()}
+            free = self._without_choice(choices)
+            pins = self._chosen(choices, free)
+        if pins is None:
+            raise self._dependent(list(choices))
+        self.pins = pins
         self.projected = {c: self._uses(c) for c in surfaces if c in free}
         self._lengths: dict[int, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
@@ -72,20 +80,28 @@ class HeldStates:
             found |= {c for c in choices if moved & set(self._uses(c))}
         return found
 
-    def _chosen(self, choices: dict[int, list[int]]) -> dict[int, int]:
-        """One state for each surface, no two alike, no circle."""
-        chosen = self._match(list(choices), choices, {})
-        if chosen is None:
-            lowering = self.lowering
-            titles = dict.fromkeys(lowering.title(c, plural=True) for c in choices)
-            raise ModelError(
-                f"the {' and '.join(titles)} of "
-                + ", ".join(lowering.components[c].name for c in choices)
-                + " are not independent: holding all of them at zero leaves no state for each",
-                place=lowering.place(next(iter(choices))),
-                remedy="merge contacts that share one relative velocity, and surfaces that are one",
-            )
-        return chosen
+    def _chosen(self, choices: dict[int, list[int]], free: set[int]) -> dict[int, int] | None:
+        """One state for each surface that is not projected, no two alike, no circle; None where there is none."""
+        pinned = {c: found for c, found in choices.items() if c not in free}
+        return self._match(list(pinned), pinned, {})
+
+    def _refuse_dependent(self, linear: list[int]) -> None:
+        """Refuse surfaces of which one is zero where the others are."""
+        sp = self.lowering.sp
+        slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
+        if not slopes.free_symbols & set(self.states) and slopes.rank() < len(linear):
+            raise self._dependent(linear)
+
+    def _dependent(self, components: list[int]) -> ModelError:
+        lowering = self.lowering
+        titles = dict.fromkeys(lowering.title(c, plural=True) for c in components)
+        return ModelError(
+            f"the {' and '.join(titles)} of "
+            + ", ".join(lowering.components[c].name for c in components)
+            + " are not independent: holding all of them at zero leaves no state for each",
+            place=lowering.place(components[0]),
+            remedy="merge contacts that share one relative velocity, and surfaces that are one",
+        )
 
     def _match(
         self, open_: list[int], choices: dict[int, list[int]], taken: dict[int, int]

@@ -18,7 +18,7 @@ from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.start import settled_start
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
-from hybridsim.engine.system import System
+from hybridsim.engine.system import Series, System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
@@ -46,7 +46,7 @@ class ModeLoop:
         self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray
-        self.accumulation = Accumulation(1e-3 * task.tolerances.rtol * abs(task.t1 - task.t0))
+        self.accumulation = Accumulation()
         self.leaper = self._leaper()
         self.progress: Callable[[Instant], None] | None = None
         if progress is not None:
@@ -283,7 +283,24 @@ class ModeLoop:
         error[system.evaluated(z)] = 0.0
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
         resets = [("schedule", k) for k in schedules]
-        return Settling(system, at, z.copy(), self.forward).run((), resets)
+        settling = Settling(system, at, z.copy(), self.forward)
+        settling.jumped = self._surfaces_jump(instant, at)
+        return settling.run((), resets)
+
+    def _surfaces_jump(self, instant: Instant, at: Situation) -> bool:
+        """Whether an input's jump carries a surface away from where it was: what was held is held no longer."""
+        system = self.system
+        if not (system.signals and system.surface_of):
+            return False
+        before = system.vector(instant, system.discrete(at.p), not self.forward)
+        values, bounds = [], []
+        for p in (before, at.p.copy()):
+            p[system.layout.pin_at] = 0.0
+            series = system.series(0.0, at.x, p, np.maximum(at.z, 0), np.zeros(system.n), 0.0)
+            assert isinstance(series, Series)  # models with surfaces are made from expressions
+            values.append(series.surfaces[:, 0])
+            bounds.append(series.surface_bounds[:, 0])
+        return bool((np.abs(values[1] - values[0]) > bounds[0] + bounds[1]).any())
 
     def _accumulated(self, instants: np.ndarray) -> bool:
         """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""

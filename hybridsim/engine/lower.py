@@ -257,6 +257,9 @@ class Lowering:
                         remedy=f"use {_name(unknown[c])} in the derivative of the velocity state",
                     )
                 self.never_held.add(c)
+        self._refuse_powers(
+            unknown, [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
+        )
         clusters = self._clusters(order, effect)
         items: list[Item] = []
         for cluster in clusters:
@@ -266,6 +269,19 @@ class Lowering:
                 pull = sp.Integer(-1) if c in self.never_held else -effect[c, c]
                 items.append(Assign(user(ATTRACTION + self.components[c].surface.unknown), pull))
         return items, clusters
+
+    def _refuse_powers(self, unknown: dict[int, Any], rates: list[Any]) -> None:
+        """Refuse a surface's name where it is not linear: Filippov's rates lie between those of the sides."""
+        for c, u in unknown.items():
+            for x, rate in zip(self.states, rates, strict=True):
+                component = self.components[c]
+                if component.surface.unique and u in self.sp.simplify(self.sp.diff(rate, u)).free_symbols:
+                    name = _name(u)
+                    raise ModelError(
+                        f"surface {component.name}: {name} enters the rate of {_name(x)} nonlinearly",
+                        place=self.place(c),
+                        remedy=f"let {name} enter the rates linearly, or give whole fields as above and below of it",
+                    )
 
     def _nonlinear(self, c: int, d: int, others: set[Any]) -> ModelError:
         """The fault of an unknown that acts on a surface together with itself or others."""

@@ -20,6 +20,7 @@ from hybridsim.engine.decide import (
     UNDECIDED,
     choose,
     decreed_zeros,
+    is_decreed,
     open_question,
     preference,
     side_after,
@@ -229,6 +230,7 @@ def judge_members(
             if g < 0:
                 continue
             is_fired = is_on and g == fired and (z[c] == at.z[c] or automata.is_corner[c])
+            is_fired = is_fired and is_decreed(is_holding, continuous)
             zeros = decreed_zeros(j == 0, on_surface[c], is_holding, is_smooth, is_fired)
             side, order, is_open = guard_side(lin, k, g, zeros, x, x_error, work)
             if side < 0:

@@ -201,7 +201,9 @@ def _judge(plant: Any, state: Any, room: Any, count: int) -> int:
                 g[k], e[k] = -sigma * room.F[k, i], room.err_f[k, c]
             g[0] += plant.limits[c, side]
             e[0] += _UNIT * plant.limits[c, side]
-            sign, order = side_after(g[: _SHORT - 1], e[: _SHORT - 1], 1 if room.at_limit[c] == sigma else 0)
+            # a force that another one's jump changes is no longer at the limit that it was located at
+            decreed = 1 if is_continuous and room.at_limit[c] == sigma else 0
+            sign, order = side_after(g[: _SHORT - 1], e[: _SHORT - 1], decreed)
             state.decree[c, side] = order if order < _SHORT - 1 else 0
             if sign < 0:
                 if order > 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hybridsim.model.nonsmooth import has_word
 from hybridsim.model.scope import Scope
 from hybridsim.model.switching import SwitchingSurface
 
@@ -26,6 +27,11 @@ def _surface(scope: Scope, surface: SwitchingSurface) -> None:
     if switched:
         message = f"{what}: the switching function depends on '{switched[0]}', which depends on a mode"
         scope.fail(surface, message, "write it over states, discrete states, parameters and t.")
+    elif any(map(has_word, [surface.expr, *(e for n, e in scope.model.definitions if n in reached)])):
+        message = f"{what}: the switching function '{surface.expr.text}' is not smooth"
+        scope.fail(
+            surface, message, "write one without abs, min, max, sign and conditions, or modes with guards."
+        )
     elif not any(scope.kinds.get(name) == "state" for name in reached):
         message = f"{what}: the switching function '{surface.expr.text}' contains no state"
         scope.fail(

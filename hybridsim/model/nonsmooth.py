@@ -55,6 +55,11 @@ def uses_primitives(model: Model) -> bool:
     return any(_WORD.search(expr.text) for expr in _expressions(model))
 
 
+def has_word(expr: Expression) -> bool:
+    """Whether an expression itself may have a corner or a jump."""
+    return bool(_WORD.search(expr.text))
+
+
 def _expressions(model: Model) -> Iterator[Expression]:
     yield from (state.der for state in model.states)
     yield from (expr for _, expr in model.definitions)

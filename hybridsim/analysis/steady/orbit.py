@@ -177,9 +177,10 @@ class Sampler:
         x = self.segments.states(index, s)
         out = np.empty((len(s), len(self.names)))
         out[:, : self.system.n] = x
-        for i in np.unique(index):
-            chosen = np.flatnonzero(index == i)
-            out[chosen, self.system.n :] = self._others(int(i), s[chosen], np.ascontiguousarray(x[chosen]))
+        order = np.argsort(index, kind="stable")
+        numbers, first = np.unique(index[order], return_index=True)
+        for i, chosen in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+            out[chosen, self.system.n :] = self._others(i, s[chosen], np.ascontiguousarray(x[chosen]))
         return out
 
     def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
