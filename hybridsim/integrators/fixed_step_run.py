@@ -90,6 +90,7 @@ class FixedStepRun:
         self.accumulation = Accumulation(located, 4.0 * located)
         self.lately = self.x[None, :]  # states of the last stretch, the size of which rounding is relative to
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
+        self.turned = False  # an input may just have jumped
 
     def run(self) -> Trajectory:
         """Step to the end; what was computed is kept in any case."""
@@ -134,7 +135,9 @@ class FixedStepRun:
         )
         start_z = self.z.copy()
         rows = (times, states, modes)
-        count, why = self.march.run(numbers, bound, p, (self.x, self.z), self.fresh, rows)
+        z = self._sides_taken() if self.turned else self.z
+        self.turned = False
+        count, why = self.march.run(numbers, bound, p, (self.x, z), self.fresh, rows)
         self.fresh[:] = False
         if count < _ROWS:  # a short stretch does not hold on to room for a long one
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
@@ -156,9 +159,23 @@ class FixedStepRun:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
             self.timetable.kept(instant)
+            self.turned = bool(system.signals)
             at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
             return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
         return self._declared_event(s, p, why)
+
+    def _sides_taken(self) -> np.ndarray:
+        """The modes, but for what an input's jump has carried off its surface: the kernel sees that as it is held."""
+        z, p = self.z.copy(), self._vector()
+        p[self.system.layout.pin_at] = 0.0
+        values = self.system.rows(
+            "surfaces", len(self.system.surface_of), np.zeros(1), self.x[None, :], p, self.z
+        )[0]
+        for c, value in zip(self.system.surface_of, values.tolist(), strict=True):
+            automaton = self.system.automata[c]
+            if z[c] == automaton.hold and value != 0.0:
+                z[c] = automaton.above if value > 0.0 else automaton.below
+        return z
 
     # -- events of guards and monitors beside the surfaces --------------------------------------------------
 

@@ -86,7 +86,7 @@ def tied() -> Scene:
         "tied-limits",
         (0.0, 0.2),
         Truth(((release, "b:slip+"),), states),
-        needs("contacts", "exact-stick"),
+        needs("contacts", "exact-stick", "adaptive"),  # a fixed step finds both limits passed
         start_is_event=False,
         unit=0.2,
     )
@@ -101,7 +101,7 @@ def turning_belt() -> Scene:
         "turning-belt",
         (0.0, 5.0),
         Truth(None, states, checks=(("", sequence(turns)),)),
-        needs("contacts", "scheduled"),
+        needs("contacts", "exact-stick", "scheduled"),
         unit=1.0,
         start_is_event=False,
     )
