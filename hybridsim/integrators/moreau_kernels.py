@@ -15,6 +15,9 @@ from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, NOT_F
 
 _NUDGE = 2.0**-26  # a difference quotient's step, relative: half of the digits
 _RENEWED = 4  # iterations after which Newton's method gets a new matrix
+# Sweeps after which what slips comes to rest by kinetic friction alone: contacts whose static friction is larger might
+# take turns for ever.
+_PATIENCE = 50
 _SWEEPS = 10_000  # of the projected Gauss-Seidel iteration; a lone contact needs one
 _HOLD, _ABOVE, _BELOW = 0, 1, 2  # what a force means
 
@@ -155,7 +158,7 @@ def forces(room: Any, m: int, tolerance: float) -> bool:
 
     Each force is what holds its surface at zero, as far as its limits allow; else that of slip.
     """
-    for _ in range(_SWEEPS):
+    for sweep in range(_SWEEPS):
         change = scale = 0.0
         for k in range(m):
             y = room.y[k]
@@ -164,9 +167,12 @@ def forces(room: Any, m: int, tolerance: float) -> bool:
                     y += room.G[k, j] * room.force[j]
             own, meaning = room.G[k, k], _HOLD
             force = -y / own if own < 0.0 else 0.0
-            if force > room.most[k] or (own >= 0.0 and y > 0.0):
+            most, least = room.most[k], room.least[k]
+            if sweep > _PATIENCE and room.meaning[k] != _HOLD:
+                most, least = min(most, room.up[k]), max(least, room.down[k])
+            if force > most or (own >= 0.0 and y > 0.0):
                 force, meaning = room.up[k], _ABOVE
-            elif force < room.least[k] or (own >= 0.0 and y < 0.0):
+            elif force < least or (own >= 0.0 and y < 0.0):
                 force, meaning = room.down[k], _BELOW
             room.meaning[k] = meaning
             change = max(change, abs(force - room.force[k]))

@@ -119,6 +119,16 @@ class MechanicalRun:
         j, plant = int(self.state.flags[WHERE]), self.built.plant
         return [int(self.built.contacts[c]) for c in range(plant.node_con[j], plant.node_con[j + 1])]
 
+    def start_piece(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A piece for each node that holds the start alone: all there is of a run that ends where it begins."""
+        node_dof = self.built.plant.node_dof
+        nodes = len(node_dof) - 1
+        start = np.zeros((nodes, 3))
+        start[:, 0] = self.span[0]
+        series = np.zeros((len(self.state.x[0]), self.order + 1))
+        series[:, :2] = self.state.x.T
+        return np.stack([np.arange(nodes), node_dof[:-1]], axis=1).astype(np.int64), start, series
+
     def _record(self) -> Record:
         plant, columns = self.built.plant, self.order + 1
         nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)

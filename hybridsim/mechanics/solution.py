@@ -67,7 +67,7 @@ class MechanicalSolution:
                 f"the run was made with save={self._save!r}, which keeps no states between the ends",
                 remedy="run it with save='all'",
             )
-        return Pieces(self._run.built.plant, self._run.pieces)
+        return Pieces(self._run.built.plant, self._run.pieces or [self._run.start_piece()])
 
     @cached_property
     def _scratch(self) -> tuple[Any, Any]:

@@ -62,6 +62,7 @@ class MechanicalContact(Declared):
     law: FrictionLaw
     arguments: Mapping[str, Expression] = field(default_factory=FrozenMap)
     base: float | Harmonic = 0.0
+    weights: int = field(init=False, default=0, repr=False, compare=False)  # as many as were given in a row
 
     def __post_init__(self) -> None:
         self._texts("name")
@@ -82,6 +83,8 @@ class MechanicalContact(Declared):
             raise self._fault(f"normal is {self.normal!r}", "give a load >= 0")
         if not isinstance(self.base, Harmonic):
             object.__setattr__(self, "base", self._number("base", self.base))
+        count = 0 if isinstance(self.direction, Mapping) else len(self.direction)
+        object.__setattr__(self, "weights", count)
         weights = self.direction.items() if isinstance(self.direction, Mapping) else enumerate(self.direction)
         pairs = tuple((int(i), self._number("direction", w)) for i, w in weights if w != 0)
         if not pairs:
@@ -174,6 +177,11 @@ class MechanicalSystem:
     def _forces(self, forcing: Any) -> dict[int, tuple[float | Harmonic, ...]]:
         if forcing is None:
             return {}
+        if not isinstance(forcing, Mapping) and len(forcing) != self.n:
+            raise UsageError(
+                f"{self.name}: forcing has {len(forcing)} entries for {self.n} coordinates",
+                remedy="give one for each, or a mapping from coordinates",
+            )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
         found: dict[int, tuple[float | Harmonic, ...]] = {}
         for i, given in pairs.items():
@@ -212,6 +220,11 @@ class MechanicalSystem:
             if not isinstance(contact, MechanicalContact):
                 raise UsageError(
                     f"{self.name}: contacts hold {contact!r}", remedy="give hs.MechanicalContact(...) objects"
+                )
+            if contact.weights not in (0, self.n):
+                raise UsageError(
+                    f"contact {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
+                    remedy="give one for each, or a mapping from coordinates",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,3 +109,14 @@ def test_a_bad_option_is_named(options: dict[str, float], named: str) -> None:
 def test_steps_that_do_not_converge_are_counted() -> None:
     sol = hs.simulate("dfcs", (0, 0.05), integrator="moreau", iterations=2, tolerance=1e-16)
     assert "did not converge" in sol.warnings[0]
+
+
+def test_static_friction_in_coupled_contacts_comes_loose_at_its_limit() -> None:
+    """What sticks and slips in turns within a step must not stay above its limit (tied-limits, but for a load)."""
+    path = Path(__file__).parents[1] / "conformance" / "scenes" / "tied-limits.toml"
+    model = hs.Model.from_toml(path.read_text("utf-8").replace("normal = 20.0", "normal = 25"), str(path))
+    sol = hs.simulate(model, (0, 0.2), integrator="moreau", step=1e-3)
+    assert sol.warnings == ()
+    assert sol.events[0].component == "b"
+    assert sol.events[0].t == pytest.approx(np.arcsin(0.4) / 4, abs=1.1e-3)
+    assert np.abs(sol.output("b", sol.t)).max() <= 6.0 + 1e-9

@@ -1,0 +1,47 @@
+"""What a declaration of a mechanical system refuses, and runs that end where they begin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+
+
+def contact(direction: object, **changes: object) -> hs.MechanicalContact:
+    given: dict[str, object] = {"normal": 10, "law": "coulomb", "arguments": {"mu": 0.3}} | changes
+    return hs.MechanicalContact("a", direction, **given)  # type: ignore[arg-type]  # on purpose
+
+
+def test_a_direction_has_a_weight_for_each_coordinate() -> None:
+    with pytest.raises(hs.UsageError, match="contact a: its direction has 2 weights for 3 coordinates"):
+        hs.MechanicalSystem([1, 1, 1], None, [1, 1, 1], contacts=[contact([1, 0])])
+    by_name = hs.MechanicalSystem([1, 1, 1], None, [1, 1, 1], contacts=[contact({0: 1.0})])
+    assert by_name.with_(K=[2, 2, 2]).contacts == by_name.contacts
+
+
+def test_a_forcing_has_an_entry_for_each_coordinate() -> None:
+    with pytest.raises(hs.UsageError, match="forcing has 2 entries for 3 coordinates"):
+        hs.MechanicalSystem([1, 1, 1], None, [1, 1, 1], forcing=[1, 2])
+
+
+def test_a_run_that_cannot_begin_has_its_start() -> None:
+    """Kinetic friction above static: neither stick nor slip is admissible."""
+    weak = contact([1, 0], normal=45, law="static-kinetic", arguments={"mu_s": 0.3, "mu_k": 0.5})
+    system = hs.MechanicalSystem([1, 1], None, [1, 1], forcing=[20, 0], contacts=[weak], q0=[0.0, 0.5])
+    sol = hs.simulate(system, (0, 1))
+    assert sol.status == "inconsistent"
+    assert sol.t.tolist() == [0.0] * len(sol.t)
+    assert np.array_equal(sol(0.0), [0.0, 0.5, 0.0, 0.0])
+
+
+def test_a_limit_that_another_force_undoes() -> None:
+    """Both contacts are at their limits when b breaks loose; its drop takes a off its limit (as in tied-limits)."""
+    a = contact([1, 0], normal=20)
+    b = hs.MechanicalContact("b", [-1, 1], 12, "static-kinetic", {"mu_s": 0.5, "mu_k": 0.35})
+    forcing = [0, hs.Harmonic(omega=4, sin=15)]
+    sol = hs.simulate(
+        hs.MechanicalSystem([1, 2], None, [[60, -30], [-30, 60]], forcing=forcing, contacts=[a, b]), (0, 0.2)
+    )
+    assert [(e.component, e.target) for e in sol.events] == [("b", "slip+")]
+    assert sol.events[0].t == pytest.approx(np.arcsin(0.4) / 4, rel=1e-12)
