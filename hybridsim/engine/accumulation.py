@@ -21,6 +21,8 @@ _SAME_FACTOR = 1e-3
 _FAR_DOWN = 1e-6
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
 _ULPS = 16.0
+# A series with so few ulps of the time to go has come to its end: states that rounding moves decide what follows.
+_END = 1024.0
 
 
 @kernel
@@ -47,7 +49,7 @@ class Accumulation:
     """Watches the intervals between events of one run."""
 
     def __init__(self, resolution: float = 0.0, shortest: float = 0.0) -> None:
-        # a rest of the series shorter than this, or than a few ulps of the time, is the end of it
+        # a rest of the series shorter than this is the end of it, whatever rounding says
         self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
@@ -118,7 +120,7 @@ class Accumulation:
             rest = gaps[-1] * factor / (1.0 - factor)
             self.forecast = (float(float(instant) + rest), rest)
             steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
-            end = max(self.resolution, _ULPS * math.ulp(float(instant)))
+            end = max(self.resolution, _END * math.ulp(float(instant)))
             return self.forecast[0] if steady and rest <= end else None
         before, self.forecast = self.forecast, None
         if before is None or before[1] > _FAR_DOWN * self.longest:
