@@ -139,7 +139,7 @@ def build(system: MechanicalSystem) -> Built:
         _ints(node_dof), _ints(node_con), _ints(node_of), _ints(con_node),
         *_parts(K), *_parts(C), *_parts(B), *_parts(W),
         _ints(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
-        *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates),
+        *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates, dtype=float),
         base, base_rate, limits, smooth, tape, par, _ints(np.diff(W.indptr) == 1),
     )  # fmt: skip
     return Built(plant, laws, dofs, contacts, is_linear)

@@ -159,14 +159,15 @@ def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any)
     return call_kernel(address, plant, laws, state, room)
 
 
-_addresses: list[int] = []
+_addresses: dict[tuple[Any, ...], tuple[int, ...]] = {}  # by the forms of the packs
 
 
 def reach_kernels(arrays: State, *packs: Any) -> None:
     """Compile the large kernels if need be, and put their addresses where the others find them."""
-    if not _addresses:
-        _addresses.extend(kernel_address(function, *packs) for function in (expand, stretch, decide))
-    arrays.kernels[:] = _addresses
+    forms = tuple(getattr(pack, "numba_type", None) for pack in packs)
+    if forms not in _addresses:
+        _addresses[forms] = tuple(kernel_address(function, *packs) for function in (expand, stretch, decide))
+    arrays.kernels[:] = _addresses[forms]
 
 
 def new_state(built: Built, order: int) -> State:

@@ -257,6 +257,8 @@ def test_decreed_zeros(
         decreed,
     )
     beside = on_surface and not holding
-    at_zero = fired and (continuous or not holding)  # a limit that another unknown's jump may have undone is none
+    at_zero = fired and (
+        continuous or not holding
+    )  # a limit that another unknown's jump may have undone is none
     surface = (2 if released and continuous else 1) if beside else int(at_zero)
     assert decreed.tolist() == [surface, int(at_zero), 7, 0, 7]

@@ -45,3 +45,10 @@ def test_a_limit_that_another_force_undoes() -> None:
     )
     assert [(e.component, e.target) for e in sol.events] == [("b", "slip+")]
     assert sol.events[0].t == pytest.approx(np.arcsin(0.4) / 4, rel=1e-12)
+
+
+def test_whole_numbers_are_numbers() -> None:
+    """q'' + 4 q = 2 sin(3 t) from rest, after a run of a system without harmonics: the kernels are the same."""
+    hs.simulate(hs.MechanicalSystem([1.0], None, [4.0], forcing=[1.0]), (0, 1))
+    sol = hs.simulate(hs.MechanicalSystem([1], None, [4], forcing=[hs.Harmonic(omega=3, sin=2)]), (0, 1))
+    assert sol(1.0)[0] == pytest.approx(2 / (4 - 9) * (np.sin(3) - 1.5 * np.sin(2)), rel=1e-8)
