@@ -257,9 +257,10 @@ class Lowering:
                         remedy=f"use {_name(unknown[c])} in the derivative of the velocity state",
                     )
                 self.never_held.add(c)
-        self._refuse_powers(
-            unknown, [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
-        )
+        switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
+        if switching:
+            rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
+            self._refuse_powers(switching, rates)
         clusters = self._clusters(order, effect)
         items: list[Item] = []
         for cluster in clusters:
@@ -275,7 +276,7 @@ class Lowering:
         for c, u in unknown.items():
             for x, rate in zip(self.states, rates, strict=True):
                 component = self.components[c]
-                if component.surface.unique and u in self.sp.simplify(self.sp.diff(rate, u)).free_symbols:
+                if u in self.sp.simplify(self.sp.diff(rate, u)).free_symbols:
                     name = _name(u)
                     raise ModelError(
                         f"surface {component.name}: {name} enters the rate of {_name(x)} nonlinearly",
