@@ -23,6 +23,7 @@ _HOME = {
     "FrictionLaw": "hybridsim.model",
     "LawTable": "hybridsim.model",
     "Guard": "hybridsim.model",
+    "Impact": "hybridsim.model",
     "Input": "hybridsim.model",
     "Mode": "hybridsim.model",
     "Model": "hybridsim.model",
@@ -45,8 +46,10 @@ _HOME = {
     # running
     "MechanicalSolution": "hybridsim.mechanics.solution",
     "Event": "hybridsim.solution",
+    "Explanation": "hybridsim.solution",
     "Solution": "hybridsim.solution",
     "list_integrators": "hybridsim.integrators",
+    "load_solution": "hybridsim.solution",
     "simulate": "hybridsim.simulate",
     "to_ivp": "hybridsim.ivp",
     # asking

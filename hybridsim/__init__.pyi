@@ -41,6 +41,7 @@ from hybridsim.model import Contact as Contact
 from hybridsim.model import Discrete as Discrete
 from hybridsim.model import FrictionLaw as FrictionLaw
 from hybridsim.model import Guard as Guard
+from hybridsim.model import Impact as Impact
 from hybridsim.model import Input as Input
 from hybridsim.model import LawTable as LawTable
 from hybridsim.model import Mode as Mode
@@ -57,6 +58,8 @@ from hybridsim.model import load as load
 from hybridsim.model import load_law as load_law
 from hybridsim.simulate import simulate as simulate
 from hybridsim.solution import Event as Event
+from hybridsim.solution import Explanation as Explanation
 from hybridsim.solution import Solution as Solution
+from hybridsim.solution import load_solution as load_solution
 
 __version__: str

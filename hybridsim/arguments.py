@@ -13,6 +13,7 @@ from hybridsim.model import Model, load
 
 if TYPE_CHECKING:
     from hybridsim.engine.keep import Keep
+    from hybridsim.engine.limits import Limits
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
 
@@ -221,6 +222,28 @@ def kept(save: Any, system: System) -> Keep:
     if not length > 0.0:
         raise UsageError(f"save is {save!r}", remedy=remedy)
     return Keep(length, length)
+
+
+def run_limits(limits: Any) -> Limits:
+    """What a run may cost, from a mapping."""
+    from dataclasses import fields
+
+    from hybridsim.engine.limits import UNLIMITED, Limits
+
+    names = [f.name for f in fields(Limits)]
+    if limits is None:
+        return UNLIMITED
+    if not isinstance(limits, Mapping):
+        raise UsageError(
+            f"limits is {limits!r}",
+            remedy=f"give a mapping from {', '.join(names)} to numbers, {{'events': 1000}}",
+        )
+    for name, value in limits.items():
+        if name not in names:
+            raise UsageError(f"limits names {name!r}", remedy=nearest(str(name), names, kind="limits"))
+        if not number(value, f"limit of {name}") > 0.0:
+            raise UsageError(f"limit of {name} is {value!r}", remedy="give a positive number")
+    return Limits(**{name: float(value) for name, value in limits.items()})
 
 
 def time_grid(

@@ -42,6 +42,7 @@ def simulate(
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
     save: str | float = "all",
+    limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Solution: ...
@@ -59,6 +60,7 @@ def simulate(
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
     save: str | float = "all",
+    limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Solution | MechanicalSolution:
@@ -84,6 +86,9 @@ def simulate(
     save : what is kept of the run, which it never changes. "all"; "events": no states between them; "last-period": the
         last period of the forcing, states and events; a number: the last so much time, in the unit of t; "nothing":
         the state at the end, status and cost. With the last three a run of any length takes the same memory.
+    limits : what the run may cost, by name: "events", "steps", "seconds" by the clock, "megabytes" by which the process
+        grows. A run that has had its share stops soon after, with status "limit" and what it computed;
+        ``sol.resume()`` goes on from there, to the same digits as if it had never stopped.
     progress : called with the finished fraction of the span, from time to time.
     options : options of the integrator.
 
@@ -107,16 +112,21 @@ def simulate(
 
         return simulate_mechanical(
             model, t_span, x0=x0, integrator=integrator, rtol=rtol, atol=atol, max_step=max_step, t_eval=t_eval,
-            save=save, progress=progress, params=params, z0=z0, first_step=first_step, **options,
+            save=save, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
         )  # fmt: skip
     model = arguments.chosen_model(model, params)
     x0_states, model = arguments.start_values(model, x0)
     span = arguments.time_span(t_span)
+    callback = arguments.callback(progress)
+    from hybridsim.engine.driving import refuse_driving
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.python_code import PythonCode
     from hybridsim.engine.recent import system_of
+    from hybridsim.engine.stepping import Tolerances
+    from hybridsim.engine.trajectory import Task
     from hybridsim.integrators.automatic import choose
     from hybridsim.integrators.registry import make_integrator
+    from hybridsim.solution.run import Run
 
     announce_compilation()
     name = arguments.integrator_name(integrator)
@@ -135,49 +145,7 @@ def simulate(
     method.prepare(system)
     compile_time = time.perf_counter() - began
     _refuse_lacking(method, model, system, span)
-    return _run(
-        model,
-        system,
-        method,
-        span,
-        x0_states,
-        modes,
-        reason,
-        arguments.callback(progress),
-        compile_time,
-        t_eval,
-        save,
-        rtol,
-        atol,
-        max_step,
-        first_step,
-    )
-
-
-def _run(
-    model: Model,
-    system: System,
-    method: Integrator,
-    span: tuple[float, float],
-    x0: Mapping[str, float],
-    z0: np.ndarray,
-    reason: str,
-    progress: Callable[[float], None] | None,
-    compile_time: float,
-    t_eval: Sequence[float] | None,
-    save: str | float,
-    rtol: float | None,
-    atol: Any,
-    max_step: float,
-    first_step: float | None,
-) -> Solution:
-    from hybridsim.engine.driving import refuse_driving
-    from hybridsim.engine.python_code import PythonCode
-    from hybridsim.engine.stepping import Tolerances
-    from hybridsim.engine.trajectory import Task
-    from hybridsim.solution import Solution
-
-    start = system.start_state(x0)
+    start = system.start_state(x0_states)
     relative = arguments.relative_tolerance(rtol)
     tolerances = Tolerances(
         relative,
@@ -185,18 +153,11 @@ def _run(
         arguments.step_bound(max_step, "max_step"),
         None if first_step is None else arguments.step_bound(first_step, "first_step"),
     )
-    discrete = system.discrete_start
     keep = arguments.kept(save, system)
     grid = arguments.time_grid(t_eval, span, keep, save)
-    task = Task(span[0], span[1], start, z0, tolerances, discrete, keep)
-    refuse_driving(system, span[0], start, discrete, z0)
-    began = time.perf_counter()
-    trajectory = method.run(system, task, progress)
-    wall_time = time.perf_counter() - began
-    if isinstance(system.code, PythonCode):
-        system.code.report(trajectory)
-    trajectory.close(keep)
-    return Solution(model, system, trajectory, method.name, wall_time, compile_time, grid, span, save, reason)
+    task = Task(*span, start, modes, tolerances, system.discrete_start, keep, arguments.run_limits(limits))
+    refuse_driving(system, span[0], start, task.discrete, modes)
+    return Run(model, system, method, task, grid, save, reason).carried_out(callback, compile_time)
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
@@ -213,7 +174,8 @@ def _check_functions(method: Integrator, system: System, code: PythonCode, x0: n
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:
     needs = {
-        "contacts": any(a.has_surface and not a.is_unique for a in system.automata),
+        "contacts": any(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata),
+        "impacts": any(a.is_unilateral for a in system.automata),
         "sliding": any(a.is_unique for a in system.automata),
         "transitions": any(not a.has_surface for a in system.automata),
         "monitors": bool(model.monitors),

@@ -2,187 +2,164 @@
 
     python studies/chain.py [OUT_DIR]
 
-Beside hybridsim runs what one would write in an afternoon: fixed-step RK4 in numba, every step checked for
-contacts that stop or are torn loose, the earliest found by bisection, and the whole system restarted there.
+Beside hybridsim run heyoka, if it is installed (the extra of that name), and what one would write in an afternoon:
+fixed-step RK4 in numba with bisection.
 """
 
 from __future__ import annotations
 
-import math
+import importlib.util
+import os
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-import numba
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rivals import chain_rk4
+from rivals.page import machine
+
 import hybridsim as hs
+from hybridsim.plot import style
 
 SIZES = (10, 30, 100, 300, 1000)
 SPAN = {10: 200.0, 30: 100.0, 100: 40.0, 300: 15.0, 1000: 6.0}
-H, DELTA, BELT, COUPLING, LEAF = 0.01, 3.0, 0.2, 1.0, 1.0
+TURNS = {10: 20, 30: 10, 100: 5, 300: 3, 1000: 3}  # the least time of so many
+JUDGED = 5.0  # units of time after which states are compared: later, what is close parts by the motion itself
+STEP, DELTA, BELT, COUPLING, LEAF = 0.01, 3.0, 0.2, 1.0, 1.0
+CHAIN = (COUPLING, LEAF, DELTA, BELT)
+LINES = {  # of the picture: colour, marker
+    "hybridsim, rtol 1e-9": (style.PALETTE[0], "o-"),
+    "hybridsim, rtol 1e-6": (style.PALETTE[5], "s--"),
+    "heyoka, 1e-9": (style.PALETTE[2], "D-."),
+    f"RK4, h = {STEP:g}": (style.PALETTE[1], "^:"),
+}
+HAS_HEYOKA = importlib.util.find_spec("heyoka") is not None
+Run = Callable[[float], tuple[float, int, np.ndarray]]  # seconds, events and states of a run to an end
 
 
-@numba.njit(cache=False)
-def springs(x, i):
-    """Force of the springs on block i."""
-    n = x.shape[0]
-    force = -LEAF * x[i]
-    if i > 0:
-        force += COUPLING * (x[i - 1] - x[i])
-    if i < n - 1:
-        force += COUPLING * (x[i + 1] - x[i])
-    return force
+def ours(chain: hs.MechanicalSystem, rtol: float) -> Run:
+    """A run of the package, in its compiled loop."""
+
+    def run(end: float) -> tuple[float, int, np.ndarray]:
+        sol = hs.simulate(chain, (0, end), rtol=rtol, save="nothing")
+        assert sol.success, sol.message
+        return sol.stats["kernel_time"], int(sol.stats["events"]), sol.x_end
+
+    return run
 
 
-@numba.njit
-def rates(x, v, mode, dx, dv):
-    """Rates of positions and velocities; mode 0 sticks, else the direction of slip."""
-    for i in range(x.shape[0]):
-        dx[i] = v[i]
-        if mode[i] == 0:
-            dx[i], dv[i] = BELT, 0.0
-        else:
-            dv[i] = springs(x, i) - mode[i] / (1.0 + DELTA * mode[i] * (v[i] - BELT))
-
-
-@numba.njit
-def rk4(x, v, mode, h, k, x1, v1, y, w):
-    """One classical step of length h."""
-    rates(x, v, mode, k[0], k[1])
-    y[:], w[:] = x + 0.5 * h * k[0], v + 0.5 * h * k[1]
-    rates(y, w, mode, k[2], k[3])
-    y[:], w[:] = x + 0.5 * h * k[2], v + 0.5 * h * k[3]
-    rates(y, w, mode, k[4], k[5])
-    y[:], w[:] = x + h * k[4], v + h * k[5]
-    rates(y, w, mode, k[6], k[7])
-    x1[:] = x + h / 6.0 * (k[0] + 2.0 * k[2] + 2.0 * k[4] + k[6])
-    v1[:] = v + h / 6.0 * (k[1] + 2.0 * k[3] + 2.0 * k[5] + k[7])
-
-
-@numba.njit
-def fired(x, v, mode):
-    """The first block that has left its mode, or -1."""
-    for i in range(x.shape[0]):
-        if mode[i] == 0:
-            if abs(springs(x, i)) > 1.0:
-                return i
-        elif mode[i] * (v[i] - BELT) < 0.0:
-            return i
-    return -1
-
-
-@numba.njit
-def rk4_bisection(x, v, mode, end):
-    """Run to the end; the number of events."""
-    n, t, events = x.shape[0], 0.0, 0
-    k, x1, v1, y, w = np.empty((8, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    while t < end:
-        h = min(H, end - t)
-        rk4(x, v, mode, h, k, x1, v1, y, w)
-        i = fired(x1, v1, mode)
-        if i >= 0:
-            low, high = 0.0, h
-            for _ in range(40):
-                middle = 0.5 * (low + high)
-                rk4(x, v, mode, middle, k, x1, v1, y, w)
-                if fired(x1, v1, mode) >= 0:
-                    high = middle
-                else:
-                    low = middle
-            h = high
-            rk4(x, v, mode, h, k, x1, v1, y, w)
-            i, events = fired(x1, v1, mode), events + 1
-            if i >= 0:
-                force = springs(x1, i)
-                v1[i] = BELT
-                if mode[i] == 0 or abs(force) > 1.0:
-                    mode[i] = 1 if force > 0.0 else -1
-                    v1[i] += mode[i] * 1e-14
-                else:
-                    mode[i] = 0
-        x[:], v[:] = x1, v1
-        t += h
-    return events
-
-
-def ours(n: int, rtol: float) -> tuple[float, float, float, str]:
-    """ms and events per unit of time, us per event."""
+def runs_of(n: int) -> dict[str, Run]:
+    """All that run a chain of n blocks."""
     chain = hs.chain_on_belt(n, coupling=COUPLING, leaf=LEAF, delta=DELTA, belt=BELT)
-    hs.simulate(chain, (0, 0.5), save="nothing")
-    runs = [hs.simulate(chain, (0, SPAN[n]), rtol=rtol, save="nothing") for _ in range(3)]
-    best, events = min(sol.stats["kernel_time"] for sol in runs), runs[0].stats["events"]
-    return 1e3 * best / SPAN[n], events / SPAN[n], 1e6 * best / events, runs[0].status
+    found: dict[str, Run] = {f"hybridsim, rtol 1e-{p}": ours(chain, 10.0**-p) for p in (9, 6)}
+    if HAS_HEYOKA:
+        from rivals.chain_heyoka import prepared
+
+        found["heyoka, 1e-9"] = prepared(chain.q0, *CHAIN, 1e-9)
+    found[f"RK4, h = {STEP:g}"] = lambda end: chain_rk4.run(chain.q0, CHAIN, end, STEP)
+    return found
 
 
-def theirs(n: int) -> tuple[float, int]:
-    """ms per unit of time and events of RK4."""
+def measured(n: int) -> dict[str, tuple[float, float, float]]:
+    """Of each, ms per unit of time, events per unit of time, and the error after JUDGED."""
+    runs = runs_of(n)
     chain = hs.chain_on_belt(n, coupling=COUPLING, leaf=LEAF, delta=DELTA, belt=BELT)
-    rk4_bisection(chain.q0.copy(), chain.v0.copy(), np.full(n, -1), 0.1)
-    best, events = math.inf, 0
-    for _ in range(2):
-        x, v, mode = chain.q0.copy(), chain.v0.copy(), np.full(n, -1, dtype=np.int64)
-        began = time.perf_counter()
-        events = rk4_bisection(x, v, mode, SPAN[n])
-        best = min(best, time.perf_counter() - began)
-    return 1e3 * best / SPAN[n], events
+    truth = hs.simulate(chain, (0, JUDGED), rtol=1e-13, save="nothing").x_end
+    errors = {name: float(abs(run(JUDGED)[2] - truth).max()) for name, run in runs.items()}
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    events = {}
+    for _ in range(TURNS[n]):
+        for name, run in runs.items():
+            took, events[name], _ = run(SPAN[n])
+            seconds[name].append(took)
+    return {
+        name: (1e3 * min(took) / SPAN[n], events[name] / SPAN[n], errors[name])
+        for name, took in seconds.items()
+    }
+
+
+def picture(rows: dict[int, dict[str, tuple[float, float, float]]], path: Path) -> None:
+    """Time per event and per unit of time over the number of blocks."""
+    figure = style.figure(10.0, 4.2)
+    left, right = figure.subplots(1, 2)
+    for name in rows[SIZES[0]]:
+        colour, marks = LINES[name]
+        cost = np.array([rows[n][name][0] for n in SIZES])
+        events = np.array([rows[n][name][1] for n in SIZES])
+        left.loglog(SIZES, 1e3 * cost / events, marks, color=colour, label=name)
+        right.loglog(SIZES, cost, marks, color=colour, label=name)
+    left.set(xlabel="number of blocks n", ylabel="time per event / us")
+    right.set(xlabel="number of blocks n", ylabel="time per unit of simulated time / ms")
+    for axes in (left, right):
+        style.dress(axes)
+        axes.legend(fontsize=8)
+    style.save(figure, path)
 
 
 def main() -> None:
     """Measure, draw, write the page."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent / "docs"
-    rows = []
+    rows, load = {}, os.getloadavg()[0]
     for n in SIZES:
-        fine, coarse, rival = ours(n, 1e-9), ours(n, 1e-6), theirs(n)
-        rows.append((n, fine, coarse, rival))
-        print(n, fine, coarse, rival, flush=True)
-    sizes = np.array(SIZES, dtype=float)
-    per_event = np.array([row[1][2] for row in rows])
-    exponent = np.polyfit(np.log(sizes), np.log(per_event), 1)[0]
-    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
-    axes[0].loglog(sizes, per_event, "o-", color="#0072B2", label=f"rtol 1e-9, ~ n^{exponent:.2f}")
-    axes[0].loglog(sizes, [row[2][2] for row in rows], "s--", color="#56B4E9", label="rtol 1e-6")
-    rival_per_event = [1e3 * row[3][0] * SPAN[row[0]] / row[3][1] for row in rows]
-    axes[0].loglog(sizes, rival_per_event, "^:", color="#D55E00", label="RK4 with bisection, h = 0.01")
-    axes[0].set(xlabel="blocks n", ylabel="time per event / us")
-    axes[1].loglog(sizes, [row[1][0] for row in rows], "o-", color="#0072B2", label="hybridsim, rtol 1e-9")
-    axes[1].loglog(sizes, [row[2][0] for row in rows], "s--", color="#56B4E9", label="hybridsim, rtol 1e-6")
-    axes[1].loglog(
-        sizes, [row[3][0] for row in rows], "^:", color="#D55E00", label="RK4 with bisection, h = 0.01"
-    )
-    axes[1].set(xlabel="blocks n", ylabel="ms per unit of time")
-    for axis in axes:
-        axis.grid(alpha=0.3, which="both")
-        axis.legend(fontsize=8)
-    figure.savefig(out / "images" / "chain.png", dpi=130)
+        rows[n] = measured(n)
+        print(n, rows[n], flush=True)
+    picture(rows, out / "images" / "chain.png")
+    (out / "studies" / "chain.md").write_text(page(rows, load), encoding="utf-8")
+
+
+def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) -> str:
+    """The page, with its figures."""
+    names, fine = list(rows[SIZES[0]]), "hybridsim, rtol 1e-9"
+    per_event = [1e3 * rows[n][fine][0] / rows[n][fine][1] for n in SIZES]
+    exponent = np.polyfit(np.log(SIZES), np.log(per_event), 1)[0]
     table = "\n".join(
-        f"| {n} | {fine[1]:.3g} | {fine[2]:.3g} | {fine[0]:.3g} | {coarse[0]:.3g} | {rival[0]:.3g} |"
-        for n, fine, coarse, rival in rows
+        f"| {n} | {rows[n][fine][1]:.3g} | {us:.3g} | "
+        + " | ".join(f"{rows[n][name][0]:.3g} ({rows[n][name][2]:.0e})" for name in names)
+        + " |"
+        for n, us in zip(SIZES, per_event)
     )
-    (out / "studies" / "chain.md").write_text(
-        f"""# A chain of blocks: what an event costs
+    is_ahead = {n: HAS_HEYOKA and rows[n][fine][0] < rows[n]["heyoka, 1e-9"][0] for n in SIZES}
+    ahead, behind = (
+        ", ".join(str(n) for n in SIZES if is_ahead[n] is side) or "none" for side in (True, False)
+    )
+    verdict = ""
+    if HAS_HEYOKA:
+        verdict = f"""
+Against heyoka hybridsim is ahead for n = {ahead}, and behind for n = {behind}. heyoka expands the whole chain at
+every event, in code that is made and compiled for this one chain (not counted), and its event callbacks are Python;
+hybridsim's kernels are compiled once for all systems.
+"""
+    heads = " | ".join(names)
+    return f"""# A chain of blocks: what an event costs
 
 `hs.chain_on_belt(n)`: blocks of mass 1 on a belt of speed {BELT}, leaf springs {LEAF}, coupling {COUPLING}, friction
-1/(1 + {DELTA:g}|v|), from random positions. Made by `studies/chain.py`; every run finished. Times are those of
-the compiled loops on one core, the best of three (two for RK4); they depend on the machine, their ratios less.
+1/(1 + {DELTA:g}|v|), from random positions. Made by `python studies/chain.py`; every run finished. Each takes turns
+with the others, the least time counts. {machine()}
 
-| n | events per unit of time | us per event, rtol 1e-9 | ms per unit, rtol 1e-9 | rtol 1e-6 | RK4 with
-bisection, h = 0.01 | | --- | --- | --- | --- | --- | --- |
+When it began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. That makes all
+times longer, and ratios uncertain by a factor of two.
+
+Milliseconds per unit of simulated time, and in brackets the largest error of a state after {JUDGED:g} units, against a
+run of hybridsim at rtol 1e-13:
+
+| n | events per unit of time | us per event, hybridsim 1e-9 | {heads} |
+| --- | --- | --- | {" | ".join(["---"] * len(names))} |
 {table}
 
 ![Time per event and per unit of simulated time against the number of blocks](../images/chain.png)
 
-The time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose
-series it changes by more than a tenth of the tolerance; all blocks are expanded together only at the end of a
-step, which all events of the step share. RK4 with bisection restarts everything at each event: with n times
-the events, each n times as dear.
-
-The series control their error; RK4 with h = 0.01 does not. What it has torn loose it puts 1e-14 off the belt's speed,
-so that it is not stopped again at once.
-""",
-        encoding="utf-8",
-    )
+hybridsim's time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose
+series it changes by more than a tenth of the tolerance; all blocks are expanded together only at the end of a step,
+which all events of the step share. The others restart everything at each event: with n times the events, each n times
+as dear.
+{verdict}
+The series control their error; RK4 with h = {STEP:g} does not. What it has torn loose it puts 1e-14 off the belt's
+speed, so that it is not stopped again at once. siconos has no wheel on PyPI (`pip download siconos` finds no version),
+and was not run.
+"""
 
 
 if __name__ == "__main__":

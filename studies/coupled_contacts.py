@@ -1,17 +1,20 @@
 """Whether coupled contacts are decided rightly: random systems, every event against all combinations in 40 digits.
 
-python studies/coupled_contacts.py [systems]        (60 of each law by default; they make
-docs/studies/coupled-contacts.md)
+    python studies/coupled_contacts.py [systems]    (60 of each law by default)
+
+Writes docs/studies/coupled-contacts.md. The balance of energy of each run is looked at as well.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from mechanics.energy import balance
 from mechanics.enumeration import Enumeration
 from mechanics.random_systems import LAWS, random_system, reordered
 
@@ -22,8 +25,24 @@ MODES = {"stick": 0, "slip+": 1, "slip-": -1}
 SPAN, ORDERS, RTOL = 30.0, 3, 1e-11
 
 
-def examine(seed: int, law: str) -> tuple[int, int, int, float]:
-    """Instants decided, those not admissible, those with several outcomes, and the largest difference among orders."""
+@dataclass(frozen=True)
+class Found:
+    """Instants decided, those not admissible, those with several outcomes; largest difference among orders; energies.
+
+    miss is what the balance of energy leaves over and quadrature what its own order changes, relative to what friction
+    dissipates.
+    """
+
+    instants: int
+    wrong: int
+    several: int
+    apart: float
+    miss: float
+    quadrature: float
+
+
+def examine(seed: int, law: str) -> Found:
+    """One system over the whole span."""
     system = random_system(seed, law)
     sol = hs.simulate(system, (0, SPAN), rtol=RTOL)
     assert sol.success, (law, seed, sol.message)
@@ -43,22 +62,29 @@ def examine(seed: int, law: str) -> tuple[int, int, int, float]:
             wrong += 1
             print(law, seed, t, names, found, admissible)
         several += len(admissible) > 1
-    return len(instants), wrong, several, difference
+    energies, coarser = balance(sol), balance(sol, 16)
+    quadrature = abs(energies.friction - coarser.friction) / energies.dissipated
+    return Found(len(instants), wrong, several, difference, energies.miss, quadrature)
 
 
 def main() -> None:
     """Run all and write the page."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 60
-    rows = []
+    rows, energy = [], []
     for law in LAWS:
         found = [examine(seed, law) for seed in range(count)]
-        instants, wrong, several = (sum(row[i] for row in found) for i in range(3))
-        apart = sorted(row[3] for row in found)
+        instants, wrong, several = (
+            sum(getattr(f, key) for f in found) for key in ("instants", "wrong", "several")
+        )
+        apart, miss = (sorted(getattr(f, key) for f in found) for key in ("apart", "miss"))
         rows.append(
             f"| {law} | {count} | {instants} | {wrong} | {several} | {apart[count // 2]:.1e} | {apart[-1]:.1e} |"
         )
-        print(rows[-1], flush=True)
-    table = "\n".join(rows)
+        energy.append(
+            f"| {law} | {miss[count // 2]:.1e} | {miss[-1]:.1e} | {max(f.quadrature for f in found):.1e} |"
+        )
+        print(rows[-1], energy[-1], flush=True)
+    table, energies = "\n".join(rows), "\n".join(energy)
     PAGE.write_text(
         f"""# Coupled contacts
 
@@ -79,6 +105,20 @@ With one coefficient at rest the motion is unique; that several combinations are
 judge's, who looks at two derivatives, at none for redundant sets, and takes 1e-9 for zero. With static friction above
 kinetic there may be several outcomes; the run begins with all that may stick and lets go of what cannot hold.
 Differences among orders are rounding, grown as the motion itself makes neighbouring states part.
+
+## Work and energy
+
+Over each run the change of v.Mv/2 + q.Kq/2 is the work of the forcing, less that of the dampers and of friction.
+These works are integrals over the dense output, by Gauss-Legendre quadrature with 20 nodes between any two times at
+which a series begins or an event is. What the balance leaves over, relative to what friction dissipates, the
+integral of the sum of f (w.v - base):
+
+| law | left over: median | largest | 16 nodes instead of 20 change the work of friction by at most |
+| --- | --- | --- | --- |
+{energies}
+
+The runs are at rtol {RTOL:g}: a law whose force depends on the speed has the error of the run in its work, Coulomb's
+and that of two constants have rounding alone.
 """,
         encoding="utf-8",
     )

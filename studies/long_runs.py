@@ -1,4 +1,4 @@
-"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, an orbit without a stop over 10^6.
+"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, stick over 10^5, no stop over 10^6.
 
     python studies/long_runs.py [periods] [integrator]     (10^6 with dop853 by default; 10^4 take a minute)
 
@@ -20,6 +20,7 @@ import numpy as np
 import hybridsim as hs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from mechanics.stuck_systems import FORCING, stuck_system, ulps_off
 from reference.arithmetic import multiprecision
 from reference.dfcs_closed_form import Oscillator
 
@@ -117,6 +118,28 @@ def turned(
     )
 
 
+def stick(last: int) -> None:
+    """Two contacts over all of three coordinates, stuck for ever while the third way to move is shaken.
+
+    How far the relative velocities are off those of the bases, in ulp of the sum of their terms: read from the run at
+    all times of each window, and in the integrator's own state at the end of runs of each length.
+    """
+    period = 2 * math.pi / FORCING
+    for base in (0.0, 0.2):
+        system = stuck_system(base)
+        began = time.perf_counter()
+        sol = hs.simulate(system, (0, last * period), rtol=1e-6)
+        assert sol.success and not sol.events, sol.message
+        for checkpoint in [n for n in CHECKPOINTS if n <= last]:
+            window = sol(points((checkpoint - WINDOW) * period, checkpoint * period))
+            ended = hs.simulate(system, (0, checkpoint * period), rtol=1e-6, save="nothing").x_end
+            print(
+                f"stick, base {base:g}, {checkpoint:8d} periods: {ulps_off(system, window):.2g} ulp in the window, "
+                f"{ulps_off(system, ended[:, None]):.2g} at the end  ({time.perf_counter() - began:.0f} s)",
+                flush=True,
+            )
+
+
 def points(t0: float, t1: float) -> np.ndarray:
     """Times at all phases, none of which is that of a switch: its rounded time stands for the switch itself."""
     return t0 + (t1 - t0) * (np.arange(POINTS) + 1 / math.pi) / POINTS
@@ -134,4 +157,5 @@ if __name__ == "__main__":
     method = sys.argv[2] if len(sys.argv) > 2 else "dop853"
     for damping in (0.05, 0.0):
         square(min(longest, 10**4), damping, 1e-12, method)
+    stick(min(longest, 10**5))
     no_stop(longest, method)

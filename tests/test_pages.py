@@ -95,3 +95,20 @@ def test_the_page_on_many_contacts_runs_and_is_short(
     sol = runpy.run_path(str(script))["sol"]
     assert capsys.readouterr().out == "finished slip+\n"
     assert len(sol.modes) == 3
+
+
+def test_a_long_run_goes_on_and_explains_itself(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "how-to" / "long-runs.md"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", "\n".join(blocks(page, "python"))],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (shown,) = blocks(page, "text")
+    status, message, *explanation = done.stdout.splitlines()
+    assert status == "limit" and "500 were allowed" in message
+    rounded = r"within rounding \(\S+\)"  # of another machine's sine
+    assert re.sub(rounded, "", "\n".join(explanation)) == re.sub(rounded, "", shown.strip())

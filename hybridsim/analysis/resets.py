@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hybridsim.analysis.trajectory import EventLike
 from hybridsim.model import Model
+from hybridsim.model.impact import CLOSED, OPEN
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,11 @@ def resets_of(model: Model) -> Resets:
         for choice in guard.then
         if states & choice.reset.keys()
     )
+    transitions |= {
+        (impact.name, source, target)
+        for impact in model.impacts
+        for source, target in ((OPEN, OPEN), (OPEN, CLOSED), (CLOSED, OPEN))
+    }
     declared = [(monitor.name, monitor.reset) for monitor in model.monitors]
     declared += [(schedule.name, schedule.reset) for schedule in model.schedules]
     return Resets(transitions, frozenset(name for name, reset in declared if states & reset.keys()))

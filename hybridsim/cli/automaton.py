@@ -31,6 +31,7 @@ def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> I
     surfaces = {surface.name for surface in model.surfaces}
     for component in model.all_components():
         kind = "switching surface" if component.name in surfaces else "component"
+        kind = "impact" if component.surface and component.surface.is_unilateral else kind
         kind = f"contact, law {laws[component.name]}" if component.name in laws else kind
         yield from _section(f"{component.name}: {kind}", _component(component, report))
     yield from _section("corners and jumps", map(_primitive, primitives))
@@ -96,10 +97,15 @@ def _component(component: Component, report: Report) -> Iterator[str]:
     yield f"starts in {component.initial}" if component.initial else "starts as the initial state decides"
     sides: tuple[str, ...] = ()
     if surface := component.surface:
-        sides = (surface.above, surface.below, surface.hold)
+        sides = surface.modes
         held, projected = report.held.get(component.name), report.projected.get(component.name)
+        beyond = (
+            f"impacts of restitution {_flat(surface.restitution)} where it comes to 0"
+            if surface.restitution is not None
+            else f"{surface.below} where it is < 0"
+        )
         yield (
-            f"{surface.above} where {_flat(surface.function)} > 0, {surface.below} where it is < 0; "
+            f"{surface.above} where {_flat(surface.function)} > 0, {beyond}; "
             f"{surface.hold} keeps it at 0 by {surface.unknown}"
             + (f", with {held} exact" if held else "")
             + (f", with {', '.join(projected)} projected onto it" if projected else "")

@@ -1,7 +1,7 @@
 """From a command line to an exit code: no error of the user's ever ends in a traceback.
 
-Exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted (Ctrl-C), 141 the
-reader of the output went away. Data goes to stdout, everything else to stderr.
+Exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted (Ctrl-C), 143
+asked to end (SIGTERM), 141 the reader of the output went away. Data goes to stdout, everything else to stderr.
 """
 
 from __future__ import annotations
@@ -15,8 +15,20 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from hybridsim import __version__
-from hybridsim.cli import advise, cache, check, compare, integrators, models, run, steady, study, sweep
-from hybridsim.cli.output import INTERRUPTED, complain
+from hybridsim.cli import (
+    advise,
+    cache,
+    check,
+    compare,
+    integrators,
+    models,
+    resume,
+    run,
+    steady,
+    study,
+    sweep,
+)
+from hybridsim.cli.output import complain
 from hybridsim.cli.parser import Parser
 from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError
@@ -26,6 +38,7 @@ if TYPE_CHECKING:
 
 COMMANDS: tuple[ModuleType, ...] = (
     run,
+    resume,
     compare,
     advise,
     steady,
@@ -100,7 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _interrupted(session: Session) -> int:
     complain(f"interrupted; {session.kept()}")
-    return INTERRUPTED
+    return session.interrupted_code
 
 
 def _show_traceback_if_wanted() -> bool:

@@ -12,8 +12,6 @@ from typing import Any
 
 from hybridsim.errors import UsageError
 
-INTERRUPTED = 130  # 128 + SIGINT, as shells report it
-
 
 def complain(message: str) -> None:
     """Print a message for the person at the terminal."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from hybridsim.cli.output import complain
 
@@ -18,6 +19,7 @@ class Session:
     def __init__(self) -> None:
         self.written: list[Path] = []
         self.interrupted = False
+        self.interrupted_code = 128 + signal.SIGINT  # as shells report it
         self._gently = False
 
     def wrote(self, path: Path) -> None:
@@ -31,18 +33,25 @@ class Session:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Take notice of Ctrl-C, unless whoever started the program had it ignored, as a shell does for `&`."""
-        ours = (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        )
-        if ours:
-            signal.signal(signal.SIGINT, self._interrupt)
+        """Take notice of Ctrl-C and of being asked to end, unless whoever started the program had that ignored.
+
+        As a shell has Ctrl-C for `&`.
+        """
+        usual: dict[signal.Signals, Any] = {
+            signal.SIGINT: signal.default_int_handler,
+            signal.SIGTERM: signal.SIG_DFL,
+        }
+        is_main = threading.current_thread() is threading.main_thread()
+        ours = [
+            number for number, handler in usual.items() if is_main and signal.getsignal(number) is handler
+        ]
+        for number in ours:
+            signal.signal(number, self._interrupt)
         try:
             yield
         finally:
-            if ours:
-                signal.signal(signal.SIGINT, signal.default_int_handler)
+            for number in ours:
+                signal.signal(number, usual[number])
 
     @contextmanager
     def stopping_gently(self) -> Iterator[None]:
@@ -58,12 +67,13 @@ class Session:
             self._gently = False
 
     def stop_if_asked(self) -> None:
-        """Raise KeyboardInterrupt if Ctrl-C is waiting, or was taken by somebody for an error of another kind."""
+        """Raise KeyboardInterrupt if a signal is waiting, or was taken by somebody for an error of another kind."""
         if self.interrupted:
             raise KeyboardInterrupt
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         first, self.interrupted = not self.interrupted, True
+        self.interrupted_code = 128 + number
         if first and self._gently:
             complain("stopping at the next step; Ctrl-C once more stops at once")
         else:

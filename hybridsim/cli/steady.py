@@ -99,10 +99,12 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
             f"  period       {found.period:.12g}" + (f" (x {found.multiple})" if found.multiple > 1 else "")
         )
     lines.append(f"  modes        {' '.join(found.word)}")
-    for contact, share in record["stick_fraction"].items():
+    rubbing = {contact.name for contact in model.contacts}
+    for name, share in record["stick_fraction"].items():
+        work = f", work {record['dissipated'][name]:.6g}" if name in rubbing else ""
         lines.append(
-            f"  {contact:<12} {100.0 * share:.4g} % of the period in stick, "
-            f"{record['stops_per_period'][contact]:g} stops a period, work {record['dissipated'][contact]:.6g}"
+            f"  {name:<12} {100.0 * share:.4g} % of the period in {found.held_mode(name)}, "
+            f"{record['stops_per_period'][name]:g} stops a period{work}"
         )
     sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
     lines.append(f"  stable       {'yes' if found.stable else 'no'}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.output import INTERRUPTED, complain, require_folder
+from hybridsim.cli.output import complain, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import Place, SimulationError, UsageError
@@ -36,7 +36,9 @@ def add_to(commands: Any) -> None:
         help="measure a model at many values of its parameters",
         description="Measure a model at many values of its parameters: the steady state, or the end of a run. A point "
         "that fails leaves its status, and all the others.",
-        epilog=_EXAMPLES + "\nThe folder gets sweep.csv, sweep.json and sweep.png.",
+        epilog=_EXAMPLES
+        + "\nThe folder gets sweep.csv, sweep.json and sweep.png. Until then sweep.journal has what is done: the same "
+        "command goes on from there, after Ctrl-C or worse.",
     )
     values.add_model_arguments(parser)
     parser.add_argument(
@@ -90,6 +92,10 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
     import hybridsim
 
+    folder.mkdir(parents=True, exist_ok=True)
+    journal = folder / "sweep.journal"
+    if journal.exists():
+        complain(f"going on with {journal}")
     with Progress(session) as progress, session.stopping_gently():
         result = hybridsim.sweep(
             model,
@@ -98,21 +104,23 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             mode="list" if args.list else "grid",
             workers=args.workers,
             warm_start=args.warm_start,
+            journal=journal,
             progress=progress.of_steps,
             **given,
         )
+    if not result.interrupted:
+        journal.unlink()
     print(result.to_json() if args.json else result.table())
     _write(result, args.over, folder, session)
     for text, count in result.problems():
         complain(f"{count} of {result.status.size} points: {text}")
     if result.interrupted:
         complain(f"interrupted after {int((~result.failed).sum())} of {result.status.size} points")
-        return INTERRUPTED
+        return session.interrupted_code
     return SimulationError.exit_code if result.failed.all() else 0
 
 
 def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     result.to_csv(folder / "sweep.csv")
     session.wrote(folder / "sweep.csv")
     result.to_json(folder / "sweep.json")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.checkpoint import Pace
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import Instant
 
@@ -70,9 +71,19 @@ class Accumulation:
             abs(f - factor) <= 2.0 * _SAME_FACTOR * factor for f in factors
         )
 
-    def last_interval(self) -> float:
-        """Between the last two events."""
-        return self.intervals[-1] if self.intervals else 0.0
+    def last_intervals(self, count: int) -> float:
+        """What the last intervals add up to."""
+        return sum(list(self.intervals)[-count:])
+
+    def pace(self) -> Pace:
+        """What is known so far."""
+        return Pace(self.last, tuple(self.intervals), self.longest, self.forecast)
+
+    def go_on(self, pace: Pace) -> None:
+        """Take up what was known."""
+        self.last, intervals, self.longest, self.forecast = pace
+        self.intervals.clear()
+        self.intervals.extend(intervals)
 
     def begin_anew(self) -> None:
         """Forget the intervals: what came before has been dealt with."""

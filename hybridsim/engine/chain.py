@@ -31,6 +31,7 @@ class Chain(Sequence[Item]):
     def __init__(self, loose: Callable[[], Any], window: float | None = math.inf) -> None:
         self.blocks: list[Any] = []
         self._loose, self.window = loose, window
+        self.forgotten = 0  # blocks
 
     def append(self, item: Item) -> None:
         """One more item."""
@@ -61,6 +62,7 @@ class Chain(Sequence[Item]):
         now = self.blocks[-1].until
         while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > self.window:
             del self.blocks[0]
+            self.forgotten += 1
 
     def drop(self, count: int) -> None:
         """Let go of the first items."""
@@ -68,6 +70,30 @@ class Chain(Sequence[Item]):
             count -= len(self.blocks.pop(0))
         if count:
             self.blocks[0] = self.blocks[0].since(count)
+
+    def mark(self) -> tuple[int, int]:
+        """A place after the last item, for `since_mark`."""
+        blocks = self.blocks
+        return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
+
+    def since_mark(self, mark: tuple[int, int]) -> int:
+        """How many items came after a mark."""
+        number, length = mark[0] - self.forgotten, mark[1]
+        rest = len(self.blocks[number - 1]) - length if number > 0 else 0
+        return rest + sum(map(len, self.blocks[max(number, 0) :]))
+
+    def without_last(self, count: int) -> list[Any]:
+        """The blocks without so many items at the end, to go on with."""
+        blocks = list(self.blocks)
+        while blocks and count >= len(blocks[-1]):
+            count -= len(blocks.pop())
+        if blocks and count:
+            assert isinstance(blocks[-1], list), "a run goes on where a block in arrays ends"
+        if blocks and isinstance(blocks[-1], list):
+            last = self._loose()
+            last.extend(blocks[-1][: len(blocks[-1]) - count])
+            blocks[-1] = last
+        return blocks
 
     def starts(self) -> np.ndarray:
         """Number of the first item of each block, and of all items."""

@@ -120,16 +120,19 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
 
 
 @inlined
-def decreed_zeros(is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool) -> int:
+def decreed_zeros(
+    is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool, is_gap: bool
+) -> int:
     """How many leading coefficients of a guard of a candidate mode the event decrees to be zero.
 
     is_first: the first guard of a mode beside a surface is that surface. is_on: the surface is zero; is_holding: the
     candidate holds it; is_smooth: the component is released from it and all unknowns stay as they were, so that the
-    surface starts with a zero rate as well. is_fired: the guard was located at zero, its mode goes on, and it is still
+    surface starts with a zero rate as well. is_gap: the surface is a gap, which is on where its rate is zero too: one
+    more of each. is_fired: the guard was located at zero, its mode goes on, and it is still
     what was located: `is_decreed`.
     """
     if is_first and is_on and not is_holding:
-        return 2 if is_smooth else 1
+        return (2 if is_smooth else 1) + (1 if is_gap else 0)
     return 1 if is_fired else 0
 
 
@@ -144,21 +147,28 @@ def is_decreed(is_holding: bool, continuous: bool) -> bool:
 
 @kernel
 def decree_orders(
-    guards_of: Any, holding: Any, on_surface: Any, released: Any, continuous: bool, fired: Any, decreed: Any
+    guards_of: Any,
+    holding: Any,
+    on_surface: Any,
+    released: Any,
+    continuous: bool,
+    fired: Any,
+    gaps: Any,
+    decreed: Any,
 ) -> None:
     """Count the leading zeros that the event decrees for the guards of one candidate; see `decreed_zeros`.
 
     guards_of (components, widest): active guard numbers, -1 where none; holding[c]: component c holds its surface
     in this candidate; on_surface[c]: its surface is zero; released[c]: c leaves its holding mode here;
     continuous: every change of this candidate leaves the unknowns as they were; fired[g]: guard g was located at zero
-    and its mode goes on.
+    and its mode goes on; gaps[c]: the surface of c is a gap.
     """
     for c in range(guards_of.shape[0]):
         for j in range(guards_of.shape[1]):
             g = guards_of[c, j]
             if g >= 0:
                 smooth, at_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
-                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero)
+                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero, gaps[c])
 
 
 def joint_candidates(sizes: list[int]) -> np.ndarray:

@@ -21,7 +21,16 @@ def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarra
     except (ZeroDivisionError, ValueError, OverflowError):
         return  # not a number at the start: the run itself says where
     for c, effect in effects.items():
-        if effect >= 0.0 and not system.automata[c].is_unique:
+        automaton = system.automata[c]
+        if automaton.is_unilateral:
+            if effect <= 0.0:
+                raise ModelError(
+                    f"impact {automaton.name}: the force {automaton.name} pulls its gap shut instead of pushing it "
+                    f"open (its effect on the second derivative is {effect:.6g}, and should be positive)",
+                    place=system.model.all_components()[c].place,
+                    remedy=f"turn the sign of {automaton.name} in the rates round, or that of the gap",
+                )
+        elif effect >= 0.0 and not system.automata[c].is_unique:
             name = system.automata[c].name
             place = system.model.all_components()[c].place
             raise ModelError(

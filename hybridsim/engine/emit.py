@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pprint import pformat
 from typing import Any
 
+from hybridsim.engine.impulse_rows import impulses, restitutions, speed_name
 from hybridsim.engine.layout import SIGNAL_SLOTS
 from hybridsim.engine.lower import Lowering, Program, user
 from hybridsim.engine.program import Assign, Item, Switch, needed
@@ -94,7 +95,9 @@ class Emitter:
         where = {"s": "t", "origin": f"p[{layout.origin_at}]", "pin": f"p[{layout.pin_at}]"}
         where |= {user(q.name): f"p[{i}]" for i, q in enumerate(program.model.parameters)}
         where |= {user(q.name): f"p[{layout.discrete_at + i}]" for i, q in enumerate(program.model.discrete)}
-        where |= {f"raw_{i}": f"x[{i}]" for i in range(len(program.model.states))}
+        n = len(program.model.states)
+        where |= {f"raw_{i}": f"x[{i}]" for i in range(n)}
+        where |= {speed_name(k): f"x[{n + k}]" for k in range(len(program.surfaces))}
         where |= {f"phase_{i}": f"p[{layout.phases_at + i}]" for i in range(layout.phases)}
         for i in range(layout.signals):
             at = layout.signals_at + SIGNAL_SLOTS * i
@@ -119,6 +122,8 @@ class Emitter:
             self._function("quantities", self._quantities()),
             self._function("jumps", self._jumps()),
             self._function("effects", [(f"out[{k}]", e) for k, e in enumerate(self.lowering.effects)]),
+            self._function("impulses", impulses(self.lowering)),
+            self._function("restitutions", restitutions(self.lowering)),
             self._function("rates", [(f"out[{k}]", r) for k, r in enumerate(program.rates)]),
             self._choose(),
             self._reset(),

@@ -46,6 +46,15 @@ class ExactLeaper:
             layout.discrete,
         )
 
+    @property
+    def place(self) -> np.ndarray:
+        """How far ahead the tables reach."""
+        return np.array([self.horizon])
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        self.horizon = float(place[0])
+
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:

@@ -42,6 +42,22 @@ class StepSegments(Sequence[Segment]):
         longer = self._last > self._first
         self._first, self._last = self._first[longer], self._last[longer]
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All that it is made of; see `of_arrays`."""
+        used = slice(int(self._first[0]), int(self._last[-1]) + 1)
+        rows = {"s": self._s[used], "x": self._x[used], "z": self._z[used]}
+        return rows | {
+            "origin": np.array(self._origin),
+            "p": self._p,
+            "cuts": self._first[1:] - self._first[0],
+        }
+
+    @classmethod
+    def of_arrays(cls, system: System, arrays: dict[str, np.ndarray]) -> StepSegments:
+        """The same again."""
+        origin = Instant(*arrays["origin"].tolist())
+        return cls(system, origin, *(arrays[name] for name in ("p", "s", "x", "z", "cuts")))
+
     def __len__(self) -> int:
         return len(self._first)
 

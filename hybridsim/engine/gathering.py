@@ -1,4 +1,4 @@
-"""Where crossings of several switching surfaces accumulate: from there on the motion slides along all of them."""
+"""Where events accumulate: from there on the motion slides along their surfaces, or rests in their contacts."""
 
 from __future__ import annotations
 
@@ -13,22 +13,25 @@ _REACH = (
 )
 
 
-def gathered(system: System, outcome: Outcome, p: np.ndarray, left: float) -> Outcome | None:
-    """What holds where the surfaces come together, which the motion reaches within `left`; None if it does not slide.
+def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: float) -> Outcome | None:
+    """What holds at the limit, at local time s, of crossings or impacts; None if it is none of what can be held.
 
-    The surfaces are those that their rates may bring to zero in that time. The state is put onto them, by less than the
-    motion moves meanwhile; the decision is that of any event (`hybridsim.engine.settle`).
+    It is of the surfaces that their rates may bring to zero within the time `left`, and of the contacts whose gaps and
+    their rates come to zero in it. The state is put onto them, by less than the motion moves meanwhile; the decision is
+    that of any event (`hybridsim.engine.settle`).
     """
     near = _within_reach(system, outcome, p, left)
-    if len(near) < 2:
+    if len(near) < (1 if any(system.is_unilateral[near]) else 2):
         return None
     z = outcome.z.copy()
     z[near] = [system.automata[c].hold for c in near]
-    x = system.project(0.0, outcome.x, p, z)
+    x = system.project(s, outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z), p, z)
     z[near] = -1  # no mode yet: the decision takes them as they are at a start
-    at = Situation(0.0, x, p, z, outcome.x_error.copy(), 0.0)
+    at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
-    if found.status or any(found.z[c] != system.automata[c].hold for c in near):
+    if found.status or any(
+        found.z[c] != system.automata[c].hold for c in near if not system.is_unilateral[c]
+    ):
         return None
     found.changes = [
         Change(c, "side", int(outcome.z[c]), int(found.z[c]), outcome.x, found.x) for c in near
@@ -42,9 +45,12 @@ def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) 
     found = []
     for k, c in enumerate(system.surface_of):
         automaton = system.automata[c]
-        if not automaton.is_unique or outcome.z[c] == automaton.hold:
+        if not (automaton.is_unique or automaton.is_unilateral) or outcome.z[c] == automaton.hold:
             continue
-        value, rate = series.surfaces[k, :2]
-        if abs(value) <= _REACH * abs(rate) * left + series.surface_bounds[k, 0]:
+        (value, rate, curve), bounds = series.surfaces[k, :3], series.surface_bounds[k, :3]
+        is_near = abs(value) <= _REACH * abs(rate) * left + bounds[0]
+        if automaton.is_unilateral:
+            is_near = is_near and abs(rate) <= 2.0 * _REACH * abs(curve) * left + bounds[1]
+        if is_near:
             found.append(c)
     return found

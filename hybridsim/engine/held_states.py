@@ -1,9 +1,10 @@
-"""How a holding mode keeps its surface at zero: one state evaluated from the constraint, or a projection onto it."""
+"""How a holding mode keeps what it holds at zero: a state evaluated from each constraint, or a projection onto them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
 
@@ -14,63 +15,79 @@ if TYPE_CHECKING:
 # third is for stages of a step, which may be further away.
 _CORRECTIONS = 3
 
+Held = tuple[int, int]
+"""A constraint: its component, and 0 for s, 1 for the rate of a gap."""
+
 
 class HeldStates:
     """Which states the surfaces of a model hold, and the items that evaluate them.
 
     Parameters
     ----------
-    surfaces : component to its s over states, t and parameters; those alone that a mode can hold.
+    surfaces : what holding modes keep at zero, over states, t and parameters; of those alone that a mode can hold.
 
     Attributes
     ----------
-    pins : component to the index of the one state that is evaluated, where s is linear in it with a coefficient that no
-        state changes: it is exact then.
-    projected : component to the indices of the states of its s, for any other: they are moved along the gradients of
-        the surfaces that are held, by Newton's method. So are surfaces that share a state with one of these.
+    pins : constraint to the index of the one state that is evaluated, where it is linear in it with a coefficient that
+        no state changes: it is exact then. Two that never hold at once, such as two stops of one body, may share it.
+    projected : constraint to the indices of its states, for any other: they are moved along the gradients of
+        those that are held, by Newton's method. So are constraints that share a state with one of these.
     """
 
-    def __init__(self, lowering: Lowering, surfaces: dict[int, Any]) -> None:
+    def __init__(self, lowering: Lowering, surfaces: dict[Held, Any]) -> None:
         self.lowering, self.surfaces = lowering, surfaces
         self.states: list[Any] = lowering.states
-        choices = {c: self._linear_in(s) for c, s in surfaces.items()}
+        self._of_gaps = {x for c, k in surfaces if k == 1 for x in surfaces[c, 0].free_symbols}
+        choices = {c: self._linear_in(c) for c in surfaces}
         free = self._without_choice(choices)
         pins = self._chosen(choices, free)
         if pins is None:
             self._refuse_dependent(list(choices))
-            choices = {c: [] if lowering.components[c].surface.unique else i for c, i in choices.items()}
+            unique = {c for c in choices if lowering.components[c[0]].surface.unique}
+            choices = {c: [] if c in unique else i for c, i in choices.items()}
             free = self._without_choice(choices)
             pins = self._chosen(choices, free)
         if pins is None:
-            raise self._dependent(list(choices))
+            raise self._circle(list(choices))
         self.pins = pins
         self.projected = {c: self._uses(c) for c in surfaces if c in free}
-        self._lengths: dict[int, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
+        self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
+
+    def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
+        """Pins or projected states (an index or several for each constraint) as the engine knows them."""
+        found: dict[int, tuple[int, ...]] = {}
+        for (c, _), i in states.items():
+            found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))
+        return found
 
     # -- which ----------------------------------------------------------------------------------------------
 
-    def _linear_in(self, s: Any) -> list[int]:
-        """States in which s is linear with a coefficient free of states, the plainest first."""
+    def _linear_in(self, c: Held) -> list[int]:
+        """States in which a constraint is linear with a coefficient free of states, the plainest first.
+
+        For the rate of a gap velocities come before positions.
+        """
         sp, fixed = self.lowering.sp, set(self.states)
         found = []
         for i, x in enumerate(self.states):
-            slope = sp.diff(s, x)
+            slope = sp.diff(self.surfaces[c], x)
             if slope != 0 and not slope.free_symbols & fixed:
-                found.append((0 if abs(slope) == 1 else 1, i))
-        return [i for _, i in sorted(found)]
+                found.append((c[1] == 1 and x in self._of_gaps, 0 if abs(slope) == 1 else 1, i))
+        return [i for *_, i in sorted(found)]
 
-    def _uses(self, c: int) -> tuple[int, ...]:
+    def _uses(self, c: Held) -> tuple[int, ...]:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
-    def _without_choice(self, choices: dict[int, list[int]]) -> set[int]:
-        """Components that are projected: those linear in no state, and what shares states with them."""
+    def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
+        """Constraints that are projected: those linear in no state, and what shares states with them."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
-            if not self.lowering.components[c].surface.unique:
+            surface = self.lowering.components[c[0]].surface
+            if not (surface.unique or surface.is_unilateral):
                 raise ModelError(
-                    f"{self.lowering.components[c].name}: its relative velocity '{self.lowering.written(c)}' is linear "
-                    "in no state",
-                    place=self.lowering.place(c),
+                    f"{self.lowering.components[c[0]].name}: its relative velocity "
+                    f"'{self.lowering.written(c[0])}' is linear in no state",
+                    place=self.lowering.place(c[0]),
                     remedy="introduce the relative velocity as a state of its own",
                 )
         size = -1
@@ -80,20 +97,21 @@ class HeldStates:
             found |= {c for c in choices if moved & set(self._uses(c))}
         return found
 
-    def _chosen(self, choices: dict[int, list[int]], free: set[int]) -> dict[int, int] | None:
-        """One state for each surface that is not projected, no two alike, no circle; None where there is none."""
+    def _chosen(self, choices: dict[Held, list[int]], free: set[Held]) -> dict[Held, int] | None:
+        """One state for each constraint that is not projected, no two alike, no circle; None where there is none."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 
-    def _refuse_dependent(self, linear: list[int]) -> None:
+    def _refuse_dependent(self, linear: list[Held]) -> None:
         """Refuse surfaces of which one is zero where the others are."""
         sp = self.lowering.sp
         slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
         if not slopes.free_symbols & set(self.states) and slopes.rank() < len(linear):
             raise self._dependent(linear)
 
-    def _dependent(self, components: list[int]) -> ModelError:
+    def _dependent(self, held: list[Held]) -> ModelError:
         lowering = self.lowering
+        components = list(dict.fromkeys(c for c, _ in held))
         titles = dict.fromkeys(lowering.title(c, plural=True) for c in components)
         return ModelError(
             f"the {' and '.join(titles)} of "
@@ -103,26 +121,43 @@ class HeldStates:
             remedy="merge contacts that share one relative velocity, and surfaces that are one",
         )
 
+    def _circle(self, held: list[Held]) -> ModelError:
+        components = list(dict.fromkeys(c for c, _ in held))
+        names = ", ".join(self.lowering.components[c].name for c in components)
+        return ModelError(
+            f"the relative velocities of {names} go round in a circle: there is no order in which each gives one "
+            "state from the others",
+            place=self.lowering.place(components[0]),
+            remedy="introduce a relative velocity as a state of its own, or run an hs.MechanicalSystem",
+        )
+
     def _match(
-        self, open_: list[int], choices: dict[int, list[int]], taken: dict[int, int]
-    ) -> dict[int, int] | None:
+        self, open_: list[Held], choices: dict[Held, list[int]], taken: dict[Held, int]
+    ) -> dict[Held, int] | None:
         if not open_:
             return taken if self._acyclic(taken) else None
         for i in choices[open_[0]]:
-            if i not in taken.values():
+            if all(self._exclude(open_[0][0], c) for (c, _), j in taken.items() if i == j):
                 result = self._match(open_[1:], choices, taken | {open_[0]: i})
                 if result is not None:
                     return result
         return None
 
-    def _acyclic(self, pins: dict[int, int]) -> bool:
+    def _exclude(self, c: int, d: int) -> bool:
+        """Whether two gaps are never zero at once: one grows as the other shrinks, by as much."""
+        if not all(self.lowering.components[i].surface.is_unilateral for i in (c, d)):
+            return False
+        total = self.lowering.sp.simplify(self.surfaces[c, 0] + self.surfaces[d, 0])
+        return c != d and not total.free_symbols & {*self.states, self.lowering.s, self.lowering.t}
+
+    def _acyclic(self, pins: dict[Held, int]) -> bool:
         remaining = dict(pins)
         while remaining:
             free = [
                 c
                 for c, i in remaining.items()
                 if not self.surfaces[c].free_symbols
-                & {self.states[j] for d, j in remaining.items() if d != c}
+                & {self.states[j] for d, j in remaining.items() if d != c and j != i}
             ]
             if not free:
                 return False
@@ -135,21 +170,28 @@ class HeldStates:
     def items(self) -> list[Item]:
         """Effective states: a held one from its constraint, every other as integrated."""
         sp = self.lowering.sp
-        by_state = {i: c for c, i in self.pins.items()}
         moved = {i for states in self.projected.values() for i in states}
         items: list[Item] = self._projection(sorted(moved)) if moved else []
         for i, x in enumerate(self.states):
             raw = _raw(sp, i)
-            if i in by_state:
-                items.append(self._pinned(by_state[i], x, raw))
-            elif i not in moved:
+            holding = [c for c, j in self.pins.items() if i == j]
+            if not holding and i not in moved:
                 items.append(Assign(x.name, raw))
+            before = raw
+            for c in holding:  # no two of them hold at once
+                name = x.name if c == holding[-1] else f"pinned_{i}_{c[0]}"
+                items.append(self._pinned(c, x, name, raw, before))
+                before = sp.Symbol(name, real=True)
         return items
 
-    def _pinned(self, c: int, x: Any, raw: Any) -> Switch:
+    def _pinned(self, c: Held, x: Any, name: str, raw: Any, before: Any) -> Switch:
         sp, s = self.lowering.sp, self.surfaces[c]
         value = sp.simplify(-sp.expand(s).coeff(x, 0) / sp.diff(s, x))
-        return self._in_hold(c, x.name, _where_pinned(sp, value, raw), raw)
+        return self._in_hold(c[0], name, _where_pinned(sp, value, raw), before)
+
+    def holding(self, i: int) -> list[int]:
+        """The components that evaluate a state while they hold."""
+        return [c for (c, _), j in self.pins.items() if i == j]
 
     def _in_hold(self, c: int, name: str, value: Any, otherwise: Any) -> Switch:
         component = self.lowering.components[c]
@@ -165,28 +207,28 @@ class HeldStates:
         order = list(self.projected)
         at = {states[i]: _raw(sp, i) for i in moved}
         for k in range(_CORRECTIONS):
-            matrix: dict[tuple[int, int], Any] = {}
-            right: dict[int, Any] = {}
-            slopes: dict[tuple[int, int], Any] = {}
+            matrix: dict[tuple[Held, Held], Any] = {}
+            right: dict[Held, Any] = {}
+            slopes: dict[tuple[Held, int], Any] = {}
             for c in order:
                 s = self.surfaces[c]
                 for i in self.projected[c]:
-                    name = f"normal_{k}_{c}_{i}"
+                    name = f"normal_{k}_{_label(c)}_{i}"
                     items.append(Assign(name, sp.diff(s, states[i]).subs(at, simultaneous=True)))
                     slopes[c, i] = sp.Symbol(name, real=True)
-                name = f"miss_{k}_{c}"
-                items.append(self._in_hold(c, name, s.subs(at, simultaneous=True), sp.Integer(0)))
+                name = f"miss_{k}_{_label(c)}"
+                items.append(self._in_hold(c[0], name, s.subs(at, simultaneous=True), sp.Integer(0)))
                 right[c] = sp.Symbol(name, real=True)
             for c in order:
                 for d in order:
                     both = [i for i in self.projected[c] if i in self.projected[d]]
                     if both:
-                        name = f"metric_{k}_{c}_{d}"
+                        name = f"metric_{k}_{_label(c)}_{_label(d)}"
                         value = sp.Add(*(slopes[c, i] * slopes[d, i] for i in both))
-                        items.append(self._in_hold(c, name, value, sp.Integer(1 if c == d else 0)))
+                        items.append(self._in_hold(c[0], name, value, sp.Integer(1 if c == d else 0)))
                         matrix[c, d] = sp.Symbol(name, real=True)
-            length = {c: sp.Symbol(f"length_{k}_{c}", real=True) for c in order}
-            items += self.lowering.eliminate(order, length, matrix, right, prefix=f"p{k}_")
+            length = {c: sp.Symbol(f"length_{k}_{_label(c)}", real=True) for c in order}
+            items += eliminated(order, length, matrix, right, f"p{k}_", _label)
             self._lengths = {c: self._lengths[c] + length[c] for c in order}
             after = {}
             for i in moved:
@@ -220,6 +262,11 @@ class HeldStates:
             names[i] = f"turned_{i}"
             items.append(Assign(names[i], rate))
         return items, names
+
+
+def _label(c: Held) -> str:
+    """A constraint in names of the program."""
+    return f"{c[0]}" if c[1] == 0 else f"{c[0]}r"
 
 
 def _raw(sp: Any, i: int) -> Any:

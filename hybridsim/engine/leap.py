@@ -333,6 +333,6 @@ def holding(automata: Any, z: Any) -> bool:
 def landing(automata: Any, z: Any) -> bool:
     """Whether any component keeps its surface by projection, onto which each step is to land."""
     for c in range(z.shape[0]):
-        if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c] < 0:
+        if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c, 0] < 0:
             return True
     return False

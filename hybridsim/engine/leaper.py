@@ -132,6 +132,19 @@ class Leaper(ABC):
             np.empty((_SEGMENTS, 2, n)),
         )
 
+    @property
+    def place(self) -> np.ndarray:
+        """How far the rows are written, and how many there are: where the next call has to pause."""
+        return np.array([*self.used, self.steps], dtype=float)
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        rows, segments, steps = (int(number) for number in place)
+        if steps != self.steps:
+            self.steps = steps
+            self._renew()
+        self.used = (rows, segments)
+
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:

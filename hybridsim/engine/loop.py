@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
+from hybridsim.engine.checkpoint import Checkpoint, stopped_early
 from hybridsim.engine.decide import side_after
+from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import gathered
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
@@ -25,6 +29,9 @@ from hybridsim.engine.trajectory import Task, Trajectory
 
 # Local time rounds angles that grow in time, by 1e-13 after this many turns: a stretch without events begins anew then.
 _TURNS = 100
+_STATE = (
+    "x", "p", "z", "sides", "orders", "monitor_sides", "monitor_orders", "x_error", "guard_floors", "monitor_floors",
+)  # fmt: skip  # of an outcome: what a run needs to go on
 
 
 class ModeLoop:
@@ -35,7 +42,8 @@ class ModeLoop:
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
-        self.record = Trajectory(system, task.keep)
+        self.record = task.record or Trajectory(system, task.keep)
+        self.gauge = Gauge(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.crossed_by_reset: dict[
@@ -48,10 +56,16 @@ class ModeLoop:
         self.p: np.ndarray
         self.accumulation = Accumulation()
         self.leaper = self._leaper()
-        self.progress: Callable[[Instant], None] | None = None
-        if progress is not None:
-            span = task.t1 - task.t0
-            self.progress = lambda instant: progress((float(instant) - task.t0) / span)
+        self._told = progress
+
+    def _progress(self, instant: Instant) -> None:
+        """So far the run has come; raises LimitReached."""
+        self._tell(instant)
+        self.gauge.check()
+
+    def _tell(self, instant: Instant) -> None:
+        if self._told is not None:
+            self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
 
     def _leaper(self) -> Leaps | None:
         """The compiled loop, where method and model allow it."""
@@ -65,32 +79,44 @@ class ModeLoop:
         try:
             self._run()
         except StepFailure as failure:
-            self.record.status, self.record.message = (
-                "step-failure",
-                f"after t = {float(self.origin)!r}: {failure}",
-            )
+            self.record.status = "step-failure"
+            self.record.message = f"after t = {float(self.origin)!r}: {failure}{self._in_the_way()}"
+        except LimitReached as reached:
+            self.record.status, self.record.message = "limit", stopped_early(str(reached), self.origin)
         except KeyboardInterrupt:
-            self.record.status = "interrupted"
-            self.record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
+            self.record.status, self.record.message = "interrupted", stopped_early("", self.origin)
         if self.adopted == self.origin:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
             )
+        self.record.seal()
         return self.record
+
+    def _in_the_way(self) -> str:
+        why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
+        return f"; {why}" if why else ""
 
     def _run(self) -> None:
         task, system = self.task, self.system
-        p = system.vector(self.origin, task.discrete, self.forward)
-        due = self.timetable.due_at_start(self.origin) if self.forward else ()
-        self.timetable.kept(self.origin)
-        stop = self._adopt(self.origin, settled_start(system, task, p, due), task.x0, due, ())
-        step_size = task.tolerances.first_step
+        checkpoint = self.record.checkpoint
+        if checkpoint is not None:
+            stop, step_size = False, self._go_on_from(checkpoint)
+        else:
+            p = system.vector(self.origin, task.discrete, self.forward)
+            due = self.timetable.due_at_start(self.origin) if self.forward else ()
+            self.timetable.kept(self.origin)
+            stop = self._adopt(self.origin, settled_start(system, task, p, due), task.x0, due, ())
+            step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
+            self._mark(step_size)
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
             if self.leaper is not None and not self.accumulation.is_under_way():
                 arrived, stop = self._leap(self.leaper, target, appointment)
                 if arrived or stop:
+                    if not stop:
+                        self._mark(None)
+                        self._progress(self.origin)
                     continue
             if abs(target.minus(self.origin)) > self.renewal:
                 target = self.origin.plus(self.renewal if self.forward else -self.renewal)
@@ -106,14 +132,39 @@ class ModeLoop:
             stop = self._settle(instant, arrival, appointment if at_target else None, segment)
             step_size = segment.last_step if self.outcome.continuous else None
 
+    def _mark(self, step_size: float | None) -> None:
+        """Note a state from which the run could go on, where an event has just been settled."""
+        if self.adopted != self.origin:
+            return
+        outcome = self.outcome
+        arrays = {name: getattr(outcome, name) for name in _STATE}
+        size = math.nan if step_size is None else step_size
+        arrays |= {"continuous": np.array(outcome.continuous), "step_size": np.array(size)}
+        if self.leaper is not None:
+            arrays["place"] = self.leaper.place
+        self.record.mark(Checkpoint(self.origin, arrays, self.timetable.settled, self.accumulation.pace()))
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
+        """Take a noted state up; the step size to begin with."""
+        arrays = checkpoint.arrays
+        self.origin = self.adopted = checkpoint.instant
+        if checkpoint.settled is not None:
+            self.timetable.kept(checkpoint.settled)
+        self.accumulation.go_on(checkpoint.pace)
+        state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
+        self.outcome = Outcome(**state, continuous=bool(arrays["continuous"]))
+        self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
+        if self.leaper is not None and "place" in arrays:
+            self.leaper.place = arrays["place"]
+        step_size = float(arrays["step_size"])
+        return None if math.isnan(step_size) else step_size
+
     def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
         """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
         while True:
             landing = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
             self.origin, self.outcome = landing.origin, landing.outcome
             arrived = landing.end == ARRIVED
-            if self.progress:
-                self.progress(self.origin)
             if len(landing.instants):
                 self.adopted = Instant(*landing.instants[-1].tolist())
             if not arrived or self.adopted == self.origin:
@@ -122,9 +173,14 @@ class ModeLoop:
                 return arrived, True
             if landing.end != PAUSED:
                 break
+            self._mark(None)
+            self._progress(self.origin)
         if not arrived:
+            self._mark(None)
+            self._progress(self.origin)
             return False, False
         if appointment is None:
+            self._tell(self.origin)
             return True, True
         self.timetable.kept(target)
         x = self.outcome.x
@@ -155,7 +211,7 @@ class ModeLoop:
             self.task.tolerances,
             self.record.counters,
             self.forward,
-            self.progress,
+            self._progress,
         )
 
     def _keep(self, run: SegmentRun) -> None:
@@ -304,6 +360,13 @@ class ModeLoop:
 
     def _accumulated(self, instants: np.ndarray) -> bool:
         """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
+        automata = self.system.automata
+        if any(
+            automata[c.component].is_unilateral and c.target == automata[c.component].hold
+            for c in self.outcome.changes
+        ):
+            self.accumulation.begin_anew()  # a contact that has closed bounces no more
+            return False
         limit = self.accumulation.limit_of_all(instants)
         if limit is None or self._gathered(limit):
             return False
@@ -312,13 +375,14 @@ class ModeLoop:
         return True
 
     def _gathered(self, limit: float) -> bool:
-        """Whether the motion goes on sliding along the surfaces whose crossings accumulate."""
-        left = abs(limit - float(self.origin)) + self.accumulation.last_interval()
-        found = gathered(self.system, self.outcome, self.p, left) if self.forward else None
+        """Whether the motion goes on along surfaces whose crossings accumulate, or in contacts whose impacts do."""
+        ahead = max(Instant(limit).minus(self.origin), 0.0)
+        left = ahead + self.accumulation.last_intervals(2)
+        found = gathered(self.system, self.outcome, self.p, ahead, left) if self.forward else None
         if found is None:
             return False
         self.accumulation.begin_anew()
-        self._adopt(self.origin, found, self.outcome.x, (), ())
+        self._adopt(self.origin.plus(ahead), found, self.outcome.x, (), ())
         return True
 
     def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.program import Assign, Item, Switch, ordered
@@ -37,7 +39,7 @@ class Program:
     items: list[Item]
     derivatives: list[str]
     surfaces: list[tuple[int, str]]  # (component, name of s)
-    pins: dict[int, int]  # component -> index of the state that its holding mode evaluates
+    pins: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode evaluates
     projected: dict[int, tuple[int, ...]]  # component -> those that its holding mode projects instead
     rates: list[Any]  # SymPy, parameters only
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
@@ -72,7 +74,13 @@ class Lowering:
         self.parameters = {self.symbols[p.name] for p in model.parameters}
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
+        self.unknown: dict[int, Any] = {}  # of each surface
+        self.definitions: dict[Any, Any] = {}
         self.effects: list[Any] = []  # of each unknown on the rate of its own surface
+        self.held_rates: dict[
+            int, Any
+        ] = {}  # what each unknown acts on the rate of: a surface, or the rate of a gap
+        self.open_rates: list[Any] = []  # of the states, over the unknowns
         self.never_held: set[int] = (
             set()
         )  # components whose unknown does not act on the rate of their surface
@@ -142,7 +150,10 @@ class Lowering:
     def lower(self) -> Program:
         """Run all the steps."""
         model, sp = self.model, self.sp
-        definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
+        self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
+        ordered(
+            [Assign(k.name, e) for k, e in definitions.items()]
+        )  # a circle could not be put in without end
         signals = {self.symbols[i.name]: self.signal(k) for k, i in enumerate(model.inputs)}
         der = [self.convert(s.der) for s in model.states]
         items: list[Item] = [Assign(user("t"), sp.Symbol("origin", real=True) + self.s)]
@@ -153,12 +164,14 @@ class Lowering:
             if comp.surface
         }
         self._check_surfaces(surfaces)
-        unknown_items, clusters = self._unknowns(surfaces, der, definitions)
-        held = HeldStates(self, {c: s for c, s in surfaces.items() if c not in self.never_held})
+        gap_rates = self._gap_rates(surfaces, der, definitions | signals)
+        unknown_items, clusters = self._unknowns(surfaces | gap_rates, der, definitions)
+        constraints = {(c, 0): s for c, s in surfaces.items() if c not in self.never_held}
+        held = HeldStates(self, constraints | {(c, 1): rate for c, rate in gap_rates.items()})
         items += held.items()
         items += self._mode_variables()
         items += unknown_items
-        derivative_items, derivatives = self._derivatives(der, held.pins)
+        derivative_items, derivatives = self._derivatives(der, held)
         turning_items, derivatives = held.turned(derivatives)
         items += derivative_items + turning_items
         items += [Assign(f"surface_{c}", s) for c, s in surfaces.items()]
@@ -170,8 +183,8 @@ class Lowering:
             ordered(items),
             derivatives,
             [(c, f"surface_{c}") for c in surfaces],
-            held.pins,
-            held.projected,
+            held.by_component(held.pins),
+            held.by_component(held.projected),
             self.rates,
             clusters,
             [self._jump(c) for c in surfaces],
@@ -180,17 +193,43 @@ class Lowering:
         )
         return program
 
+    def _gap_rates(
+        self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
+    ) -> dict[int, Any]:
+        """Rates of the gaps of unilateral contacts, by component, over states, t and parameters."""
+        found: dict[int, Any] = {}
+        for c, s in surfaces.items():
+            if not self.components[c].surface.is_unilateral:
+                continue
+            slopes = [(self.sp.diff(s, x), d) for x, d in zip(self.states, der, strict=True)]
+            rate = self._rate_in_time(s) + sum(a * self._inline(d, definitions) for a, d in slopes if a != 0)
+            wrong = sorted(map(_name, self._foreign(rate)))
+            if wrong or rate == 0:
+                fault = f"uses {', '.join(wrong)}, which depends on a mode" if wrong else "is zero"
+                raise ModelError(
+                    f"impact {self.components[c].name}: the rate of its gap '{self.written(c)}' {fault}",
+                    place=self.place(c),
+                    remedy="write the gap over positions, whose rates are velocities; forces change these",
+                )
+            found[c] = rate
+        return found
+
+    def inlined(self, expression: Expression) -> Any:
+        """A declared expression in SymPy with the definitions put in."""
+        return self._inline(self.convert(expression), self.definitions)
+
+    def _rate_in_time(self, s: Any) -> Any:
+        """The rate of an expression while the states stay."""
+        return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
+
     def _inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
         while e.free_symbols & definitions.keys():
             e = e.subs(definitions)
         return e
 
     def _check_surfaces(self, surfaces: dict[int, Any]) -> None:
-        allowed = self.parameters | set(self.states) | {self.t, self.s}
-        allowed |= {self.symbols[d.name] for d in self.model.discrete}
         for c, s in surfaces.items():
-            wrong = [n for n in s.free_symbols - allowed if n.name.startswith("v_")]
-            if wrong:
+            if wrong := self._foreign(s):
                 names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
                 raise ModelError(
                     f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
@@ -199,11 +238,19 @@ class Lowering:
                     remedy="write it over states, inputs, parameters and t",
                 )
 
+    def _foreign(self, e: Any) -> list[Any]:
+        """The names in an expression that depend on a mode."""
+        allowed = self.parameters | set(self.states) | {self.t, self.s}
+        allowed |= {self.symbols[d.name] for d in self.model.discrete}
+        return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
+
     def title(self, c: int, plural: bool = False) -> str:
         """What a surface's function is called."""
         one, many = "relative velocity", "relative velocities"
         if self.components[c].surface.unique:
             one, many = "switching function", "switching functions"
+        elif self.components[c].surface.is_unilateral:
+            one, many = "gap", "gaps"
         return many if plural else one
 
     def written(self, c: int) -> str:
@@ -231,13 +278,14 @@ class Lowering:
         sp = self.sp
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
+        self.held_rates, self.unknown = surfaces, unknown
         all_unknown = set(unknown.values())
         blends = self._blends()
         rate: dict[int, Any] = {}
         effect: dict[tuple[int, int], Any] = {}
         for c in order:
             s = surfaces[c]
-            total = sp.diff(s, self.s) + sp.diff(s, self.t)
+            total = self._rate_in_time(s)
             for x, d in zip(self.states, der, strict=True):
                 slope = sp.diff(s, x)
                 if slope != 0:
@@ -251,20 +299,21 @@ class Lowering:
             if effect[c, c] == 0:
                 if not self.components[c].surface.unique:
                     raise ModelError(
-                        f"{_name(unknown[c])} does not act on its own relative velocity "
+                        f"{_name(unknown[c])} does not act on its own {self.title(c)} "
                         f"'{self.written(c)}' ({self.components[c].name}): it can never hold it",
                         place=self.place(c),
                         remedy=f"use {_name(unknown[c])} in the derivative of the velocity state",
                     )
                 self.never_held.add(c)
+        self.open_rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
         switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
         if switching:
-            rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
-            self._refuse_powers(switching, rates)
-        clusters = self._clusters(order, effect)
+            self._refuse_powers(switching, self.open_rates)
+        loads = self._loads(unknown, definitions)
+        clusters = self._clusters(order, effect, loads)
         items: list[Item] = []
         for cluster in clusters:
-            items += self._solve(cluster, unknown, rate, effect)
+            items += self._solve(cluster, unknown, rate, effect, loads)
         for c in order:
             if self.components[c].surface.unique:
                 pull = sp.Integer(-1) if c in self.never_held else -effect[c, c]
@@ -321,10 +370,50 @@ class Lowering:
         inner = {k: d for k, d in definitions.items() if self._inline(d, definitions).free_symbols & unknown}
         return self._inline(e, inner)
 
-    def _clusters(self, order: list[int], effect: dict[tuple[int, int], Any]) -> list[list[int]]:
+    def _loads(
+        self, unknown: dict[int, Any], definitions: dict[Any, Any]
+    ) -> dict[tuple[int, int], dict[str, Any]]:
+        """By how much the force of slip of a contact grows with a normal force, by (contact, impact) and mode.
+
+        A normal force that a contact's guards alone use has an entry without modes.
+        """
+        normal = {u: d for d, u in unknown.items() if self.components[d].surface.is_unilateral}
+        found: dict[tuple[int, int], dict[str, Any]] = {}
+        for c, component in enumerate(self.components):
+            if c in normal.values() or not normal:
+                continue
+            for m in component.modes:
+                values = {n: self._inline(self.convert(e), definitions) for n, e in m.set.items()}
+                guards = [self._inline(self.convert(g.expr), definitions) for g in m.guards]
+                used = {u for e in (*values.values(), *guards) for u in e.free_symbols} & normal.keys()
+                for u in used:
+                    slopes = {n: self.sp.simplify(self.sp.diff(e, u)) for n, e in values.items() if e.has(u)}
+                    own = unknown.get(c)
+                    if set(slopes) - {_name(own) if own is not None else None} or any(
+                        e.free_symbols & set(unknown.values()) for e in slopes.values()
+                    ):
+                        raise ModelError(
+                            f"{component.name} uses the normal force {_name(u)} of an impact otherwise than as a "
+                            "load that friction of slip and stick is proportional to",
+                            place=component.place,
+                            remedy="take a law of slip and stick that is linear in its load; write rates with "
+                            f"{_name(u)} in them as the rates of states",
+                        )
+                    if own is not None:
+                        by_mode = found.setdefault((c, normal[u]), {})
+                        if slopes:
+                            by_mode[m.name] = slopes[_name(own)]
+        return found
+
+    def _clusters(
+        self, order: list[int], effect: dict[tuple[int, int], Any], loads: Container[tuple[int, int]]
+    ) -> list[list[int]]:
+        def act(c: int, d: int) -> bool:
+            return effect[c, d] != 0 or (c, d) in loads
+
         clusters: list[list[int]] = []
         for c in order:
-            linked = [g for g in clusters if any(effect[c, d] != 0 or effect[d, c] != 0 for d in g)]
+            linked = [g for g in clusters if any(act(c, d) or act(d, c) for d in g)]
             clusters = [g for g in clusters if g not in linked] + [
                 sorted([c, *(d for g in linked for d in g)])
             ]
@@ -336,6 +425,7 @@ class Lowering:
         unknown: dict[int, Any],
         rate: dict[int, Any],
         effect: dict[tuple[int, int], Any],
+        loads: dict[tuple[int, int], dict[str, Any]],
     ) -> list[Item]:
         sp = self.sp
         items: list[Item] = []
@@ -349,85 +439,56 @@ class Lowering:
             if value.count_ops() < 200:
                 value = sp.expand(sp.cancel(sp.together(value)))
             return [branches(c, unknown[c].name, value)]
-        # joint solve: rows of components that do not hold read "unknown = its declared value", and it is 0 in the mode
-        # of one that never holds, which is not entered
+        # joint solve: rows of components that do not hold read "unknown = its declared value", less what that has from
+        # normal forces among the unknowns; it is 0 in the mode of one that never holds, which is not entered
         matrix: dict[tuple[int, int], Any] = {}
         right: dict[int, Any] = {}
         for c in cluster:
+            given = {unknown[d]: 0 for d in cluster if (c, d) in loads}
             for d in cluster:
-                if effect[c, d] == 0 and c != d:
+                by_mode = loads.get((c, d), {})
+                if effect[c, d] == 0 and c != d and not by_mode:
                     continue
                 name = f"effect_{c}_{d}"
-                off = sp.Integer(1 if c == d else 0)
-                items.append(branches(c, name, off if c in self.never_held else effect[c, d], off))
+                off = {m.name: -by_mode.get(m.name, sp.Integer(0)) for m in self.components[c].modes}
+                off = dict.fromkeys(off, sp.Integer(1)) if c == d else off
+                held = off[self.components[c].surface.hold] if c in self.never_held else effect[c, d]
+                items.append(branches(c, name, held, off))
                 matrix[c, d] = sp.Symbol(name, real=True)
-            items.append(branches(c, f"right_{c}", sp.Integer(0) if c in self.never_held else -rate[c]))
+            hold = sp.Integer(0) if c in self.never_held else -rate[c]
+            items.append(branches(c, f"right_{c}", hold, without=given))
             right[c] = sp.Symbol(f"right_{c}", real=True)
-        items += self.eliminate(cluster, unknown, matrix, right)
-        return items
+        return items + eliminated(cluster, unknown, matrix, right)
 
-    def _in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None) -> Switch:
-        """A name with one value in the holding mode; in the others another, or what they declare for the unknown."""
+    def _in_modes(
+        self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None
+    ) -> Switch:
+        """A name with one value in the holding mode; in the others another, or what they declare for the unknown.
+
+        otherwise : by mode. without : values of names in what is declared.
+        """
         component = self.components[c]
         surface = component.surface
         rows = []
         for m in component.modes:
             value = in_hold
             if m.name != surface.hold:
-                value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise
+                value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise[m.name]
+                if without:
+                    value = self._inline(value, self.definitions).subs(without)
             rows.append((Assign(name, value),))
         return Switch(c, tuple(rows))
 
-    def eliminate(
-        self,
-        cluster: list[int],
-        unknown: dict[int, Any],
-        matrix: dict[tuple[int, int], Any],
-        right: dict[int, Any],
-        prefix: str = "",
-    ) -> list[Item]:
-        """Gaussian elimination without exchanges: of matrices whose leading minors do not vanish.
-
-        The effects of forces on accelerations are definite, and those of relays that keep their surfaces have positive
-        principal minors.
-        """
-        sp = self.sp
-        items: list[Item] = []
-
-        def fresh(name: str, value: Any) -> Any:
-            items.append(Assign(name, value))
-            return sp.Symbol(name, real=True)
-
-        for a, c in enumerate(cluster):
-            for d in cluster[a + 1 :]:
-                if (d, c) not in matrix:
-                    continue
-                factor = fresh(f"{prefix}factor_{d}_{c}", matrix.pop((d, c)) / matrix[c, c])
-                for e in cluster[a + 1 :]:
-                    if (c, e) in matrix:
-                        value = matrix.get((d, e), sp.Integer(0)) - factor * matrix[c, e]
-                        matrix[d, e] = fresh(f"{prefix}pivot_{a}_{d}_{e}", value)
-                right[d] = fresh(f"{prefix}right_{a}_{d}", right[d] - factor * right[c])
-        for a in reversed(range(len(cluster))):
-            c = cluster[a]
-            value = right[c]
-            for d in cluster[a + 1 :]:
-                if (c, d) in matrix:
-                    value -= matrix[c, d] * unknown[d]
-            items.append(Assign(unknown[c].name, value / matrix[c, c]))
-        return items
-
-    def _derivatives(self, der: list[Any], pins: dict[int, int]) -> tuple[list[Item], list[str]]:
+    def _derivatives(self, der: list[Any], held: HeldStates) -> tuple[list[Item], list[str]]:
         items: list[Item] = []
         names = [f"d_{i}" for i in range(len(der))]
-        by_state = {i: c for c, i in pins.items()}
         for i, (name, e) in enumerate(zip(names, der, strict=True)):
             state = self.model.states[i].name
             overriding = [
                 c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)
             ]
-            if i in by_state:
-                overriding.append(by_state[i])
+            holding = held.holding(i)
+            overriding += holding[:1]
             if not overriding:
                 items.append(Assign(name, e))
                 continue
@@ -438,14 +499,17 @@ class Lowering:
                     place=self.components[overriding[-1]].place,
                     remedy="let one component change it",
                 )
-            component = self.components[overriding[0]]
-            hold = component.surface.hold if i in by_state and component.surface else None
             free = self.sp.Piecewise((0, self.sp.Symbol("pin", real=True) > 0), (e, True))
-            branches = []
-            for m in component.modes:
-                value = self.convert(m.der[state]) if state in m.der else e
-                branches.append((Assign(name, free if m.name == hold else value),))
-            items.append(Switch(overriding[0], tuple(branches)))
+            for c in holding or overriding:  # no two that hold one state do so at once
+                component = self.components[c]
+                hold = component.surface.hold if holding else None
+                target = name if c == (holding or overriding)[-1] else f"{name}_{c}"
+                branches = []
+                for m in component.modes:
+                    value = self.convert(m.der[state]) if state in m.der else e
+                    branches.append((Assign(target, free if m.name == hold else value),))
+                items.append(Switch(c, tuple(branches)))
+                e = self.sp.Symbol(target, real=True)
         return items, names
 
     def _guards(self) -> tuple[list[Item], dict[tuple[int, int, int], tuple[Any, ...]]]:

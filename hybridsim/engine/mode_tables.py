@@ -16,10 +16,11 @@ _LONGEST = 256  # vectors of modes on a shelf that is shared: each event searche
 class Automata(NamedTuple):
     """What does not change: components, their guards, clusters, choices. -1 stands for none.
 
-    guards_of (C, M, W); hold, above, pin, surface (C,); owner, place (G,): component of a guard, index in its mode;
+    guards_of (C, M, W); hold, above, surface (C,); pin (C, most): states
+    that a holding mode evaluates; owner, place (G,): component of a guard, index in its mode;
     cluster_start (C + 1,), cluster (members): the cluster of each component; target, reset (C, M, W, T) of choices;
     reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index);
-    is_corner, is_unique (C,).
+    is_corner, is_unique, is_unilateral (C,).
     """
 
     guards_of: np.ndarray
@@ -37,6 +38,7 @@ class Automata(NamedTuple):
     reset_slot: np.ndarray
     is_corner: np.ndarray
     is_unique: np.ndarray
+    is_unilateral: np.ndarray
 
 
 class Tapes(NamedTuple):
@@ -90,12 +92,15 @@ def _automata(system: System) -> Automata:
     for members in system.clusters:
         for c in members:
             cluster_of[c] = list(members)
+    pin = np.full((count, max((len(held) for held in system.pins.values()), default=1)), -1, dtype=np.int64)
+    for c, held in system.pins.items():
+        pin[c, : len(held)] = held
     order = {c: k for k, c in enumerate(system.surface_of)}
     return Automata(
         guards_of,
         np.array([a.hold for a in automata], dtype=np.int64),
         np.array([a.above for a in automata], dtype=np.int64),
-        np.array([system.pins.get(c, -1) for c in range(count)], dtype=np.int64),
+        pin,
         np.array([order.get(c, -1) for c in range(count)], dtype=np.int64),
         system.owner,
         place,
@@ -105,6 +110,7 @@ def _automata(system: System) -> Automata:
         *_flat(reset_slots),
         system.is_corner,
         np.array([a.is_unique for a in automata], dtype=np.bool_),
+        np.array([a.is_unilateral for a in automata], dtype=np.bool_),
     )
 
 

@@ -1,8 +1,8 @@
 """Events that need no discussion, settled in compiled code: one guard of one component, everything certain just after.
 
 The rules are those of `hybridsim.engine.decide`, as everywhere. What is not ordinary (several guards at once, a case
-undecided at rounding, a cascade, no or several admissible motions, an event in a model that also slides where it
-jumps) is left untouched for `hybridsim.engine.settle`, which can say what is the matter.
+undecided at rounding, a cascade, no or several admissible motions, an impact, an event in a model that also slides
+where it jumps) is left untouched for `hybridsim.engine.settle`, which can say what is the matter.
 """
 
 from __future__ import annotations
@@ -231,7 +231,9 @@ def judge_members(
                 continue
             is_fired = is_on and g == fired and (z[c] == at.z[c] or automata.is_corner[c])
             is_fired = is_fired and is_decreed(is_holding, continuous)
-            zeros = decreed_zeros(j == 0, on_surface[c], is_holding, is_smooth, is_fired)
+            zeros = decreed_zeros(
+                j == 0, on_surface[c], is_holding, is_smooth, is_fired, automata.is_unilateral[c]
+            )
             side, order, is_open = guard_side(lin, k, g, zeros, x, x_error, work)
             if side < 0:
                 return LEAVES
@@ -293,6 +295,9 @@ def settle_ordinary(
         if not is_alone(tapes, lin, k, fired, x, x_error, work):
             return NOT_ORDINARY, False
     c = automata.owner[fired]
+    for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
+        if automata.is_unilateral[automata.cluster[i]]:
+            return NOT_ORDINARY, False
     if automata.hold[c] >= 0:
         number = decide_surface(
             functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, z, work
@@ -457,8 +462,8 @@ def decide_surface(
         trial[members[i]] = hold[members[i]]
     call(functions.project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        if pin[members[i]] >= 0:
-            x_error[pin[members[i]]] = UNIT * abs(x[pin[members[i]]])
+        if pin[members[i], 0] >= 0:  # a unilateral contact, which has two, is not ordinary
+            x_error[pin[members[i], 0]] = UNIT * abs(x[pin[members[i], 0]])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     if count == 1:

@@ -27,7 +27,7 @@ class Report:
     Parameters
     ----------
     clusters : names of the surface components that are decided together.
-    held : component to the state that its holding mode evaluates from the constraint.
+    held : component to the state, or states, that its holding mode evaluates from the constraint.
     projected : component to the states that its holding mode keeps on the surface by projection.
     linear : component to its modes whose flow is linear in the states; "" stands for the states' own equations.
     rates : number of angles that grow in time and are kept modulo 2 pi.
@@ -62,7 +62,7 @@ def describe(model: Model) -> Report:
     } | {"": ("",) if data["linear"][""][0] else ()}
     return Report(
         tuple(tuple(names[c] for c in cluster) for cluster in data["clusters"]),
-        {names[c]: model.states[i].name for c, i in data["pins"].items()},
+        {names[c]: " and ".join(model.states[i].name for i in held) for c, held in data["pins"].items()},
         {names[c]: tuple(model.states[i].name for i in held) for c, held in data["projected"].items()},
         linear,
         data["rates"],

@@ -47,8 +47,11 @@ def state_errors(
     for i in range(y.shape[0]):
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
     for c in range(z.shape[0]):
-        if automata.pin[c] >= 0 and z[c] == automata.hold[c]:
-            out[automata.pin[c]] = UNIT * abs(y[automata.pin[c]])
+        if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
+            for j in range(automata.pin.shape[1]):
+                i = automata.pin[c, j]
+                if i >= 0:
+                    out[i] = UNIT * abs(y[i])
 
 
 @inlined

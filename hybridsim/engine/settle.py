@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hybridsim.engine.decide import (
     side_after,
 )
 from hybridsim.engine.differences import DifferenceSeries
+from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
 from hybridsim.engine.outcome import Change, Outcome, Situation
@@ -77,10 +79,10 @@ class Settling:
             return self._stop(*failure)
         open_ &= surfaces
         if surfaces and (self.jumped or (self.at.z < 0).any()):
-            open_ |= self._take_sides()
+            open_ |= self.take_sides()
         limit = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in self.system.automata))
         for _ in range(limit):
-            failure = self._decide(open_)
+            failure = strike(self, open_) or self._decide(open_)
             if failure:
                 message = self._fatal_among(located)
                 return self._stop(*(("inconsistent", message) if message else failure))
@@ -99,7 +101,7 @@ class Settling:
                 return self._stop(*failure)
             open_ = leaving & surfaces
             if surfaces and self.jumped:
-                open_ |= self._take_sides()
+                open_ |= self.take_sides()
         names = ", ".join(
             f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
         )
@@ -127,7 +129,7 @@ class Settling:
                 self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
         return open_ - corners - staying
 
-    def _take_sides(self) -> set[int]:
+    def take_sides(self) -> set[int]:
         """Give every surface component the mode of the side it is on; return those that are on the surface."""
         at, system = self.at, self.system
         free = at.p.copy()
@@ -139,6 +141,9 @@ class Settling:
             if abs(value) <= series.surface_bounds[k, 0]:
                 if at.z[c] in (-1, automaton.hold) or self.on_surface[c]:
                     found.add(c)
+                continue
+            if value < 0.0 and automaton.is_unilateral:
+                found.add(c)
                 continue
             self.on_surface[c] = False
             side = automaton.above if value > 0.0 else automaton.below
@@ -307,10 +312,25 @@ class Settling:
                 place = system.names.index(name)
                 value = x_plus[place] = x_one[place]
                 x_error[place] = UNIT * abs(value)
+            if not np.isfinite(value):
+                state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, self.at.x, strict=True))
+                return f"{self._reset_in_words(key)} sets {name} to {float(value)!r}, at {state}"
             previous = writer.setdefault(name, (label, float(value)))
             if previous[1] != value and not (np.isnan(value) and np.isnan(previous[1])):
                 return f"two resets at one instant set {name} to {previous[1]!r} and to {float(value)!r}"
         return None
+
+    def _reset_in_words(self, key: tuple[object, ...]) -> str:
+        model = self.system.model
+        if key[0] != "choice":
+            kind, number = str(key[0]), int(str(key[1]))
+            parts: Any = model.monitors if kind == "monitor" else model.schedules
+            return f"the reset of {kind} {parts[number].name}"
+        c, mode, j = (int(str(k)) for k in key[1:4])
+        automaton = self.system.automata[c]
+        return (
+            f"the reset of guard {automaton.guard_names[mode][j]} of {automaton.name}.{automaton.modes[mode]}"
+        )
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 
@@ -372,7 +392,7 @@ class Settling:
 
     def _pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)
-        mask[[self.system.pins[c] for c in components if c in self.system.pins]] = True
+        mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
@@ -434,7 +454,16 @@ class Settling:
         released = np.array([self._released(c, z) for c in range(len(z))], dtype=np.bool_)
         decreed = np.zeros(system.guard_count, dtype=np.int64)
         fired = self.fired & (z == self.at.z)[system.owner]
-        decree_orders(system.guards_of(z), holding, self.on_surface, released, continuous, fired, decreed)
+        decree_orders(
+            system.guards_of(z),
+            holding,
+            self.on_surface,
+            released,
+            continuous,
+            fired,
+            system.is_unilateral,
+            decreed,
+        )
         return decreed
 
     def _say(self, components: list[int], candidates: np.ndarray, what: str) -> str:

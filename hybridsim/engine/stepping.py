@@ -188,7 +188,10 @@ class Leaps(Protocol):
     """A compiled mode loop of one run: whole segments and their ordinary events at once.
 
     It adds what it went over to the record as blocks (`hybridsim.engine.blocks`) and counts in its counters.
+    place: what it remembers from leap to leap, in an array; a run that goes on gives it back.
     """
+
+    place: np.ndarray
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory

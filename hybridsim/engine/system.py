@@ -42,6 +42,7 @@ class Automaton:
     below: int = -1
     hold: int = -1
     initial: int = -1
+    is_unilateral: bool = False  # its surface is a gap: there is no mode below
     is_unique: bool = False  # its surface takes a motion only where no other is admissible
     is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
 
@@ -142,11 +143,16 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         tuple(tuple(tuple(names.index(c.to) for c in g.then) for g in m.guards) for m in component.modes),
         tuple(tuple(g.fatal for g in m.guards) for m in component.modes),
         *(
-            (names.index(surface.above), names.index(surface.below), names.index(surface.hold))
+            (
+                names.index(surface.above),
+                -1 if surface.below is None else names.index(surface.below),
+                names.index(surface.hold),
+            )
             if surface
             else (-1, -1, -1)
         ),
         initial=-1 if component.initial is None else names.index(component.initial),
+        is_unilateral=bool(surface and surface.is_unilateral),
         is_unique=bool(surface and surface.unique),
         is_corner=isinstance(component, Corner),
     )
@@ -169,6 +175,7 @@ class _Frame:
                 self.owner[list(numbers)] = c
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
         self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
+        self.is_unilateral = np.array([a.is_unilateral for a in self.automata], dtype=np.bool_)
         self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
         self.component_numbers = np.arange(len(self.automata))
         self.guard_table = self._guard_table()
@@ -206,11 +213,12 @@ class System:
         self.declared: tuple[Automaton, ...] = frame.declared  # those that are no corners
         self.has_surface: np.ndarray = frame.has_surface
         self.is_corner: np.ndarray = frame.is_corner
+        self.is_unilateral: np.ndarray = frame.is_unilateral
         self.owner: np.ndarray = frame.owner  # component of each guard
         self.guard_count: int = data["guard_count"]
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
         self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
-        self.pins: dict[int, int] = data["pins"]
+        self.pins: dict[int, tuple[int, ...]] = data["pins"]
         self.projected: dict[int, tuple[int, ...]] = data["projected"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
         self.quantities: tuple[str, ...] = data["quantities"]
@@ -253,7 +261,7 @@ class System:
 
     def evaluated(self, z: np.ndarray) -> list[int]:
         """The states that the modes in z evaluate from their constraints, each exactly."""
-        return [i for c, i in self.pins.items() if z[c] == self.automata[c].hold]
+        return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
 
     # -- values ---------------------------------------------------------------------------------------------
 
@@ -351,10 +359,37 @@ class System:
         self.code.module.effects(s, x, p, z, out)
         return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
 
+    def impulses(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For m surfaces the slopes of their u (m, n), changes of the states by impulses (m, n), loads (2, m, m).
+
+        u is the rate of a gap, or a relative velocity; see `hybridsim.engine.impulse_rows`.
+        """
+        n, m = self.n, len(self.surface_of)
+        out = np.zeros(2 * m * (n + m))
+        self.code.module.impulses(s, x, p, z, out)
+        return (
+            out[: m * n].reshape(m, n),
+            out[m * n : 2 * m * n].reshape(m, n),
+            out[2 * m * n :].reshape(2, m, m),
+        )
+
+    def restitutions(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, speeds: np.ndarray
+    ) -> np.ndarray:
+        """Coefficient of restitution (m,) of the surfaces at their speeds of approach (m,); 0 where there is none."""
+        out = np.zeros(len(self.surface_of))
+        self.code.module.restitutions(s, np.concatenate([x, speeds]), p, z, out)
+        return out
+
     def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
         """Number of the first choice of a guard whose condition holds; -1 if none."""
         out = np.zeros(1)
-        self.code.module.choose(s, x, p, np.array([*z, component, mode, guard]), out)
+        try:
+            self.code.module.choose(s, x, p, np.array([*z, component, mode, guard]), out)
+        except (ValueError, ArithmeticError):  # a condition without a value holds no more than a false one
+            return -1
         return int(out[0])
 
     def apply_reset(
@@ -364,7 +399,11 @@ class System:
         if key in self.resets:
             at = self.layout.discrete_slice
             out = np.concatenate([x_plus, p_plus[at]])
-            self.code.module.reset(s, x, p, np.array([*z, self.resets[key][0]]), out)
+            try:
+                self.code.module.reset(s, x, p, np.array([*z, self.resets[key][0]]), out)
+            except (ValueError, ArithmeticError):  # of the standard library's functions beyond their domain
+                discrete = [d.name for d in self.model.discrete]
+                out[[[*self.names, *discrete].index(name) for name in self.resets[key][1]]] = np.nan
             x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
 
     # -- series ---------------------------------------------------------------------------------------------

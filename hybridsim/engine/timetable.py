@@ -31,7 +31,7 @@ class Timetable:
 
     def __init__(self, system: System, end: Instant) -> None:
         self._end = end
-        self._settled: Instant | None = None  # the last appointment that was kept, or the start of the run
+        self.settled: Instant | None = None  # the last appointment that was kept, or the start of the run
         values = system.values
         self._signals = system.signals
         self._schedules = []
@@ -44,7 +44,7 @@ class Timetable:
 
     def kept(self, instant: Instant) -> None:
         """Note that an instant is settled: what lies within rounding of it is not due once more."""
-        self._settled = instant
+        self.settled = instant
 
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
         """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
@@ -110,5 +110,5 @@ class Timetable:
 
     def _is_settled(self, instant: Instant) -> bool:
         """Whether it lies within rounding of the last appointment that was kept."""
-        settled = self._settled
+        settled = self.settled
         return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.blocks import OccurrenceList
 from hybridsim.engine.chain import Chain, SegmentChain
+from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.keep import ALL, Keep
+from hybridsim.engine.limits import UNLIMITED, Limits
 from hybridsim.engine.pieces import Occurrence, Pieces, Segment, end_point
 from hybridsim.engine.stepping import Counters
 from hybridsim.engine.system import System
@@ -33,7 +36,10 @@ class Trajectory:
         self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events)
         self.counters = Counters()
         self.status, self.message = "finished", ""
+        self.warnings_there: dict[str, int] = {}  # those up to the checkpoint
         self.warnings: dict[str, int] = {}  # message -> how often
+        self.checkpoint: Checkpoint | None = None  # the last one
+        self._mark: tuple[Checkpoint, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
         """Keep the state after an event at the very end of the run, which no segment begins with."""
@@ -67,6 +73,33 @@ class Trajectory:
                 first += 1
             self.occurrences.drop(first)
 
+    def mark(self, checkpoint: Checkpoint) -> None:
+        """Note where the run could go on."""
+        self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
+
+    def seal(self) -> None:
+        """Make the last place that was noted the one to go on from: nothing more will be recorded."""
+        if self._mark is not None:
+            checkpoint, segments, occurrences, self.warnings_there = self._mark
+            self.checkpoint = replace(
+                checkpoint,
+                segments=self.segments.since_mark(segments),
+                occurrences=self.occurrences.since_mark(occurrences),
+            )
+
+    def up_to_checkpoint(self, system: System) -> Trajectory:
+        """A copy that ends at the checkpoint, to go on with."""
+        assert self.checkpoint is not None
+        earlier = Trajectory(system)
+        for chain, others, count in (
+            (earlier.segments, self.segments, self.checkpoint.segments),
+            (earlier.occurrences, self.occurrences, self.checkpoint.occurrences),
+        ):
+            chain.window, chain.blocks = others.window, others.without_last(count)
+        earlier.counters, earlier.warnings = copy(self.counters), dict(self.warnings_there)
+        earlier.checkpoint = self.checkpoint
+        return earlier
+
     def warn(self, message: str) -> None:
         """Count a warning; each message is kept once."""
         self.warnings[message] = self.warnings.get(message, 0) + 1
@@ -88,7 +121,8 @@ class Task:
     tolerances: Any
     discrete: np.ndarray
     keep: Keep = ALL
-    options: dict[str, Any] = field(default_factory=dict)
+    limits: Limits = UNLIMITED
+    record: Trajectory | None = None  # what to go on with, from its checkpoint
 
     @property
     def forward(self) -> bool:

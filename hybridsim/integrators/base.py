@@ -18,6 +18,7 @@ NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to l
 CAPABILITIES = {
     "contacts": "contacts with dry friction, which stick",
     "located": "events of contacts are located: their number and order are those of the motion",
+    "impacts": "unilateral contacts with restitution",
     "sliding": "switching surfaces, along which a motion slides",
     "transitions": "general automata: modes, choices, resets",
     "monitors": "events that change no mode",

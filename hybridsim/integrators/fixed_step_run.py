@@ -8,8 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation
+from hybridsim.engine.checkpoint import Checkpoint, stopped_early
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.settle import Settling
@@ -19,6 +21,7 @@ from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
 from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE
 
+_STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # what a run needs to go on
 _ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
 
 
@@ -81,14 +84,15 @@ class FixedStepRun:
         self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
     ) -> None:
         self.system, self.task, self.march, self.progress = system, task, march, progress
-        self.record = Trajectory(system, task.keep)
+        self.record = task.record or Trajectory(system, task.keep)
+        self.gauge = Gauge(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
         self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
         self.accumulation = Accumulation(located, 4.0 * located)
-        self.lately = self.x[None, :]  # states of the last stretch, the size of which rounding is relative to
+        self.scale = np.abs(self.x)  # of the states on the last stretch: what rounding is relative to
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.turned = False  # an input may just have jumped
 
@@ -98,26 +102,48 @@ class FixedStepRun:
         try:
             self._run()
             record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
+        except LimitReached as reached:
+            record.status, record.message = "limit", stopped_early(str(reached), self.origin)
         except KeyboardInterrupt:
-            record.status = "interrupted"
-            record.message = f"interrupted after t = {float(self.origin)!r}; what was computed is kept"
+            record.status, record.message = "interrupted", stopped_early("", self.origin)
+        record.seal()
         counts = self.march.counts
-        record.counters.rhs_evaluations, record.counters.guard_evaluations = int(counts[0]), int(counts[1])
+        record.counters.rhs_evaluations += int(counts[0])
+        record.counters.guard_evaluations += int(counts[1])
         for warning in self.march.warnings():
             record.warn(warning)
         return record
 
     def _run(self) -> None:
-        due = self.timetable.due_at_start(self.origin)
-        self.timetable.kept(self.origin)
-        if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
-            return
+        checkpoint = self.record.checkpoint
+        if checkpoint is not None:
+            self._go_on_from(checkpoint)
+        else:
+            due = self.timetable.due_at_start(self.origin)
+            self.timetable.kept(self.origin)
+            if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
+                return
         while self.origin != self.end:
+            arrays = {name: np.array(getattr(self, name)) for name in _STATE}
+            self.record.mark(
+                Checkpoint(self.origin, arrays, self.timetable.settled, self.accumulation.pace())
+            )
             appointment = self.timetable.next(self.origin, forward=True)
             if self._stretch(appointment, appointment.instant if appointment else self.end):
                 return
             if self.progress:
                 self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
+            if self.origin != self.end:
+                self.gauge.check()
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> None:
+        self.origin = checkpoint.instant
+        if checkpoint.settled is not None:
+            self.timetable.kept(checkpoint.settled)
+        self.accumulation.go_on(checkpoint.pace)
+        state = {name: checkpoint.arrays[name].copy() for name in _STATE}
+        self.x, self.z, self.discrete, self.scale, self.fresh = (state[name] for name in _STATE[:-1])
+        self.turned = bool(state["turned"])
 
     def _vector(self) -> np.ndarray:
         p = self.system.vector(self.origin, self.discrete)
@@ -141,7 +167,7 @@ class FixedStepRun:
         self.fresh[:] = False
         if count < _ROWS:  # a short stretch does not hold on to room for a long one
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
-        self.lately = states
+        self.scale = np.abs(states).max(axis=0)
         self._keep(p, times, states, modes, start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
@@ -265,8 +291,7 @@ class FixedStepRun:
         sides = np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
-        scale = np.abs(self.lately).max(axis=0)
-        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), scale) + s_error * np.abs(
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale) + s_error * np.abs(
             system.flow(0.0, self.x, p, self.z)
         )
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)

@@ -60,6 +60,7 @@ class Moreau(Integrator):
         "multiple-roots": "only the signs at the ends of a step are compared",
         "backward": "the law of a contact that sticks has no past",
         "sliding": "its solve is made for friction forces; what a switching surface weighs needs another",
+        "impacts": "its solve is made for friction forces, not yet for the impulses of contacts that close",
         "functions": "it takes forces apart that are declared by expressions",
     }
 

@@ -23,6 +23,7 @@ _FIXED = {
     "stiff": "explicit, with a fixed step",
     "backward": "the zone rule of the force has no past",
     "sliding": "its zone rule is made for friction, which opposes a velocity; a relay needs another",
+    "impacts": "its rule is made for friction forces, not for impulses",
     "functions": "it is a method for contacts, which are declared by expressions",
 }
 

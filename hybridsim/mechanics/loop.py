@@ -25,16 +25,22 @@ _ROUNDS = 1000  # events of one node at one instant
 
 
 @kernel
+def _hold(plant: Any, state: Any, room: Any) -> None:
+    """Phases of bases and forcing at the clock, and velocities there that meet the constraints of what sticks."""
+    for r in range(plant.rates.shape[0]):
+        state.phase[r] = phase_of(state.clock[0], state.clock[1], plant.rates[r], 0.0)
+    for j in range(plant.node_dof.shape[0] - 1):
+        if state.holds[j] > 0:
+            project(plant, state, room, j, 0.0, state.x[1])
+
+
+@kernel
 def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, left: float) -> bool:
     """Expand all nodes at the origin of a step, and set its length."""
     rtol, longest, top, keep = control
-    for r in range(plant.rates.shape[0]):
-        state.phase[r] = phase_of(state.clock[0], state.clock[1], plant.rates[r], 0.0)
+    _hold(plant, state, room)
     count = plant.node_dof.shape[0] - 1
-    for j in range(count):
-        state.origin[j] = 0.0
-        if state.holds[j] > 0:
-            project(plant, state, room, j, 0.0, state.x[1])
+    state.origin[:] = 0.0
     nd, nc = whole(plant, state, room)
     expanded(plant, laws, state, room, count, nd, nc, 0.0, top)
     limit = min(left, longest)
@@ -234,6 +240,7 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
         if state.flags[FRESH]:
             left = (target[0] - state.clock[0]) + (target[1] - state.clock[1])
             if not left > 0.0:
+                _hold(plant, state, room)  # the series of the last step meets them to its tolerance only
                 return DONE
             if not _begin_step(plant, laws, state, room, record, control, left):
                 return LOST

@@ -3,6 +3,7 @@
 from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.contact import Contact
 from hybridsim.model.frozen_map import FrozenMap
+from hybridsim.model.impact import Impact
 from hybridsim.model.inputs import Input
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.law_table import LawTable
@@ -21,6 +22,7 @@ __all__ = [
     "FrictionLaw",
     "FrozenMap",
     "Guard",
+    "Impact",
     "Input",
     "LawTable",
     "Mode",

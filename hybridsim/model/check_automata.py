@@ -104,13 +104,14 @@ def _surface(scope: Scope, component: Component, what: str, names: list[str]) ->
     surface = component.surface
     if surface is None:
         return
-    sides = (surface.above, surface.below, surface.hold)
+    sides = surface.modes
     for name in sides:
         if name not in names:
             scope.unknown(surface, f"{what}, surface: there is no mode", name, names, "modes")
-    if set(sides) <= set(names) and (len(set(sides)) < 3 or len(names) != 3):
-        message = f"{what}: a surface has three modes, above, below and hold; these are {', '.join(names)}"
-        scope.fail(surface, message, "give it exactly three.")
+    if set(sides) <= set(names) and not len(set(sides)) == len(names) == len(sides):
+        words = "two modes, above and hold" if surface.is_unilateral else "three modes, above, below and hold"
+        message = f"{what}: a surface has {words}; these are {', '.join(names)}"
+        scope.fail(surface, message, f"give it exactly {len(sides)}.")
 
 
 def _mode_key(scope: Scope, part: Declared, what: str, key: str) -> None:

@@ -10,7 +10,7 @@ from hybridsim.model.monitor import Monitor
 from hybridsim.model.schedule import Schedule
 from hybridsim.model.scope import Scope
 
-_NEED_EXPRESSIONS = ("contacts", "surfaces", "inputs", "discrete", "definitions")
+_NEED_EXPRESSIONS = ("contacts", "surfaces", "impacts", "inputs", "discrete", "definitions")
 
 
 def check_functions(scope: Scope) -> None:

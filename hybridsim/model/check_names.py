@@ -29,7 +29,7 @@ def check_names(scope: Scope) -> None:
             message = f"the name '{name}' is used twice, for a {seen[name]} and for a {kind}"
             scope.fail(part, message, "rename one of them.")
         seen.setdefault(name, kind)
-    check_labels(scope, "component", [*model.contacts, *model.surfaces, *model.components])
+    check_labels(scope, "component", [*model.contacts, *model.surfaces, *model.impacts, *model.components])
     check_labels(scope, "event", [*model.monitors, *model.schedules])
     check_labels(scope, "output", model.outputs)
     for output in model.outputs:

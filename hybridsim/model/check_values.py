@@ -5,6 +5,7 @@ from __future__ import annotations
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.evaluate import dependency_order
+from hybridsim.model.check_impacts import check_restitution
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared
 from hybridsim.model.inputs import Input
@@ -41,6 +42,8 @@ def check_values(scope: Scope) -> None:
     constants = _constant_definitions(scope, values)
     for contact in model.contacts:
         _contact(scope, contact, constants)
+    for impact in model.impacts:
+        check_restitution(scope, impact, constants)
 
 
 def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:

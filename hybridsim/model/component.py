@@ -83,25 +83,45 @@ class Surface(Declared):
     ----------
     function : s.
     unknown : the variable that holds it, solved for from ds/dt = 0, in which it must be linear.
-    above, below, hold : mode for s > 0, for s < 0, and on s = 0.
+    above, below, hold : mode for s > 0, for s < 0, and on s = 0. Without one below, s cannot become negative: where it
+        comes to zero there is an impact, and ``hold`` keeps s and ds/dt at zero, solved for from d2s/dt2 = 0.
     jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s =
         0+ (in ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
     unique : the motion must be the only admissible one. Otherwise what holds comes first, as static friction does,
-        and the unknown has to oppose s.
+        and the unknown has to oppose s; without a mode below it has to push s up.
+    restitution : of impacts, where there is no mode below; over the model's names and ``speed``, that of approach.
     """
 
     function: Expression
     unknown: str
     above: str
-    below: str
+    below: str | None
     hold: str
     jump_above: Expression
     jump_below: Expression
     unique: bool = False
+    restitution: Expression | None = None
 
     def __post_init__(self) -> None:
-        self._texts("unknown", "above", "below", "hold")
-        self._expressions("function", "jump_above", "jump_below")
+        self._texts("unknown", "above", "hold")
+        if self.below is not None:
+            self._texts("below")
+        self._expressions("function", "jump_above", "jump_below", "restitution")
+        if (self.below is None) == (self.restitution is None):
+            raise self._fault(
+                f"below is {self.below!r} and restitution {self.restitution!r}",
+                "a surface has a mode below, or a restitution of its impacts",
+            )
+
+    @property
+    def is_unilateral(self) -> bool:
+        """Whether its function cannot become negative."""
+        return self.below is None
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The modes that it decides between."""
+        return (self.above, self.hold) if self.below is None else (self.above, self.below, self.hold)
 
 
 @dataclass(frozen=True)

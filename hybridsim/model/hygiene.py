@@ -202,6 +202,7 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
     for surface in model.surfaces:
         values = (surface.expr, *surface.above.values(), *surface.below.values())
         yield from ((f"surface {surface.name}", expr) for expr in values)
+    yield from ((f"impact {impact.name}", impact.gap) for impact in model.impacts)
     for component in model.components:
         for mode in component.modes:
             where = f"mode {mode.name} of component {component.name}"

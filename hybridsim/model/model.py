@@ -13,6 +13,7 @@ from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.model.component import Component, Corner
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared, as_tuple
+from hybridsim.model.impact import Impact
 from hybridsim.model.inputs import Input
 from hybridsim.model.law_with_states import ContactState
 from hybridsim.model.monitor import Monitor
@@ -31,6 +32,7 @@ _PARTS: dict[str, type[Declared]] = {
     "schedules": Schedule,
     "outputs": Output,
     "surfaces": SwitchingSurface,
+    "impacts": Impact,
 }
 
 
@@ -45,6 +47,7 @@ class Model(Declared):
     discrete : states changed by resets and ticks only.
     components, contacts : the automata; their modes together are the discrete state z.
     surfaces : switching surfaces, along which the motion may slide; automata as well.
+    impacts : unilateral contacts, whose gaps cannot become negative; automata as well.
     inputs, monitors, schedules : known signals, events that change no mode, events at known times.
     outputs : `Output` objects, or a dict of name to expression.
     definitions : named intermediate expressions, a dict or pairs; they may use one another and what
@@ -87,6 +90,7 @@ class Model(Declared):
     path: str | None = None
     flow: Callable[..., Any] | None = None
     surfaces: tuple[SwitchingSurface, ...] = ()
+    impacts: tuple[Impact, ...] = ()
 
     def __post_init__(self) -> None:
         self._functions("flow")
@@ -149,7 +153,8 @@ class Model(Declared):
 
     def __repr__(self) -> str:
         automata = [contact.name for contact in self.contacts]
-        automata += [surface.name for surface in self.surfaces] + [part.name for part in self.components]
+        automata += [surface.name for surface in self.surfaces] + [impact.name for impact in self.impacts]
+        automata += [part.name for part in self.components]
         names = ", ".join(state.name for state in self.states)
         return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
 
@@ -229,7 +234,7 @@ class Model(Declared):
         return replace(contact, start={**contact.start, **start})
 
     def _brought_by(self, contact: Contact) -> tuple[State, ...]:
-        return contact.states(self.constant_names(), partial(self._load_rate, contact))
+        return contact.states(self._never_negative_names(), partial(self._load_rate, contact))
 
     def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
         """A copy in which every contact has a single-valued force, for a look at what that costs.
@@ -279,24 +284,29 @@ class Model(Declared):
         return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
-        """All automata: the contacts expanded, the surfaces, the components, in order of declaration; corners last."""
+        """All automata: the contacts expanded, surfaces, impacts, components, in order of declaration; corners last."""
         components: tuple[Component, ...] = self.once("components", self._components)
         return components
 
     def _components(self) -> tuple[Component, ...]:
         parts = [part for contact in self.contacts for part in self.components_of(contact)]
         parts += [surface.component() for surface in self.surfaces]
+        parts += [impact.component() for impact in self.impacts]
         parts += self.components
         return tuple(sorted(parts, key=lambda part: isinstance(part, Corner)))
 
     def components_of(self, contact: Contact) -> tuple[Component, ...]:
         """The automata that one of its contacts becomes."""
-        return contact.components(self.constant_names(), partial(self._load_rate, contact))
+        return contact.components(self._never_negative_names(), partial(self._load_rate, contact))
 
     def constant_names(self) -> frozenset[str]:
         """Names that cannot change during a run: parameters, and definitions over these alone."""
         names: frozenset[str] = self.once("constants", self._constant_names)
         return names
+
+    def _never_negative_names(self) -> frozenset[str]:
+        """Names that are constant, or normal forces that impacts see to: a load of these needs no guard."""
+        return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:
         constants = {parameter.name for parameter in self.parameters}
@@ -367,7 +377,7 @@ class Model(Declared):
 def _content(model: Model) -> tuple[object, ...]:
     parts = (
         model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
-        model.monitors, model.schedules, model.outputs, model.definitions,
+        model.monitors, model.schedules, model.outputs, model.definitions, model.impacts,
     )  # fmt: skip
     words = (model.title, model.source, model.description, model.look, model.duration)
     return (model.name, *parts, *words, model.flow)

@@ -32,6 +32,7 @@ class Scope:
             except ModelError as fault:
                 self.errors.append(fault)
         yield from (surface.component() for surface in self.model.surfaces)
+        yield from (impact.component() for impact in self.model.impacts)
         yield from self.model.components
 
     def fail(self, part: Declared, message: str, remedy: str) -> None:
@@ -58,7 +59,7 @@ class Scope:
         for contact in model.contacts:
             yield "contact force", contact.name, contact
         brought = {contact.name for contact in model.contacts}
-        own = len(model.surfaces) + len(model.components)
+        own = len(model.surfaces) + len(model.impacts) + len(model.components)
         for component in self.components[: len(self.components) - own]:
             for name in component.variables:
                 if name not in brought:
@@ -67,6 +68,8 @@ class Scope:
             yield "switching surface", surface.name, surface
             for name in surface.above:
                 yield f"variable of surface {surface.name}", name, surface
+        for impact in model.impacts:
+            yield "normal force", impact.name, impact
         for component in model.components:
             for name in component.variables:
                 yield f"variable of component {component.name}", name, component
@@ -74,7 +77,7 @@ class Scope:
     def is_switched(self, name: str) -> bool:
         """Whether a name stands for something that modes decide."""
         kind = self.kinds.get(name, "")
-        return kind.startswith("variable") or kind in ("contact force", "switching surface")
+        return kind.startswith("variable") or kind in ("contact force", "switching surface", "normal force")
 
     @cached_property
     def changed_by_reset(self) -> tuple[str, ...]:

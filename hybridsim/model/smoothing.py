@@ -109,6 +109,7 @@ class _Smoothing:
             components=(*made, *map(self._corner_component, self.work.corners.values())),
             contacts=(),
             surfaces=(),
+            impacts=(),
             monitors=monitors,
         )
 

@@ -50,7 +50,8 @@ def _component(component: Component) -> Iterator[str]:
     if surface:
         yield (
             f"  surface {surface.function}; {surface.unknown}; {surface.above}; {surface.below}; "
-            f"{surface.hold}; {surface.jump_above}; {surface.jump_below}; {surface.unique}"
+            f"{surface.hold}; {surface.jump_above}; {surface.jump_below}; {surface.unique}; "
+            f"{surface.restitution}"
         )
     for mode in component.modes:
         yield f"  mode {mode.name}: set" + _map(mode.set) + " der" + _map(mode.der)

@@ -73,13 +73,18 @@ def _surface(parent: Table) -> Surface | None:
     table = parent.sub(parent.data["surface"], f"{parent.kind}, surface", None, "surface")
     if table is None:
         return None
-    names = ("unknown", "above", "below", "hold")
+    restitution = table.expression("restitution")
+    names = ("unknown", "above", "hold", *(() if restitution is not None else ("below",)))
     jumps = ("jump_above", "jump_below")
-    table.only("function", *names, *jumps, "unique")
+    table.only("function", *names, *jumps, "unique", "restitution")
     for key in names:
         table.require(key, f'write {key} = "...".')
-    unknown, above, below, hold = (table.text(key) for key in names)
+    unknown, above, hold, *sides = (table.text(key) for key in names)
     jump_above, jump_below = (table.needed(key, f"{key} = 0 says that nothing jumps there.") for key in jumps)
     function = table.needed("function", 'write function = "s(t, x)".')
     unique = table.flag("unique")
-    return Surface(function, unknown, above, below, hold, jump_above, jump_below, unique, place=table.place)
+    below = sides[0] if sides else None
+    jumps_of = (jump_above, jump_below)
+    return Surface(
+        function, unknown, above, below, hold, *jumps_of, unique, restitution=restitution, place=table.place
+    )

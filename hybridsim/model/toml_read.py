@@ -11,6 +11,7 @@ from typing import Any
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr import Expression
 from hybridsim.model.contact import Contact
+from hybridsim.model.impact import Impact
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.model import Model
 from hybridsim.model.monitor import Monitor
@@ -26,8 +27,8 @@ from hybridsim.model.toml_table import Source, Table
 SCHEMA = 1
 KEYS = (
     "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
-    "definitions", "inputs", "laws", "contacts", "surfaces", "initial", "modes", "components", "monitors", "schedules",
-    "clocks", "outputs",
+    "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "modes", "components", "monitors",
+    "schedules", "clocks", "outputs",
 )  # fmt: skip
 
 
@@ -93,6 +94,7 @@ def _model(root: Table, folder: Path) -> Model:
         components=tuple(read_components(root)),
         contacts=tuple(_contacts(root, laws)),
         surfaces=tuple(_surfaces(root)),
+        impacts=tuple(_impacts(root)),
         inputs=tuple(read_inputs(root, folder)),
         monitors=tuple(_monitors(root)),
         schedules=(*_schedules(root), *_clocks(root)),
@@ -160,6 +162,14 @@ def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
             table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}.", given, one)
         if not single:
             yield SwitchingSurface(name, expr, above, below, place=table.place)
+
+
+def _impacts(root: Table) -> Iterable[Impact]:
+    for name, table in root.entries("impacts", "impact"):
+        table.only("gap", "restitution")
+        gap = table.needed("gap", 'write gap = "what cannot become negative", of positions.')
+        restitution = table.needed("restitution", "write restitution = a number from 0 to 1.")
+        yield Impact(name, gap, restitution, place=table.place)
 
 
 def _monitors(root: Table) -> Iterable[Monitor]:

@@ -62,6 +62,9 @@ def _lines(model: Model) -> Iterator[str]:
     for surface in model.surfaces:
         sides = {"above": surface.above, "below": surface.below}
         yield from _section(f"surfaces.{_key(surface.name)}", {"expr": surface.expr, **sides})
+    for impact in model.impacts:
+        entries = {"gap": impact.gap, "restitution": impact.restitution}
+        yield from _section(f"impacts.{_key(impact.name)}", entries)
     for component in model.components:
         yield from _component(component)
     for monitor in model.monitors:
@@ -130,7 +133,17 @@ def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any
 def _component(component: Component) -> Iterator[str]:
     head = f"components.{_key(component.name)}"
     surface = component.surface
-    fields = ("function", "unknown", "above", "below", "hold", "jump_above", "jump_below", "unique")
+    fields = (
+        "function",
+        "unknown",
+        "above",
+        "below",
+        "hold",
+        "jump_above",
+        "jump_below",
+        "unique",
+        "restitution",
+    )
     entries: dict[str, Any] = {"initial": component.initial}
     if surface is not None:
         entries["surface"] = {field: getattr(surface, field) for field in fields}

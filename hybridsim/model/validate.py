@@ -9,6 +9,7 @@ from hybridsim.model.check_automata import check_automata
 from hybridsim.model.check_contacts import check_contacts
 from hybridsim.model.check_expressions import check_expressions, check_given
 from hybridsim.model.check_functions import check_functions
+from hybridsim.model.check_impacts import check_impacts
 from hybridsim.model.check_names import check_names
 from hybridsim.model.check_signals import check_signals
 from hybridsim.model.check_surfaces import check_surfaces
@@ -37,6 +38,7 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_automata(scope)
     check_contacts(scope)
     check_surfaces(scope)
+    check_impacts(scope)
     check_signals(scope)
     check_functions(scope)
     check_expressions(scope)

@@ -176,10 +176,12 @@ def test_static_and_kinetic() -> None:
     full = amplitude(model, "e", span, kept)
     v0 = 0.01 * top(np.abs(last(model, "v", span, kept)))
     values = {"at-rest": 0.0, "karnopp": amplitude(model.regularized("karnopp", v0=v0), "e", span, kept)}
+    # with mu_s = mu_k it breaks loose at rest, and swings about steady sliding with the speed of the pull
+    values["mu_s=mu_k"] = 0.01 * math.sqrt(1.0 / 100.0)
     found = hs.advise(model, "amplitude.e", 0.01, integrators=False)
     check(found, values, full)
     assert found.simplest.name == "full model"
-    assert "no limit cycle" in found["mu_s=mu_k"].why
+    assert found["mu_s=mu_k"].verdict == "not adequate"
     assert "holds more at rest" in found["tanh"].why
 
 

@@ -263,3 +263,12 @@ def test_run_lasts_as_long_as_the_model_says(hybridsim: Callable) -> None:
         assert code == 0
         ends.append(json.loads(out)["t_span"][1])
     assert ends == [3.0, 1.0, 4.0]
+
+
+def test_steady_calls_the_sliding_of_a_surface_by_its_name(hybridsim: Callable) -> None:
+    """Its share of the period is that of its own mode, and it has no work of friction; a contact has both."""
+    _, of_surface, _ = hybridsim("steady", "relay-control")
+    assert "100 % of the period in sliding, 0 stops a period\n" in of_surface
+    assert "stick" not in of_surface
+    _, of_contact, _ = hybridsim("steady", "dfcs")
+    assert "% of the period in stick, 2 stops a period, work 0.0316" in of_contact

@@ -1,4 +1,4 @@
-"""Ctrl-C in a process of its own: exit code 130, no traceback, and what was computed is kept."""
+"""Signals to a process of its own: exit code 130 or 143, no traceback, and what was computed is kept."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import time
 from pathlib import Path
 
 import pytest
+
+import hybridsim as hs
+from hybridsim.cli import main
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT between processes")
 
@@ -30,8 +33,8 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def interrupted(tmp_path: Path, *argv: str) -> tuple[int, str]:
-    """Exit code and messages of a command that gets SIGINT half a second after its work has begun."""
+def interrupted(tmp_path: Path, *argv: str, number: int = signal.SIGINT) -> tuple[int, str]:
+    """Exit code and messages of a command that gets a signal half a second after its work has begun."""
     process = subprocess.Popen(
         [sys.executable, "-c", _PROGRAM, *argv],
         cwd=tmp_path,
@@ -46,7 +49,7 @@ def interrupted(tmp_path: Path, *argv: str) -> tuple[int, str]:
         if line == "begun\n":
             break
     time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     seen.append(process.communicate(timeout=300)[1])
     return process.returncode, "".join(seen)
 
@@ -67,6 +70,19 @@ def test_compare_stops_altogether(tmp_path: Path) -> None:
     assert code == 130, messages
     assert "interrupted; nothing was written" in messages
     assert "Traceback" not in messages
+
+
+def test_a_run_that_is_asked_to_end_goes_on(tmp_path: Path) -> None:
+    argv = ("run", "dfcs", "--t-end", "500T", "--integrator", "scipy-dop853", "--save", "run.hsol")
+    code, messages = interrupted(tmp_path, *argv, number=signal.SIGTERM)
+    assert code == 143, messages
+    assert "hybridsim resume run.hsol goes on" in messages and "Traceback" not in messages
+    saved = str(tmp_path / "run.hsol")
+    assert hs.load_solution(saved).status == "interrupted"
+    assert main(["resume", saved, "--save", saved]) == 0
+    finished = hs.load_solution(saved)
+    whole = hs.simulate("dfcs", (0.0, finished.t_end), integrator="scipy-dop853")
+    assert (finished.t == whole.t).all() and (finished.y == whole.y).all()
 
 
 def test_sweep_writes_the_points_that_it_has(tmp_path: Path) -> None:

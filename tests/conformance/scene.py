@@ -11,6 +11,7 @@ VOCABULARY = (
     "contacts",
     "located",
     "sliding",
+    "impacts",
     "transitions",
     "nonlinear",
     "functions",

@@ -242,8 +242,9 @@ def test_the_candidates_are_all_combinations_once(sizes: list[int]) -> None:
 @pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("continuous", [False, True])
 @pytest.mark.parametrize("fired", [False, True])
+@pytest.mark.parametrize("gap", [False, True])
 def test_decreed_zeros(
-    holding: bool, on_surface: bool, released: bool, continuous: bool, fired: bool
+    holding: bool, on_surface: bool, released: bool, continuous: bool, fired: bool, gap: bool
 ) -> None:
     """Two components; guards 0, 1 belong to the first, 2, 3 to the second, which is at rest in all respects."""
     decreed = np.full(5, 7, dtype=np.int64)
@@ -254,11 +255,13 @@ def test_decreed_zeros(
         np.array([released, False]),
         continuous,
         np.array([fired, fired, True, False, True]),
+        np.array([gap, gap]),
         decreed,
     )
     beside = on_surface and not holding
     at_zero = fired and (
         continuous or not holding
     )  # a limit that another unknown's jump may have undone is none
-    surface = (2 if released and continuous else 1) if beside else int(at_zero)
+    # a gap is held together with its rate
+    surface = (2 if released and continuous else 1) + gap if beside else int(at_zero)
     assert decreed.tolist() == [surface, int(at_zero), 7, 0, 7]

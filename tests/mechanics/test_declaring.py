@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanics.stuck_systems import stuck_system
 
 import hybridsim as hs
 
@@ -52,3 +53,9 @@ def test_whole_numbers_are_numbers() -> None:
     hs.simulate(hs.MechanicalSystem([1.0], None, [4.0], forcing=[1.0]), (0, 1))
     sol = hs.simulate(hs.MechanicalSystem([1], None, [4], forcing=[hs.Harmonic(omega=3, sin=2)]), (0, 1))
     assert sol(1.0)[0] == pytest.approx(2 / (4 - 9) * (np.sin(3) - 1.5 * np.sin(2)), rel=1e-8)
+
+
+def test_contacts_that_all_share_their_coordinates_need_the_arrays() -> None:
+    """The ordinary model evaluates one state from each contact that sticks, one after the other: here there is none."""
+    with pytest.raises(hs.ModelError, match="of f0, f1 go round in a circle"):
+        hs.simulate(stuck_system().to_model(), (0, 1))

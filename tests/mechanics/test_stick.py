@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from mechanics.random_systems import random_system
-from numpy.polynomial.legendre import leggauss
+from mechanics.energy import balance
+from mechanics.random_systems import LAWS, random_system
+from mechanics.stuck_systems import FORCING, stuck_system, ulps_off
 
 import hybridsim as hs
 
@@ -22,45 +23,32 @@ def test_a_single_block_at_rest_moves_by_no_bit_in_1e5_periods() -> None:
     assert sol.stats["events"] == 0
 
 
-def test_constraints_over_several_coordinates_hold_to_4_ulp_and_do_not_grow() -> None:
-    rng = np.random.default_rng(0)
-    W = rng.normal(size=(2, 3))
-    contacts = [hs.MechanicalContact(f"f{i}", W[i], 50.0, "coulomb", {"mu": 0.9}) for i in range(2)]
-    mass = np.eye(3) + 0.2 * W.T @ W
-    forcing = [hs.Harmonic(1.3, sin=0.5), 0, hs.Harmonic(0.7, sin=0.5)]
-    sol = hs.simulate(hs.MechanicalSystem(mass, [0.1] * 3, [1.0] * 3, forcing, contacts), (0, 2e3), rtol=1e-6)
-    assert all(m.mode == "stick" for c in contacts for m in sol.modes[c.name])
-    for first in (100.0, 1900.0):
-        velocities = sol(np.linspace(first, first + 100, 300))[3:]
-        assert abs(velocities).max() > 0.01  # one way to move is left
-        terms = W[:, :, None] * velocities
-        assert (abs(terms.sum(axis=1)) <= 4 * np.spacing(abs(terms).sum(axis=1))).all()
+@pytest.mark.parametrize("base", [0.0, 0.2])
+def test_constraints_over_several_coordinates_hold_to_4_ulp_and_do_not_grow(base: float) -> None:
+    """As read from the run, and as the integrator itself has them; 1e5 periods: studies/long_runs.py."""
+    system, period = stuck_system(base), 2 * math.pi / FORCING
+    sol = hs.simulate(system, (0, 1e4 * period), rtol=1e-6)
+    assert all(m.mode == "stick" for c in system.contacts for m in sol.modes[c.name])
+    for first in (100, 9900):
+        states = sol(np.linspace(first * period, (first + 100) * period, 300))
+        assert np.ptp(states[3:], axis=1).max() > 0.01  # one way to move is left
+        assert ulps_off(system, states) <= 4
+    ends = [sol, *(hs.simulate(system, (0, n * period), rtol=1e-6, save="nothing") for n in range(100, 110))]
+    assert ulps_off(system, np.array([run.x_end for run in ends]).T) <= 4
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", [3, 8])
-def test_work_of_friction_is_the_loss_of_energy(seed: int) -> None:
-    system = random_system(seed, "coulomb", 6)
-    free = system.with_(C=None, forcing=None)
-    sol = hs.simulate(free, (0, 10), rtol=1e-12)
-    nodes, weights = leggauss(12)
-    knots = np.unique(sol.t)
-    t = (0.5 * np.add.outer(np.diff(knots), np.zeros(12)) + knots[:-1, None]) + 0.5 * np.outer(
-        np.diff(knots), nodes
-    )
-    velocity = sol(t.ravel())[free.n :]
-    W = np.zeros((len(free.contacts), free.n))
-    for c, contact in enumerate(free.contacts):
-        for i, w in contact.direction:
-            W[c, i] += w
-    power = sum(sol.output(c.name, t.ravel()) * (W[k] @ velocity) for k, c in enumerate(free.contacts))
-    work = (power.reshape(t.shape) @ weights * 0.5 * np.diff(knots)).sum()
-
-    def energy(x: np.ndarray) -> float:
-        q, v = np.split(x, 2)
-        return float(0.5 * v @ (free.M @ v) + 0.5 * q @ (free.K @ q))
-
-    lost = energy(sol(0.0)) - energy(sol(10.0))
-    assert work == pytest.approx(lost, rel=1e-9, abs=1e-9 * energy(sol(0.0)))
+def test_work_of_friction_is_the_loss_of_energy(seed: int, law: str) -> None:
+    """With forcing and damping, moving bases too; all 60 systems of each law: studies/coupled_contacts.py."""
+    sol = hs.simulate(random_system(seed, law, 6), (0, 10), rtol=1e-12)
+    found = balance(sol)
+    assert len(sol.events) > 5 and found.dissipated > 0.1
+    assert found.miss <= 1e-9
+    assert found.friction == pytest.approx(balance(sol, 16).friction, rel=1e-11)  # the quadrature's own error
+    unforced = hs.simulate(random_system(seed, law, 6).with_(C=None, forcing=None), (0, 10), rtol=1e-12)
+    alone = balance(unforced)
+    assert alone.friction == pytest.approx(-alone.gained, rel=1e-9, abs=1e-9 * alone.dissipated)
 
 
 def test_restarting_parts_is_as_good_as_restarting_everything() -> None:

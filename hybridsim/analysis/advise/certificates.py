@@ -67,6 +67,7 @@ def _is_linear(model: Model) -> bool:
     if (
         model.contacts
         or model.surfaces
+        or model.impacts
         or model.components
         or model.discrete
         or model.schedules
@@ -87,7 +88,9 @@ def _is_linear(model: Model) -> bool:
 
 def _nothing_moves(model: Model) -> tuple[float, float] | None:
     """(largest load, limit of stick) where a single contact holds everything from the start on, for ever."""
-    plain = not (model.surfaces or model.components or model.discrete or model.schedules or model.flow)
+    plain = not (
+        model.surfaces or model.impacts or model.components or model.discrete or model.schedules or model.flow
+    )
     if not plain or len(model.contacts) != 1 or any(i.kind != "wave" for i in model.inputs):
         return None
     if any(monitor.action != "record" for monitor in model.monitors):

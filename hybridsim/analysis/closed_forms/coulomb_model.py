@@ -69,7 +69,8 @@ def coulomb_oscillator(model: Model, t_span: tuple[float, float]) -> ClosedForm 
 
 def recognise(model: Model) -> Recognised | None:
     """The oscillator that a model declares, or None if it declares anything else."""
-    plain = not (model.surfaces or model.components or model.discrete or model.inputs or model.schedules)
+    automata = model.surfaces or model.impacts or model.components
+    plain = not (automata or model.discrete or model.inputs or model.schedules)
     if not plain or len(model.states) != 2 or len(model.contacts) != 1:
         return None
     if any(monitor.action != "record" for monitor in model.monitors):

@@ -108,7 +108,7 @@ class Rules:
         after, open_ = list(modes), set()
         for c, watched in zip(order, expansion.surfaces, strict=True):
             surface = self.components[c].surface
-            assert surface is not None
+            assert surface is not None and surface.below is not None  # models with impacts are refused
             if expansion.is_zero(watched):
                 if modes[c] == UNDECIDED:
                     open_.add(c)

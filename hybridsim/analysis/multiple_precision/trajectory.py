@@ -63,6 +63,12 @@ def multiple_precision_trajectory(
             f"model {model.name} has switching surfaces ({names}): the multiple-precision run does not slide",
             remedy="compare with another integrator at a tight tolerance, or with a closed form",
         )
+    if model.impacts:
+        names = ", ".join(impact.name for impact in model.impacts)
+        raise UsageError(
+            f"model {model.name} has impacts ({names}): the multiple-precision run knows resets, not impulses",
+            remedy="compare with another integrator at a tight tolerance, or with a closed form",
+        )
     if not t_span[1] > t_span[0]:
         raise UsageError(
             f"the multiple-precision run goes forward, and t_span is {t_span}", remedy="let t1 be after t0"

@@ -26,7 +26,8 @@ class LinearResponse:
     """First harmonics of the relative velocities of a model, by the coefficients of equivalent dampers."""
 
     def __init__(self, model: Model, frequency: float) -> None:
-        if model.surfaces or model.components or model.discrete or model.schedules or model.flow is not None:
+        automata = model.surfaces or model.impacts or model.components
+        if automata or model.discrete or model.schedules or model.flow is not None:
             raise NotLinear("it has modes, clocks or functions of its own")
         states, forces = [s.name for s in model.states], [c.name for c in model.contacts]
         values, definitions = model.parameter_values(), dict(model.definitions)

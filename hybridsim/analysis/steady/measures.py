@@ -161,11 +161,12 @@ class Measures:
         return ByName(self._contacts, self._stuck, "contact")
 
     def _stuck(self, contact: str) -> float:
-        hold = self._hold(contact)
+        hold = self.held_mode(contact)
         spent = sum(i.t1 - i.t0 for i in self.solution.modes[contact] if i.mode == hold)
         return spent / (self.solution.t_end - self.solution.t_start)
 
-    def _hold(self, contact: str) -> str:
+    def held_mode(self, contact: str) -> str:
+        """Name of the mode that counts as stick: of a contact ``stick``, of a switching surface its sliding mode."""
         system = self.solution._system
         automaton = next(a for a in system.automata if a.name == contact)
         return str(automaton.modes[automaton.hold])
@@ -177,7 +178,10 @@ class Measures:
 
     def _stops(self, contact: str) -> float:
         """Stretches of stick; one that goes on over the end of the period counts once, one without end not at all."""
-        hold, intervals = self._hold(contact), [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0]
+        hold, intervals = (
+            self.held_mode(contact),
+            [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0],
+        )
         count = sum(mode == hold for mode in intervals)
         return float(count - (intervals[0] == hold == intervals[-1]))
 

@@ -141,7 +141,7 @@ class SteadyState(Measures):
             names = self._motion.names
             lines.append("  amplitudes " + ", ".join(f"{n} {self.amplitude[n]:.9g}" for n in names))
             lines += [
-                f"  {c}: {100.0 * self.stick_fraction[c]:.4g} % of the period in stick, "
+                f"  {c}: {100.0 * self.stick_fraction[c]:.4g} % of the period in {self.held_mode(c)}, "
                 f"{self.stops_per_period[c]:g} stops"
                 for c in self._contacts
             ]

@@ -287,8 +287,13 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
 
 
 def _refuse_what_ends(system: System, is_period_given: bool) -> None:
-    """Refuse what happens once, or changes for ever: from then on there is another model."""
+    """Refuse impacts, and what happens once or changes for ever: from then on there is another model."""
     model = system.model
+    if system.is_unilateral.any():
+        raise UsageError(
+            f"model {model.name} has impacts, through which derivatives are not carried: steady states are not found",
+            remedy="write it with a guard and a reset, or run it until it has settled",
+        )
     for declared in model.inputs:
         if declared.kind != "wave":
             raise UsageError(

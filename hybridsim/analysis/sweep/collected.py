@@ -23,7 +23,7 @@ class Collected:
         self._arrays: dict[str, np.ndarray] = {}
         self._places: dict[str, tuple[int, int]] = {}  # of each name: the first point that has it, and where
 
-    def put(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
+    def put(self, numbers: Sequence[int], outcomes: Sequence[Outcome]) -> None:
         """Take in some points; where there are fewer outcomes than numbers, the rest was not run."""
         for number, (status, found) in zip(numbers, outcomes):
             self.status[number] = status

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.job import Batch, Job, Outcome, Settings, Watch, run_batch
+from hybridsim.analysis.sweep.journal import Journal
 from hybridsim.analysis.sweep.pieces import Pieces
 from hybridsim.errors import UsageError
 
@@ -49,15 +50,22 @@ class Sending:
     points, pieces : what is to be done, and how it is cut.
     collected : where the results go.
     tell : called with the number of points that are done; may raise KeyboardInterrupt.
+    journal : where results are written as they come.
     """
 
     def __init__(
-        self, job: Job, points: Points, pieces: Pieces, collected: Collected, tell: Callable[[int], None]
+        self,
+        job: Job,
+        points: Points,
+        pieces: Pieces,
+        collected: Collected,
+        tell: Callable[[int], None],
+        journal: Journal | None = None,
     ) -> None:
         self._job, self._points, self._pieces, self._collected = job, points, pieces, collected
-        self._tell = tell
+        self._tell, self._journal = tell, journal
         self._stop = threading.Event()
-        self._shared_done = 0
+        self._shared_done = collected.done
         self._lock = threading.Lock()
         self._under_way: dict[Future[Batch], range] = {}
 
@@ -117,6 +125,8 @@ class Sending:
             if error is None:
                 batch = future.result()
                 self._collected.put(numbers, batch.outcomes)
+                if self._journal is not None:
+                    self._journal.note(numbers, batch.outcomes)
                 self._pieces.learn(len(batch.outcomes), batch.seconds)
             elif isinstance(error, KeyboardInterrupt):  # Ctrl-C reaches all processes of a terminal
                 raise error

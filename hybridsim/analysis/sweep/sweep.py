@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from os import PathLike
 from typing import Any
 
+from hybridsim import __version__
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import points_of
 from hybridsim.analysis.sweep.job import Job, new_token
+from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.measures import measure_of
 from hybridsim.analysis.sweep.ready import units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
@@ -31,6 +34,7 @@ def sweep(
     workers: int | None = None,
     warm_start: bool = False,
     units: Mapping[str, str] | None = None,
+    journal: str | PathLike[str] | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Sweep:
@@ -58,6 +62,9 @@ def sweep(
         ready measure starts from the state of the neighbour. The first axis is then worked through in order; the
         others are independent.
     units : units of readings, for labels.
+    journal : a file to which results are written as they come. The same sweep with the same file takes from it what
+        there is: what was killed loses at most the points that were being worked at (with ``warm_start`` the rows), and
+        the result is to the last bit that of a sweep in one.
     progress : called as progress(done, total, what is next).
     options : passed on to the measure: to the function, to `steady_state`, or to `simulate`.
 
@@ -90,7 +97,11 @@ def sweep(
         bool(warm_start),
     )
     began = time.perf_counter()
-    collected, finished, who = work(job, points, executor, count, tell)
+    mark = fingerprint(
+        _text_of(model), points, _named(measure), bool(warm_start), sorted(options.items()), __version__
+    )
+    with Journal(journal, mark) if journal is not None else nullcontext() as file:
+        collected, finished, who = work(job, points, executor, count, tell, file)
     found = collected.values(points.shape)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
     if not callable(measure):
@@ -107,6 +118,11 @@ def sweep(
         time.perf_counter() - began,
         who,
     )
+
+
+def _text_of(model: Model) -> str:
+    """What tells a model from others; of functions their names."""
+    return repr(model) if model.flow is not None else model.to_toml()
 
 
 def _named(measure: Any) -> str:

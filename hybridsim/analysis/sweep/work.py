@@ -7,16 +7,24 @@ import time
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
+
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.job import Job
+from hybridsim.analysis.sweep.journal import Journal
 from hybridsim.analysis.sweep.pieces import Pieces
 from hybridsim.analysis.sweep.sending import Points, Sending, require_sendable, worker_count
 from hybridsim.errors import UsageError
 
 
 def work(
-    job: Job, points: Points, executor: Any, workers: int | None, progress: Progress | None
+    job: Job,
+    points: Points,
+    executor: Any,
+    workers: int | None,
+    progress: Progress | None,
+    journal: Journal | None = None,
 ) -> tuple[Collected, bool, str]:
     """All results, whether they are whole, and who worked.
 
@@ -35,11 +43,27 @@ def work(
     total = math.prod(points.shape)
     chains = total // points.shape[0] if job.chained else None
     collected = Collected(total)
-    sending = Sending(job, points, Pieces(total, chains, count), collected, _Told(total, progress))
+    done = _taken_over(journal, collected, chains) if journal is not None else None
+    pieces = Pieces(total, chains, count, done)
+    sending = Sending(job, points, pieces, collected, _Told(total, progress), journal)
     if executor is not None:
         return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
     with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
         return collected, sending.run(threads, count), f"threads ({count})"
+
+
+def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> np.ndarray:
+    """Which points (total,) are known from a journal; of a chain all or none."""
+    total = len(collected.status)
+    known = np.zeros(total, dtype=np.bool_)
+    for numbers, outcomes in journal.known:
+        known[numbers] = True
+        if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
+            collected.put(numbers, outcomes)
+    if chains is not None:
+        by_chain = known.reshape(-1, chains)
+        by_chain &= by_chain.all(axis=0)
+    return known
 
 
 class _Told:

@@ -73,6 +73,11 @@ class Carrier:
                 f"model {solution.model.name} is made of Python functions, of which derivatives are not known",
                 remedy="write it in expressions",
             )
+        if self.system.is_unilateral.any():
+            raise UsageError(
+                f"model {solution.model.name} has impacts, through which derivatives are not carried",
+                remedy="write it with a guard and a reset, or compare runs with parameters that differ",
+            )
         module: Any = self.system.code.module
         self._reset, self._project, self._rates = (
             differentiated(f) for f in (module.reset, module.project, module.rates)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError, nearest
-from hybridsim.model.units import time_unit, units_of
 from hybridsim.notebook import run_html
+from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.tables import Table, event_columns, event_frame
 
 if TYPE_CHECKING:
@@ -22,50 +21,11 @@ if TYPE_CHECKING:
 
     from hybridsim.engine.chain import SegmentChain
     from hybridsim.engine.pieces import Segment
-    from hybridsim.engine.system import System
     from hybridsim.engine.trajectory import Trajectory
-    from hybridsim.model import Model
+    from hybridsim.solution.explanation import Explanation
+    from hybridsim.solution.run import Run
 
 _GOOD = ("finished", "terminated")
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened at one instant.
-
-    Parameters
-    ----------
-    t : time, rounded to a double.
-    kind : "transition", "monitor", "scheduled" or "near-grazing".
-    component : name of the component, monitor or schedule.
-    guard : name of the guard that fired, if one did.
-    source, target : modes before and after; empty where no mode changed.
-    direction : -1 falling, +1 rising, 0 where it has no meaning.
-    x_minus, x_plus : states (n,) just before and just after.
-    """
-
-    t: float
-    kind: str
-    component: str
-    guard: str
-    source: str
-    target: str
-    direction: int
-    x_minus: np.ndarray
-    x_plus: np.ndarray
-
-    def __repr__(self) -> str:
-        change = f" {self.source} -> {self.target}" if self.source or self.target else ""
-        return f"<{self.kind} {self.component}{change} at t = {self.t:.9g}>"
-
-
-@dataclass(frozen=True)
-class ModeInterval:
-    """A stretch of time that a component spent in one mode."""
-
-    mode: str
-    t0: float
-    t1: float
 
 
 class Solution:
@@ -79,25 +39,17 @@ class Solution:
 
     def __init__(
         self,
-        model: Model,
-        system: System,
+        run: Run,
         trajectory: Trajectory,
-        integrator: str,
         wall_time: float,
         compile_time: float,
-        grid: np.ndarray | None,
-        t_span: tuple[float, float],
-        save: str | float = "all",
-        reason: str = "",
     ) -> None:
-        self.model = model
-        self.integrator = integrator
-        self._system = system
-        self._trajectory = trajectory
-        self._grid = grid
-        self._span, self._save = t_span, save
+        self.model = run.model
+        self.integrator = run.method.name
+        self._run, self._system, self._trajectory = run, run.system, trajectory
+        self._grid, self._save, self._reason = run.grid, run.save, run.reason
+        self._span = (run.task.t0, run.task.t1)
         self._cost = (wall_time, compile_time)
-        self._reason = reason  # why "auto" took this integrator
 
     # -- trajectory -----------------------------------------------------------------------------------------
 
@@ -284,6 +236,28 @@ class Solution:
     def _happened(self) -> tuple[Event, ...]:
         return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
+    def explain(self, number: int) -> Explanation:
+        """Why an event went as it did: what came to zero, which modes could hold just after, and why that one.
+
+        Parameters
+        ----------
+        number : its place in `events`.
+
+        Errors
+        ------
+        UsageError where there is no such event, or what is needed was not kept (``save``).
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> sol = hs.simulate("dfcs", t_span=(0, 0.01))
+        >>> print(sol.explain(0).reason)
+        slip+ is the only mode that is admissible just after
+        """
+        from hybridsim.solution.explanation import explain
+
+        return explain(self, number)
+
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
         self._require_events()
@@ -361,6 +335,58 @@ class Solution:
         counters = self._trajectory.counters
         return {**vars(counters), "wall_time": self._cost[0], "compile_time": self._cost[1]}
 
+    # -- on disk, and on ------------------------------------------------------------------------------------
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the run to one file: the model, how it was run, the trajectory, where it goes on.
+
+        `hybridsim.load_solution` reads it. The file is a zip of NumPy arrays and one text; no code is in it.
+
+        Parameters
+        ----------
+        path : the file; .hsol is a good ending.
+
+        Errors
+        ------
+        UsageError for a model of Python functions, and where the file cannot be written.
+        """
+        from hybridsim.solution.archive import save
+
+        save(self, path)
+
+    def resume(
+        self,
+        t_end: float | None = None,
+        *,
+        limits: Mapping[str, float] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Solution:
+        """Go on with the run from just after its last event, and return the solution of the whole.
+
+        It computes what an undisturbed run would have computed, to the last bit: after Ctrl-C, after a limit, and where
+        it is to go further than it was asked for (there up to the tolerances for the methods of SciPy and SUNDIALS and
+        ``rodas5p``, whose first step depends on how far away the end is).
+
+        Parameters
+        ----------
+        t_end : where to end; without it, where the run should have ended.
+        limits, progress : as in `simulate`; limits count from here.
+
+        Errors
+        ------
+        UsageError where there is nothing left to do, or no way on (a terminating monitor, an error).
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> part = hs.simulate("dfcs", t_span=(0, 0.1), limits={"events": 5}, integrator="scipy-dop853")
+        >>> part.status, part.resume().status
+        ('limit', 'finished')
+        """
+        from hybridsim.solution.resume import resumed
+
+        return resumed(self, t_end, limits, progress)
+
     # -- as SciPy's OdeResult --------------------------------------------------------------------------------
 
     @property
@@ -397,35 +423,9 @@ class Solution:
         points : how many equal steps of time to take, both ends included; without it ``sol.t``: the integrator's own
             steps with each event time twice, on both its sides, or the grid of `simulate`.
         """
-        if points is not None and points < 2:
-            raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
-        model, own_steps = self.model, points is None and self._grid is None
-        if own_steps:
-            t, ends = self.t, np.cumsum([len(g.s) for g in self._segments], dtype=int)
-            x = self.y.T
-            pieces = [
-                (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(self._segments, ends, strict=True)
-            ]
-        else:
-            t = self.t if points is None else np.linspace(self.t_start, self.t_end, points)
-            x, pieces = self._pieces(t, "+") if len(t) else (np.zeros((0, len(self.names))), [])
-        names = [d.name for d in model.discrete]
-        names += [q for q in self._system.quantities if " in " not in q]
-        columns = {name: np.empty(len(t)) for name in (*self.names, *names)}
-        declared = self._system.declared
-        numbers = np.empty((len(declared), len(t)), dtype=np.int64)
-        for segment, chosen, s in pieces:
-            found = self._quantities(names, segment, s, x[chosen])
-            for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
-                columns[name][chosen] = values
-            numbers[:, chosen] = segment.z[: len(declared), None]
-        return Table(
-            t,
-            columns,
-            {a.name: (a.modes, row) for a, row in zip(declared, numbers, strict=True)},
-            {name: unit for name, unit in ({"t": time_unit(model)} | units_of(model)).items() if unit},
-            {"model": model.name, "title": model.title, "integrator": self.integrator, "status": self.status},
-        )
+        from hybridsim.solution.tabulated import tabulated
+
+        return tabulated(self, points)
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
         """Write the `table` as CSV."""

@@ -1,0 +1,197 @@
+"""What becomes of a solution on the command line: a summary or JSON, files, an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.cli import options, values
+from hybridsim.cli.options import PICTURES
+from hybridsim.cli.output import complain, print_json, require_writable
+from hybridsim.cli.session import Session
+from hybridsim.errors import SimulationError, UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where a solution is to go, and what the run may cost."""
+    parser.add_argument(
+        "--limit",
+        metavar="NAME=VALUE",
+        type=values.assignment,
+        action="append",
+        default=[],
+        help="stop with what there is after so many events, steps, seconds or megabytes",
+    )
+    options.add_plot(parser, "the run")
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the run as a table")
+    parser.add_argument(
+        "--npz", metavar="FILE", type=Path, help="write the run and its events for numpy.load"
+    )
+    parser.add_argument(
+        "--points",
+        metavar="N",
+        type=values.count,
+        help="equal steps of time for --csv and --npz (default: the integrator's own, events on both sides)",
+    )
+    parser.add_argument(
+        "--save",
+        metavar="FILE",
+        type=Path,
+        help="write all of the run, for hybridsim resume and hs.load_solution (.hsol)",
+    )
+    parser.add_argument(
+        "--explain",
+        metavar="N",
+        type=int,
+        action="append",
+        default=[],
+        help="say why the N-th event went as it did (from 0; again for more)",
+    )
+    options.add_json(parser, "the result", "the summary")
+
+
+def check_arguments(args: argparse.Namespace) -> None:
+    """Refuse what cannot be written, before the work is done."""
+    if args.plot:
+        require_writable(args.plot, "--plot", PICTURES)
+    if args.csv:
+        require_writable(args.csv, "--csv")
+    if args.npz:
+        require_writable(args.npz, "--npz", (".npz",))
+    if args.save:
+        require_writable(args.save, "--save", (".hsol",))
+    if args.points is not None and not (args.csv or args.npz):
+        raise UsageError("--points without --csv or --npz", remedy="say where the table is to be written")
+    if args.points == 1:
+        raise UsageError("--points 1", remedy="give at least 2: the start and the end")
+
+
+def limits(args: argparse.Namespace) -> dict[str, Any]:
+    """What the run may cost."""
+    found: dict[str, Any] = {}
+    for name, text in args.limit:
+        if name in found:
+            raise UsageError(f"--limit {name} is given twice", remedy="give one value")
+        found[name] = values.option_value(text)
+    return found
+
+
+def deliver(solution: Solution, args: argparse.Namespace, session: Session) -> int:
+    """Print the summary, write the files; 1 where the simulation did not succeed."""
+    explanations = [solution.explain(number) for number in args.explain]
+    if args.json:
+        print_json(
+            _record(solution) | ({"explanations": [asdict(e) for e in explanations]} if explanations else {})
+        )
+    else:
+        print("\n".join([*_summary(solution), *map(str, explanations)]))
+    for warning in solution.warnings:
+        complain(f"warning: {warning}")
+    if solution.t.size:  # else it stopped before the first step, and there is nothing to write
+        _write(solution, args, session)
+    if args.save:
+        solution.save(args.save)
+        session.wrote(args.save)
+    if solution.success:
+        return 0
+    begins = solution.message.startswith(solution.status)
+    complain(solution.message if begins else f"{solution.status}: {solution.message}")
+    if args.save and solution.status in ("limit", "interrupted"):
+        complain(f"hybridsim resume {args.save} goes on")
+    return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
+
+
+def _write(solution: Solution, args: argparse.Namespace, session: Session) -> None:
+    if args.csv:
+        solution.to_csv(args.csv, args.points)
+        session.wrote(args.csv)
+    if args.npz:
+        solution.to_npz(args.npz, args.points)
+        session.wrote(args.npz)
+    if args.plot:
+        from hybridsim.plot import save, time_history
+
+        save(time_history(solution), args.plot)
+        session.wrote(args.plot)
+
+
+def _shares(solution: Solution) -> dict[str, dict[str, float]]:
+    """Share of the time that each component spent in each of its modes."""
+    shares: dict[str, dict[str, float]] = {}
+    for component, intervals in solution.modes.items():
+        spent: dict[str, float] = {}
+        for interval in intervals:
+            spent[interval.mode] = spent.get(interval.mode, 0.0) + abs(interval.t1 - interval.t0)
+        total = math.fsum(spent.values()) or 1.0
+        shares[component] = {mode: time / total for mode, time in spent.items()}
+    return shares
+
+
+def _final(solution: Solution) -> list[tuple[str, float]]:
+    """Name and value of every state at the end of the run; none where the run never began."""
+    return [(name, row[-1]) for name, row in zip(solution.names, solution.y, strict=True) if row.size]
+
+
+def _summary(solution: Solution) -> list[str]:
+    model, stats = solution.model, solution.stats
+    kinds = Counter(event.kind for event in solution.events)
+    lines = [
+        f"{model.name}: {model.title}" if model.title else model.name,
+        f"  integrator   {solution.integrator}",
+        f"  status       {solution.status}",
+        f"  events       {len(solution.events)}"
+        + (f" ({', '.join(f'{n} {kind}' for kind, n in kinds.items())})" if kinds else ""),
+    ]
+    for component, modes in _shares(solution).items():
+        shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
+        lines.append(f"  {f'modes of {component}':<12} {shares}")
+    if solution.t.size:
+        units = {state.name: state.unit for state in model.states}
+        final = ", ".join(f"{name} = {value:.9g} {units[name]}".rstrip() for name, value in _final(solution))
+        lines.append(f"  time         {solution.t_start:g} to {solution.t_end:.9g}")
+        lines.append(f"  final state  {final}")
+    lines.append(
+        f"  cost         {stats['steps']} steps ({stats['rejected']} rejected), "
+        f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s"
+    )
+    return lines
+
+
+def _record(solution: Solution) -> dict[str, Any]:
+    from hybridsim import __version__
+
+    model = solution.model
+    return {
+        "hybridsim": __version__,
+        "model": model.name,
+        "parameters": model.parameter_values(),
+        "integrator": solution.integrator,
+        "success": solution.success,
+        "status": solution.status,
+        "message": solution.message,
+        "warnings": solution.warnings,
+        "t_span": [solution.t_start, solution.t_end] if solution.t.size else None,
+        "final": dict(_final(solution)),
+        "modes": _shares(solution),
+        "events": [
+            {
+                "t": event.t,
+                "kind": event.kind,
+                "component": event.component,
+                "guard": event.guard,
+                "source": event.source,
+                "target": event.target,
+                "x_minus": event.x_minus,
+                "x_plus": event.x_plus,
+            }
+            for event in solution.events
+        ],
+        "stats": solution.stats,
+    }

@@ -1,0 +1,64 @@
+"""What stands in the way of a step: a rate or guard without a value, or a state that grows without bound."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Outcome
+    from hybridsim.engine.system import System
+    from hybridsim.engine.timepair import Instant
+    from hybridsim.engine.trajectory import Trajectory
+
+_GROWN = 1e6  # times the size at the start (or 1): worth saying where no step succeeds any more
+_NEAR, _FARTHEST = 60, 1e-5  # halvings of a probe, which reaches this share of the time so far
+
+
+def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Instant, p: np.ndarray) -> str:
+    """Why no step goes on from where a run stopped, in words; empty where that cannot be told.
+
+    Looks along the tangent at the last state for the first of the rates, then of the active guards, to have no value.
+    """
+    if not system.n:
+        return ""
+    last = record.segments[-1] if record.segments and record.segments[-1].end >= origin else None
+    if last is not None and float(last.end) == float(origin) and len(last.s) == 1:
+        last = None
+    s = float(last.s[-1]) if last is not None else 0.0
+    x = last.x[-1] if last is not None else outcome.x
+    p, z = (last.p, last.z) if last is not None else (p, outcome.z)
+    here = origin.plus(s) if last is None else last.end
+    first = np.abs(record.segments[0].x[0] if record.segments else x)
+    grown = np.flatnonzero(np.abs(x) > _GROWN * np.maximum(first, 1.0))
+    if len(grown):
+        states = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in grown)
+        return f"{states}: it may grow without bound"
+    rates = system.flow(s, x, p, z)
+    if not np.isfinite(rates).all():
+        return _said(
+            system, "the rate of", [system.names[i] for i in np.flatnonzero(~np.isfinite(rates))], x, z
+        )
+    reach = _FARTHEST * max(abs(float(here)), abs(s), 1e-300)
+    for k in range(_NEAR, -1, -1):
+        step = reach * 0.5**k
+        ahead = system.flow(s + step, x + step * rates, p, z)
+        if not np.isfinite(ahead).all():
+            names = [system.names[i] for i in np.flatnonzero(~np.isfinite(ahead))]
+            return _said(system, "just after, the rate of", names, x, z)
+        guards = system.rows(
+            "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
+        )[0]
+        lost = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
+        if len(lost):
+            return _said(system, "just after,", [system.guard_title(int(g), z) for g in lost], x, z)
+    return ""
+
+
+def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndarray) -> str:
+    """What is no number, and where."""
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, x, strict=True))
+    modes = ", ".join(f"{a.name} {a.modes[m]}" for a, m in zip(system.declared, z, strict=False))
+    where = f", {modes}" if modes else ""
+    return f"{head} {', '.join(names)} is not a number (at {state}{where})"

@@ -1,0 +1,52 @@
+"""Checks of unilateral contacts: what their gap and their restitution may use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hybridsim.expr import evaluate
+from hybridsim.model.impact import SPEED, Impact
+from hybridsim.model.nonsmooth import has_word
+from hybridsim.model.scope import Scope
+
+
+def check_impacts(scope: Scope) -> None:
+    """Report gaps that depend on a mode or on no state or have corners, and restitutions over unknown names."""
+    for impact in scope.model.impacts:
+        _impact(scope, impact)
+
+
+def _impact(scope: Scope, impact: Impact) -> None:
+    what = f"impact {impact.name}"
+    scope.need(impact.gap, f"{what}, gap", scope.all_names - {impact.name})
+    names = (scope.all_names - {impact.name}) | {SPEED}
+    scope.need(impact.restitution, f"{what}, restitution", names)
+    if SPEED in scope.kinds and SPEED in impact.restitution.names:
+        message = f"{what}, restitution: '{SPEED}' is the speed of approach here and a {scope.kinds[SPEED]} elsewhere"
+        scope.fail(impact, message, f"rename the {scope.kinds[SPEED]}.")
+    switched = sorted(filter(scope.is_switched, scope.reached(impact.restitution) & scope.all_names))
+    if switched:
+        message = f"{what}: the restitution depends on '{switched[0]}', which depends on a mode"
+        scope.fail(impact, message, f"write it over {SPEED}, states and parameters.")
+    reached = scope.reached(impact.gap)
+    if not reached <= scope.all_names:
+        return
+    switched = sorted(filter(scope.is_switched, reached))
+    if switched:
+        message = f"{what}: the gap depends on '{switched[0]}', which depends on a mode"
+        scope.fail(impact, message, "write it over states, parameters and t.")
+    elif any(map(has_word, [impact.gap, *(e for n, e in scope.model.definitions if n in reached)])):
+        message = f"{what}: the gap '{impact.gap.text}' is not smooth"
+        scope.fail(impact, message, "write one impact for each smooth piece of it.")
+    elif not any(scope.kinds.get(name) == "state" for name in reached):
+        message = f"{what}: the gap '{impact.gap.text}' contains no state"
+        scope.fail(impact, message, "write the distance between the bodies, e.g. 'h' or 'x2 - x1 - d'.")
+
+
+def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float]) -> None:
+    """Report a restitution that is a number and not one of an impact that loses energy."""
+    if impact.restitution.names <= values.keys():
+        e = evaluate(impact.restitution, values)
+        if not 0.0 <= e <= 1.0:
+            message = f"impact {impact.name}: the restitution '{impact.restitution.text}' is {e!r}"
+            scope.fail(impact, message, "give a number from 0 (no rebound) to 1 (no loss).")

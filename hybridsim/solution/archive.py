@@ -1,0 +1,206 @@
+"""Solutions in files: one file holds the model, how it was run, the trajectory, and where the run goes on.
+
+The file is a zip of NumPy arrays (`numpy.savez`), one of which is a text, the header, in JSON. Nothing in it is
+pickled, so that reading a file runs no code of its writer.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from dataclasses import asdict
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import HybridsimError, UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.engine.checkpoint import Checkpoint
+    from hybridsim.solution.run import Run
+    from hybridsim.solution.solution import Solution
+
+FORMAT, VERSION = "hybridsim solution", 1
+_HEADER = "header"
+
+
+def save(solution: Solution, path: str | PathLike[str]) -> None:
+    """Write a solution to a file; see `Solution.save`."""
+    from hybridsim import __version__
+    from hybridsim.engine.block_arrays import taken_apart
+
+    run, trajectory = solution._run, solution._trajectory
+    task, counters = run.task, trajectory.counters
+    arrays: dict[str, np.ndarray] = {
+        "x0": task.x0,
+        "z0": task.z0,
+        "discrete": task.discrete,
+        "atol": task.tolerances.atol,
+    }
+    if run.grid is not None:
+        arrays["grid"] = run.grid
+    kinds: list[str] = []
+    for kind, parts in taken_apart(trajectory.segments.blocks):
+        arrays |= {f"segments/{len(kinds)}/{name}": part for name, part in parts.items()}
+        kinds.append(kind)
+    occurrences = list(trajectory.occurrences)
+    arrays["events/instants"] = np.array([o.instant for o in occurrences]).reshape(-1, 2)
+    arrays["events/words"] = np.array([o[1:6] for o in occurrences], dtype=str).reshape(-1, 5)
+    arrays["events/directions"] = np.array([o.direction for o in occurrences], dtype=np.int64)
+    for name in ("x_minus", "x_plus"):
+        rows = np.array([getattr(o, name) for o in occurrences], dtype=float)
+        arrays[f"events/{name}"] = rows.reshape(len(occurrences), run.system.n)
+    checkpoint = trajectory.checkpoint
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "hybridsim": __version__,
+        "model": run.model.to_toml(),
+        "method": {"name": run.method.name, "options": vars(run.method)},
+        "span": [task.t0, task.t1],
+        "tolerances": {n: getattr(task.tolerances, n) for n in ("rtol", "max_step", "first_step")},
+        "keep": list(task.keep),
+        "save": run.save,
+        "reason": run.reason,
+        "kinds": kinds,
+        "status": trajectory.status,
+        "message": trajectory.message,
+        "warnings": trajectory.warnings,
+        "warnings_there": trajectory.warnings_there,
+        "counters": asdict(counters),
+        "cost": list(solution._cost),
+    }
+    if checkpoint is not None:
+        arrays |= {f"checkpoint/{name}": array for name, array in checkpoint.arrays.items()}
+        header["checkpoint"] = {
+            "names": list(checkpoint.arrays),
+            **{n: getattr(checkpoint, n) for n in ("instant", "settled", "pace", "segments", "occurrences")},
+        }
+    arrays[_HEADER] = np.frombuffer(
+        json.dumps(header, default=int).encode(), dtype=np.uint8
+    )  # NumPy's whole numbers
+    whole = os.fspath(path)
+    partly = f"{whole}.part"
+    try:
+        with open(partly, "wb") as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]  # its keywords are arrays, and one is a flag
+        os.replace(partly, whole)  # a file of that name is whole at any time
+    except OSError as error:
+        raise UsageError(
+            f"{whole} cannot be written: {error.strerror}", remedy="give another path"
+        ) from error
+
+
+def load_solution(path: str | PathLike[str]) -> Solution:
+    """Read a solution that `Solution.save` wrote.
+
+    Events, modes and the states at the run's own steps are to the last bit those that were saved, and so are
+    ``resume()`` and the dense output of the compiled integrators; the dense output of the others to rounding.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Errors
+    ------
+    UsageError where it is no such file, damaged, or written by a later version.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.simulate("dfcs", t_span=(0, 0.1)).save("run.hsol")  # doctest: +SKIP
+    >>> hs.load_solution("run.hsol").status  # doctest: +SKIP
+    'finished'
+    """
+    name = os.fspath(path)
+    remedy = "give a file that sol.save(...) has written"
+    try:
+        with open(name, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {key: stored[key] for key in stored.files}
+        header = json.loads(bytes(arrays[_HEADER]))
+        if header["format"] != FORMAT:
+            raise ValueError(f"its format is {header['format']!r}")
+    except OSError as error:
+        raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=remedy) from error
+    except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        raise UsageError(f"{name} holds no solution: {error}", remedy=remedy) from error
+    if header.get("version") != VERSION:
+        raise UsageError(
+            f"{name} is of version {header.get('version')!r}, written by hybridsim {header.get('hybridsim')}; "
+            f"this one reads version {VERSION}",
+            remedy="read it with that version",
+        )
+    try:
+        return _put_together(header, arrays)
+    except HybridsimError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise UsageError(f"{name} is damaged: {type(error).__name__}: {error}", remedy=remedy) from error
+
+
+def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solution:
+    from hybridsim.engine.block_arrays import put_together
+    from hybridsim.engine.blocks import OccurrenceList
+    from hybridsim.engine.pieces import Occurrence
+    from hybridsim.engine.stepping import Counters
+    from hybridsim.engine.timepair import Instant
+    from hybridsim.engine.trajectory import Trajectory
+    from hybridsim.solution.solution import Solution
+
+    run = _run(header, arrays)
+    trajectory = Trajectory(run.system, run.task.keep)
+    stored = ((kind, _below(arrays, f"segments/{k}/")) for k, kind in enumerate(header["kinds"]))
+    trajectory.segments.blocks = put_together(run.system, stored)
+    events = _below(arrays, "events/")
+    found = OccurrenceList()
+    for k, (kind, component, guard, source, target) in enumerate(events["words"].tolist()):
+        instant, direction = Instant(*events["instants"][k].tolist()), int(events["directions"][k])
+        states = (events["x_minus"][k], events["x_plus"][k])
+        found.append(Occurrence(instant, kind, component, guard, source, target, direction, *states))
+    trajectory.occurrences.blocks = [found] if found else []
+    trajectory.counters = Counters(**header["counters"])
+    trajectory.status, trajectory.message = header["status"], header["message"]
+    trajectory.warnings, trajectory.warnings_there = header["warnings"], header["warnings_there"]
+    if "checkpoint" in header:
+        trajectory.checkpoint = _checkpoint(header["checkpoint"], arrays)
+    return Solution(run, trajectory, *header["cost"])
+
+
+def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
+    from hybridsim.engine.keep import Keep
+    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.stepping import Tolerances
+    from hybridsim.engine.trajectory import Task
+    from hybridsim.integrators.registry import make_integrator
+    from hybridsim.model import Model
+    from hybridsim.solution.run import Run
+
+    model = Model.from_toml(header["model"])
+    system = system_of(model)
+    tolerances = Tolerances(atol=arrays["atol"], **header["tolerances"])
+    (t0, t1), keep = header["span"], Keep(*header["keep"])
+    task = Task(t0, t1, arrays["x0"], arrays["z0"], tolerances, arrays["discrete"], keep)
+    method = make_integrator(header["method"]["name"], header["method"]["options"])
+    return Run(model, system, method, task, arrays.get("grid"), header["save"], header["reason"])
+
+
+def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoint:
+    from hybridsim.engine.checkpoint import Checkpoint, Pace
+    from hybridsim.engine.timepair import Instant
+
+    last, intervals, longest, forecast = header["pace"]
+    pace = Pace(last and Instant(*last), tuple(intervals), longest, forecast and tuple(forecast))
+    return Checkpoint(
+        Instant(*header["instant"]),
+        {name: arrays[f"checkpoint/{name}"] for name in header["names"]},
+        header["settled"] and Instant(*header["settled"]),
+        pace,
+        header["segments"],
+        header["occurrences"],
+    )
+
+
+def _below(arrays: dict[str, np.ndarray], head: str) -> dict[str, np.ndarray]:
+    return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}

@@ -1,0 +1,46 @@
+"""What happened in a run: events, and the stretches of time between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at one instant.
+
+    Parameters
+    ----------
+    t : time, rounded to a double.
+    kind : "transition", "monitor", "scheduled" or "near-grazing".
+    component : name of the component, monitor or schedule.
+    guard : name of the guard that fired, if one did.
+    source, target : modes before and after; empty where no mode changed.
+    direction : -1 falling, +1 rising, 0 where it has no meaning.
+    x_minus, x_plus : states (n,) just before and just after.
+    """
+
+    t: float
+    kind: str
+    component: str
+    guard: str
+    source: str
+    target: str
+    direction: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+    def __repr__(self) -> str:
+        change = f" {self.source} -> {self.target}" if self.source or self.target else ""
+        return f"<{self.kind} {self.component}{change} at t = {self.t:.9g}>"
+
+
+@dataclass(frozen=True)
+class ModeInterval:
+    """A stretch of time that a component spent in one mode."""
+
+    mode: str
+    t0: float
+    t1: float

@@ -1,0 +1,47 @@
+"""Going on with a run from the last place that it noted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybridsim import arguments
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.solution.solution import Solution
+
+_EARLY = ("limit", "interrupted")
+
+
+def resumed(
+    solution: Solution,
+    t_end: float | None,
+    limits: Mapping[str, float] | None,
+    progress: Callable[[float], None] | None,
+) -> Solution:
+    """The solution of the whole run; see `Solution.resume`."""
+    run, trajectory = solution._run, solution._trajectory
+    task, checkpoint = run.task, trajectory.checkpoint
+    if solution.status not in ("finished", *_EARLY) or checkpoint is None:
+        raise UsageError(
+            f"the run of {run.model.name} cannot go on: {solution.status}, {solution.message}",
+            remedy="start a new one, from sol.y[:, -1] and with what is to be different",
+        )
+    end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
+    sign = 1.0 if task.t1 >= task.t0 else -1.0
+    if t_end is None and solution.status == "finished":
+        raise UsageError(
+            f"the run of {run.model.name} is finished, at t = {task.t1!r}",
+            remedy="say how far to go on: t_end=...",
+        )
+    if not sign * (end - solution.t_end) >= 0.0:
+        raise UsageError(
+            f"t_end is {t_end!r}, and the run is already at {solution.t_end!r}", remedy="give a later time"
+        )
+    record = trajectory.up_to_checkpoint(run.system)
+    task = replace(task, t1=end, limits=arguments.run_limits(limits), record=record)
+    return replace(run, task=task).carried_out(
+        arguments.callback(progress), solution.stats["compile_time"], solution.stats["wall_time"]
+    )

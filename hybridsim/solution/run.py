@@ -1,0 +1,54 @@
+"""One run, ready to be carried out: the model, the method, the task, and what its solution is to show."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.python_code import PythonCode
+from hybridsim.solution.solution import Solution
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+    from hybridsim.engine.trajectory import Task
+    from hybridsim.integrators.base import Integrator
+    from hybridsim.model import Model
+
+
+@dataclass(frozen=True)
+class Run:
+    """What `hybridsim.simulate` makes of its arguments.
+
+    Parameters
+    ----------
+    grid : the times at which the solution is given; None for the integrator's own steps.
+    save : what is kept, as it was asked for.
+    reason : why "auto" took this method.
+    """
+
+    model: Model
+    system: System
+    method: Integrator
+    task: Task
+    grid: np.ndarray | None = None
+    save: str | float = "all"
+    reason: str = ""
+
+    def carried_out(
+        self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
+    ) -> Solution:
+        """The solution; before: seconds that an earlier part of it took."""
+        began = time.perf_counter()
+        trajectory = self.method.run(self.system, self.task, progress)
+        wall_time = time.perf_counter() - began
+        if isinstance(self.system.code, PythonCode):
+            self.system.code.report(trajectory)
+        trajectory.close(self.task.keep)
+        # a solution holds on to what the run left, not to what it began with
+        return Solution(
+            replace(self, task=replace(self.task, record=None)), trajectory, before + wall_time, compile_time
+        )

@@ -1,0 +1,133 @@
+"""Sweeps that were killed go on where they were, and end with the bits of an undisturbed one."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analysis.swept import end
+
+import hybridsim as hs
+from hybridsim.cli import main
+
+VALUES = {"F0": np.linspace(20.0, 40.0, 12).tolist(), "omega": [350.0, 424.0, 500.0]}
+COUNT = 36
+
+
+def mixed(model: hs.Model) -> dict[str, object]:
+    """Readings of every kind, a point that fails, one that is no number."""
+    force = model.parameter_values()["F0"]
+    if force > 38.0:
+        raise RuntimeError("too much")
+    root = float("nan") if force < 21.0 else force**0.5
+    return {
+        "root": root,
+        "turned": complex(force, 1.0 / 3.0),
+        "word": f"at {force:.3g}",
+        "row": np.array([force, 0.1]),
+        "rows": np.array([1j * force]),
+    }
+
+
+def same(one: hs.Sweep, other: hs.Sweep) -> bool:
+    return (
+        (one.status == other.status).all()
+        and list(one.values) == list(other.values)
+        and all(
+            v.dtype == other[n].dtype and (np.array_equal(v, other[n], equal_nan=v.dtype != object))
+            for n, v in one.values.items()
+        )
+    )
+
+
+@pytest.mark.parametrize("measure", [end, mixed])
+def test_a_journal_that_is_cut_anywhere_goes_on(measure: object, tmp_path: Path) -> None:
+    whole = hs.sweep("dfcs", VALUES, measure)
+    path = tmp_path / "sweep.journal"
+    assert same(whole, hs.sweep("dfcs", VALUES, measure, journal=path, workers=2))
+    written = path.read_bytes()
+    draws = np.random.default_rng(3)
+    for _ in range(25):
+        kept = int(draws.integers(0, len(written) + 1))
+        path.write_bytes(written[:kept])
+        assert same(whole, hs.sweep("dfcs", VALUES, measure, journal=path, workers=2)), kept
+        assert path.read_bytes().count(b"\n") >= written[:kept].count(b"\n")
+
+
+def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
+    path, calls = tmp_path / "sweep.journal", []
+
+    def measure(model: hs.Model) -> float:
+        calls.append(model.parameter_values()["F0"])
+        return calls[-1]
+
+    hs.sweep("dfcs", VALUES, measure, journal=path, workers=1)
+    assert len(calls) == COUNT
+    hs.sweep("dfcs", VALUES, measure, journal=path, workers=1)
+    assert len(calls) == COUNT
+    lines = path.read_bytes().splitlines(keepends=True)
+    lost = sum(len(json.loads(line)[0]) for line in lines[-2:])
+    path.write_bytes(b"".join(lines[:-2]))
+    hs.sweep("dfcs", VALUES, measure, journal=path, workers=1)
+    assert len(calls) == COUNT + lost
+
+
+def test_rows_that_follow_each_other_are_done_as_rows(tmp_path: Path) -> None:
+    def follow(model: hs.Model, previous: float | None) -> float:
+        return model.parameter_values()["F0"] + 0.5 * (previous or 0.0)
+
+    path = tmp_path / "sweep.journal"
+    whole = hs.sweep("dfcs", VALUES, follow, warm_start=True)
+    assert same(whole, hs.sweep("dfcs", VALUES, follow, warm_start=True, journal=path))
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 1 + 3
+    path.write_bytes(b"".join(lines[:2]) + lines[2][:20])
+    assert same(whole, hs.sweep("dfcs", VALUES, follow, warm_start=True, journal=path))
+
+
+def test_a_journal_of_another_sweep_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.journal"
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, end, journal=path)
+    for model, values, measure in (
+        ("dfcs", {"F0": [20.0, 31.0]}, end),
+        ("dfcs", {"F0": [20.0, 30.0]}, mixed),
+        (hs.load("dfcs").with_(mu=0.4), {"F0": [20.0, 30.0]}, end),
+    ):
+        with pytest.raises(hs.UsageError, match="of another sweep"):
+            hs.sweep(model, values, measure, journal=path)
+    path.write_text("something else\n")
+    with pytest.raises(hs.UsageError, match="no journal"):
+        hs.sweep("dfcs", {"F0": [20.0]}, end, journal=path)
+    assert path.read_text() == "something else\n"
+    with pytest.raises(hs.UsageError, match="cannot be written"):
+        hs.sweep("dfcs", {"F0": [20.0]}, end, journal=tmp_path / "nowhere" / "sweep.journal")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_sweep_that_is_killed_goes_on(tmp_path: Path) -> None:
+    argv = ["sweep", "dfcs", "F0=20:40:20", "omega=350:500:20", "--measure", "final.x", "--t-end", "2"]
+    whole = tmp_path / "whole"
+    assert main([*argv, "--out", str(whole)]) == 0
+    out, journal = tmp_path / "killed", tmp_path / "killed" / "sweep.journal"
+    command = [sys.executable, "-m", "hybridsim", *argv, "--out", str(out)]
+    sizes = [0]
+    for _ in range(3):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and (not journal.exists() or journal.stat().st_size <= sizes[-1] + 200):
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        if not journal.exists():  # it was done before the kill
+            break
+        sizes.append(journal.stat().st_size)
+    assert len(sizes) > 1 and sizes == sorted(sizes)
+    assert main([*argv, "--out", str(out)]) == 0
+    assert not journal.exists()
+    assert (out / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()

@@ -1,0 +1,107 @@
+"""Explanations of events name what decided them; their figures are those of closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.cli import main
+
+
+def verdicts(explanation: hs.Explanation) -> dict[tuple[str, ...], str]:
+    return {tuple(candidate.modes.values()): candidate.verdict for candidate in explanation.candidates}
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-dop853"])
+def test_a_release_at_equal_coefficients_is_decided_by_the_second_derivative(integrator: str) -> None:
+    model = hs.load("dfcs")
+    sol = hs.simulate(model, (0.0, 0.01), integrator=integrator)
+    why = sol.explain(0)
+    p = model.parameter_values()
+    t = math.asin(p["mu"] * p["N"] / p["F0"]) / p["omega"]  # the forcing reaches the limit at x = 0
+    assert sol.events[0].t == pytest.approx(t, rel=1e-12)
+    jerk = p["F0"] * p["omega"] * math.cos(p["omega"] * t) / p["m"]  # of the released body
+    assert [(view.mode, view.guard) for view in why.fired] == [("f stick", "upper")]
+    assert why.fired[0].derivatives[1] == pytest.approx(-p["m"] * jerk, rel=1e-9)
+    assert verdicts(why) == {
+        ("slip+",): "admissible",
+        ("slip-",): "not admissible",
+        ("stick",): "not admissible",
+    }
+    released = next(c for c in why.candidates if c.modes == {"f": "slip+"}).guards[0]
+    assert (released.decreed, released.order, released.side) == (2, 2, 1)
+    assert released.derivatives[2] == pytest.approx(jerk, rel=1e-9)
+    assert why.reason == "slip+ is the only mode that is admissible just after"
+    assert "g = 0 by decree, g' = 0 by decree, g'' =" in str(why)
+
+
+def test_a_release_with_a_drop_of_friction_is_decided_by_the_first() -> None:
+    why = hs.simulate("static-kinetic", (0.0, 10.0)).explain(0)
+    released = next(c for c in why.candidates if c.modes == {"f": "slip+"}).guards[0]
+    assert (released.decreed, released.order) == (1, 1)
+
+
+def test_a_reset_says_what_it_set() -> None:
+    sol = hs.simulate("bouncing-ball", (0.0, 1.0))
+    why = sol.explain(0)
+    v = math.sqrt(2 * 9.81)
+    assert why.fired[0].derivatives[1] == pytest.approx(-v) and why.fired[0].derivatives[2] == pytest.approx(
+        -9.81
+    )
+    assert "leads to flight, with" in why.reason and f"to {0.7 * v:.6g}" in why.reason
+
+
+def test_sliding_is_entered_where_both_sides_lead_to_the_surface() -> None:
+    why = hs.simulate("relay-control", (0.0, 3.0)).explain(0)
+    assert verdicts(why) == {
+        ("above",): "not admissible",
+        ("below",): "not admissible",
+        ("sliding",): "admissible",
+    }
+    sides = {c.modes["u"]: c.guards[0] for c in why.candidates}
+    # d(lambda x + v)/dt = lambda v + (d sin(omega t) - U u)/m on either side
+    sol = hs.simulate("relay-control", (0.0, 3.0))
+    t, (_, v) = sol.events[0].t, sol.events[0].x_minus
+    rates = {s: v + 0.8 * math.sin(7 * t) - 2 * s for s in (1, -1)}
+    assert sides["above"].derivatives[1] == pytest.approx(rates[1], rel=1e-9)
+    assert sides["below"].derivatives[1] == pytest.approx(-rates[-1], rel=1e-9)
+    assert "pull of u" in str(why)
+
+
+def test_coupled_contacts_are_explained_together() -> None:
+    model = hs.load("clutches")
+    sol = hs.simulate(model, (0.0, 10.0))
+    for k, event in enumerate(sol.events):
+        why = sol.explain(k)
+        if event.kind == "transition" and why.candidates:
+            taken = [c for c in why.candidates if c.verdict == "admissible"]
+            assert any(c.modes.get(event.component) == event.target for c in taken), str(why)
+
+
+def test_other_kinds_of_events() -> None:
+    sol = hs.simulate("sampled-servo", (0.0, 0.05))
+    kinds = {event.kind for event in sol.events}
+    assert "scheduled" in kinds
+    for k, event in enumerate(sol.events):
+        if event.kind == "scheduled":
+            assert "stepped to" in sol.explain(k).reason
+    own = hs.simulate("dfcs", (0.0, 0.01), integrator="rk4-dichotomy").explain(0)
+    assert "integrator's own" in own.reason and not own.candidates
+
+
+def test_what_cannot_be_explained() -> None:
+    sol = hs.simulate("dfcs", (0.0, 0.01))
+    for number in (99, -99, 0.5, True):
+        with pytest.raises(hs.UsageError, match="events, and event"):
+            sol.explain(number)
+    with pytest.raises(hs.UsageError, match="save='events'"):
+        hs.simulate("dfcs", (0.0, 0.01), save="events").explain(0)
+
+
+def test_the_command_line_explains(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "dfcs", "--t-end", "0.01", "--explain", "0", "--explain", "-1"]) == 0
+    text = capsys.readouterr().out
+    assert text.count("modes that could hold just after") == 2 and "is the only mode" in text
+    assert main(["run", "dfcs", "--t-end", "0.01", "--explain", "99"]) == 2

@@ -1,0 +1,62 @@
+"""What has no value is named where it arises: the rate, the guard or the reset, the mode and the state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+
+METHODS = ("taylor", "dop853", "scipy-dop853", "rodas5p", "cvode-bdf")
+
+
+def model(rate: str = "-1", guard: str = "x + 10", reset: str = "0") -> hs.Model:
+    return hs.Model.from_toml(f"""
+schema = 1
+name = "falling"
+[states]
+x = {{ start = 1, der = "{rate}" }}
+y = {{ start = 0, der = "1" }}
+[modes.down]
+initial = true
+guards.g = {{ expr = "{guard}", then = {{ to = "down", reset = {{ x = "{reset}" }} }} }}
+""")
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_rate(name: str) -> None:
+    sol = hs.simulate(model(rate="-1 - 0.1*sqrt(x)"), (0.0, 2.0), integrator=name)
+    assert sol.status == "step-failure"
+    assert "the rate of x is not a number" in sol.message and "mode down" in sol.message
+    # dx/dt = -1 - a sqrt(x) reaches zero at (2/a)(1 - ln(1 + a)/a)
+    assert sol.t_end == pytest.approx(20.0 * (1.0 - 10.0 * np.log(1.1)), abs=1e-6)
+    assert abs(sol.y[0, -1]) < 1e-6
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_guard(name: str) -> None:
+    sol = hs.simulate(model(guard="sqrt(x) + 1"), (0.0, 2.0), integrator=name)
+    assert sol.status == "step-failure"
+    assert "guard g of mode in mode down is not a number" in sol.message
+
+
+@pytest.mark.parametrize("name", [*METHODS, "exact"])
+@pytest.mark.parametrize("reset", ["log(x - 2)", "exp(1e4*x)"])
+def test_a_reset(name: str, reset: str) -> None:
+    sol = hs.simulate(model(guard="x - 0.5", reset=reset), (0.0, 2.0), integrator=name)
+    assert sol.status == "inconsistent"
+    assert (
+        "the reset of guard g of mode.down sets x to" in sol.message and "at x = 0.5, y = 0.5" in sol.message
+    )
+    assert sol.t_end == pytest.approx(0.5)
+
+
+def test_a_state_that_grows() -> None:
+    sol = hs.simulate(model(rate="x**2"), (0.0, 2.0), integrator="dop853")
+    assert sol.status == "step-failure" and "may grow without bound" in sol.message
+    assert sol.t_end == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_start() -> None:
+    sol = hs.simulate(model(rate="log(x - 2)"), (0.0, 2.0), integrator="dop853")
+    assert not sol.success and "the rate of x is not a number" in sol.message
