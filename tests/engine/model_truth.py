@@ -1,12 +1,12 @@
 """A declared model evaluated by hand: every expression in mpmath, the unknowns of holding modes by a linear solve.
 
 Nothing of the engine is used: names are looked up in the declaration, and what a holding mode solves for is found
-from d(surface)/dt = 0, differentiated numerically along the motion.
+from d(surface)/dt = 0, or for a gap from d2(gap)/dt2 = 0, differentiated numerically along the motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mpmath
@@ -36,14 +36,16 @@ class ByHand:
         self.formulas = {n: e.text for n, e in model.definitions}
         self.der = {s.name: s.der.text for s in model.states}
         self.guards: dict[str, list[str]] = {}
-        self.holding: dict[str, str] = {}  # unknown -> surface
+        self.holding: dict[str, str] = {}  # unknown -> surface, kept at zero by its rate
+        self.closed: dict[str, str] = {}  # unknown -> gap, kept at zero by its acceleration
         for component in model.all_components():
             mode = next(m for m in component.modes if m.name == modes[component.name])
             self.formulas |= {n: e.text for n, e in mode.set.items()}
             self.der |= {n: e.text for n, e in mode.der.items()}
             self.guards[component.name] = [g.expr.text for g in mode.guards]
             if component.surface and mode.name == component.surface.hold:
-                self.holding[component.surface.unknown] = component.surface.function.text
+                kept = self.holding if component.surface.restitution is None else self.closed
+                kept[component.surface.unknown] = component.surface.function.text
         self.attraction: dict[str, Any] = {}  # how strongly each unknown pulls towards its own surface
         self.unknown: dict[str, Any] = {}
         self.unknown = self.solve()
@@ -53,26 +55,38 @@ class ByHand:
         t, x = (self.t, self.x) if x is None else (t, x)
         return evaluate(text, Names(self, t, x))
 
-    def slope(self) -> dict[str, Any]:
-        """dx/dt."""
-        return {n: self.value(e) for n, e in self.der.items()}
+    def slope(self, t: Any = None, x: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """dx/dt, here or at another time and state."""
+        return {n: self.value(e, t, x) for n, e in self.der.items()}
 
-    def rate(self, surface: str) -> Any:
-        """d(surface)/dt along the motion."""
-        slope = self.slope()
+    def rate(self, surface: str, order: int = 1) -> Any:
+        """Derivative of that order of a surface along the motion, d(surface)/dt for 1."""
+        return self.along(lambda t, x: self.value(surface, t, x), order, self.t, self.x)
+
+    def along(
+        self, quantity: Callable[[Any, Mapping[str, Any]], Any], order: int, t: Any, x: Mapping[str, Any]
+    ) -> Any:
+        if order == 0:
+            return quantity(t, x)
+        slope = self.slope(t, x)
         return mpmath.diff(
-            lambda h: self.value(surface, self.t + h, {n: v + h * slope[n] for n, v in self.x.items()}), 0
+            lambda h: self.along(
+                quantity, order - 1, t + h, {n: v + h * slope[n] for n, v in x.items()}
+            ),
+            0,
         )
 
     def solve(self) -> dict[str, Any]:
         """The forces that keep every held surface where it is: they enter the rates linearly."""
-        names = list(self.holding)
+        orders = dict.fromkeys(self.holding, 1) | dict.fromkeys(self.closed, 2)
+        kept = self.holding | self.closed
+        names = list(kept)
         if not names:
             return {}
 
         def rates(values: list[Any]) -> Any:
             self.unknown = dict(zip(names, values, strict=True))
-            return mpmath.matrix([self.rate(s) for s in self.holding.values()])
+            return mpmath.matrix([self.rate(kept[name], orders[name]) for name in names])
 
         n = len(names)
         at_rest = rates([mpmath.mpf(0)] * n)

@@ -158,6 +158,8 @@ def check_model(model: Model, seed: int, pinned: bool) -> None:
                 can_hold = c in system.pins or c in system.projected
                 if pinned and can_hold and z[c] == system.automata[c].hold:
                     assert abs(surface) <= 4 * 2.0**-52 * np.max(np.abs(x), initial=1e-300)
+                    if component.surface.restitution is not None:
+                        assert close(0.0, hand.rate(component.surface.function.text), size)
             monitors = system.rows("monitors", len(model.monitors), *one)[0]
             for found, monitor in zip(monitors, model.monitors, strict=True):
                 assert close(found, hand.value(monitor.expr.text), size)
