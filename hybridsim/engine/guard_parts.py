@@ -35,9 +35,10 @@ class GuardParts:
 
     def of(self, tapes: Tapes) -> Parts:
         """The parts of these tapes."""
-        if self._known is None or self._known[0] is not tapes:
-            self._known = tapes, _parts(tapes)
-        return self._known[1]
+        known = self._known  # read once: other threads may put theirs in its place at any time
+        if known is None or known[0] is not tapes:
+            self._known = known = tapes, _parts(tapes)
+        return known[1]
 
 
 def _parts(tapes: Tapes) -> Parts:

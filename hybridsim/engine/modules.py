@@ -7,9 +7,9 @@ import importlib.util
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -26,24 +26,21 @@ class Compiled:
 
     module: ModuleType
     seconds: float  # what lowering took; 0 when the module was found in the cache
+    _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    _shared: dict[str, Any] = field(default_factory=dict)
 
     @property
     def data(self) -> dict[str, Any]:
         """Everything about the model that the functions do not say."""
         return self.module.DATA
 
-    @cached_property
-    def _kept(self) -> dict[str, tuple[Any, Any]]:
-        return {}
-
-    @cached_property
-    def _shared(self) -> dict[str, Any]:
-        return {}
-
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Something that follows from the structure alone, made once for all systems that share it."""
+        """Something that follows from the structure alone, made once for all systems that share it.
+
+        Of threads that make it at the same time, all get what the first one has left.
+        """
         if name not in self._shared:
-            self._shared[name] = make()
+            self._shared.setdefault(name, make())
         return self._shared[name]
 
     def address(self, name: str) -> Any:
@@ -51,13 +48,15 @@ class Compiled:
         if name not in self._kept:
             from hybridsim.engine.jit import compile_model_function
 
-            self._kept[name] = compile_model_function(self.module, name)
+            # another thread may have been first: its code is in use, and must not be let go
+            self._kept.setdefault(name, compile_model_function(self.module, name))
         return self._kept[name][0]
 
 
 _loaded: dict[str, Compiled] = {}
 _MOST = 16  # models of Python functions that are kept; their functions cannot be found again on disk
 _of_functions: dict[tuple[Any, ...], PythonCode] = {}
+_lock = Lock()  # of these
 
 
 def compiled(model: Model) -> Compiled | PythonCode:
@@ -66,7 +65,7 @@ def compiled(model: Model) -> Compiled | PythonCode:
         return _code_of_functions(model)
     name: str = model.once("module", lambda: _name(model))
     if name not in _loaded:
-        _loaded[name] = _load(model, name)
+        _loaded.setdefault(name, _load(model, name))
     return _loaded[name]
 
 
@@ -75,11 +74,12 @@ def _code_of_functions(model: Model) -> PythonCode:
 
     # copies with other values have the same functions
     key = (model.structure(), model.flow, model.components, model.monitors, model.schedules, model.outputs)
-    if key not in _of_functions:
-        while len(_of_functions) >= _MOST:
-            del _of_functions[next(iter(_of_functions))]
-        _of_functions[key] = PythonCode(model)
-    return _of_functions[key]
+    with _lock:
+        if key not in _of_functions:
+            while len(_of_functions) >= _MOST:
+                del _of_functions[next(iter(_of_functions))]
+            _of_functions[key] = PythonCode(model)
+        return _of_functions[key]
 
 
 def is_cached(model: Model) -> bool:

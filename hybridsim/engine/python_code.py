@@ -60,13 +60,13 @@ class PythonCode:
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
         """As in `Compiled`."""
         if name not in self._things:
-            self._things[name] = make()
+            self._things.setdefault(name, make())
         return self._things[name]
 
     def address(self, name: str) -> Any:
         """Address of one of flow, guards, monitors, quantities, and watched: guards and monitors together."""
         if name not in self._kept:
-            self._kept[name] = self._addressed(name)
+            self._kept.setdefault(name, self._addressed(name))
         return self._kept[name][0]
 
     def _addressed(self, name: str) -> tuple[Any, Any]:

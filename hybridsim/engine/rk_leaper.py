@@ -126,8 +126,9 @@ class RungeKuttaLeaper(Leaper):
         rows: Any,
     ) -> tuple[int, int, int]:
         room.counts[:] = 0
+        tapes = self.shelf.tapes  # one and the same for both: another thread may put more on the shelf
         code, steps, count = rk_leap(
-            self.functions, self.automata, self.shelf.tapes, self.parts.of(self.shelf.tapes), self.inputs,
+            self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs,
             NOT_LINEAR, self.places, self.method, self.control, to, clock, state, work, room, rows,
         )  # fmt: skip
         return code, steps, count

@@ -70,9 +70,7 @@ class ByHand:
             return quantity(t, x)
         slope = self.slope(t, x)
         return mpmath.diff(
-            lambda h: self.along(
-                quantity, order - 1, t + h, {n: v + h * slope[n] for n, v in x.items()}
-            ),
+            lambda h: self.along(quantity, order - 1, t + h, {n: v + h * slope[n] for n, v in x.items()}),
             0,
         )
 

@@ -1,0 +1,66 @@
+"""What runs on several threads share is made twice at worst, and the one that is in use stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine.guard_parts import GuardParts
+from hybridsim.engine.mode_tables import TapeShelf
+from hybridsim.engine.system import System
+
+
+def interrupted_once(function: Callable[..., Any], by: Callable[[], Any]) -> Callable[..., Any]:
+    """The function, whose first call another thread overtakes: `by` runs whole inside of it."""
+    calls: list[int] = []
+
+    def called(*arguments: Any) -> Any:
+        calls.append(1)
+        if len(calls) == 1:
+            by()
+        return function(*arguments)
+
+    return called
+
+
+def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = System(hs.load("dfcs")).code
+    code._kept.pop("flow", None)
+    overtaking: list[int] = []
+    compile_function = interrupted_once(
+        lambda module, name: (object(), name), lambda: overtaking.append(code.address("flow"))
+    )
+    monkeypatch.setattr("hybridsim.engine.jit.compile_model_function", compile_function)
+    late = code.address("flow")
+    kept = code._kept.pop("flow")
+    assert overtaking == [late] == [kept[0]]
+
+
+def test_what_is_shared_is_the_same_for_all() -> None:
+    code = System(hs.load("dfcs")).code
+    overtaking: list[Any] = []
+    make = interrupted_once(object, lambda: overtaking.append(code.shared("a thing", make)))
+    assert code.shared("a thing", make) is overtaking[0]
+    del code._shared["a thing"]
+
+
+def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:
+    """Parts of another vector of modes have another number of rows: a kernel would read beyond their end."""
+    system = System(hs.load("belt"))
+    small, large = TapeShelf(system), TapeShelf(system)
+    large.surround(np.zeros(len(system.automata), dtype=np.int64))
+
+    class Overtaken(GuardParts):
+        """Right after it has noted the parts of one shelf, another thread asks for those of the other."""
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            super().__setattr__(name, value)
+            if value is not None and value[0] is large.tapes:
+                self.of(small.tapes)
+
+    found, expected = Overtaken().of(large.tapes), GuardParts().of(large.tapes)
+    assert len(found.start) == len(expected.start) > len(GuardParts().of(small.tapes).start)
