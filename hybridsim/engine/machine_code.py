@@ -18,6 +18,7 @@ from typing import Any
 from llvmlite import binding, ir
 
 from hybridsim.engine.cache import write_whole
+from hybridsim.expr.python_tree import python_tree
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -267,7 +268,7 @@ def compile_text(text: str, name: str, kept: Path) -> tuple[int, Any]:
 def _compiled(text: str, name: str) -> bytes:
     """A function as an object file for this machine."""
     definition = next(
-        node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef) and node.name == name
+        node for node in python_tree(text).body if isinstance(node, ast.FunctionDef) and node.name == name
     )
     module, machine = ir.Module(name), _machine()
     Translator(module, definition)

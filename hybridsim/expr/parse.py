@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import math
 import re
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral, Real
@@ -22,6 +21,7 @@ from hybridsim.expr.grammar import (
     MAX_INTEGER,
     MAX_LENGTH,
 )
+from hybridsim.expr.python_tree import python_tree
 from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
@@ -110,10 +110,7 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
     text = re.sub(r"[ \t\r\n]", " ", text).strip()
     _check_text(text, where)
     try:
-        with warnings.catch_warnings():
-            # Python warns of odd spellings such as `1if x else 2`; that is no news to the user of a model.
-            warnings.simplefilter("ignore")
-            tree = ast.parse(text, mode="eval").body
+        tree = python_tree(text, "eval").body
         check_size(tree, text, where, MAX_DEPTH, MAX_LENGTH)
         names = check_tree(tree, text, where)
     except (SyntaxError, ValueError) as fault:

@@ -177,7 +177,7 @@ def test_static_and_kinetic() -> None:
     v0 = 0.01 * top(np.abs(last(model, "v", span, kept)))
     values = {"at-rest": 0.0, "karnopp": amplitude(model.regularized("karnopp", v0=v0), "e", span, kept)}
     # with mu_s = mu_k it breaks loose at rest, and swings about steady sliding with the speed of the pull. This swing
-    # touches rest: larger ones end in it, smaller ones keep their size, so the last bit says whether it is a limit cycle
+    # touches rest: larger ones end in it, smaller ones keep their size; whether it is a limit cycle, the last bit says
     values["mu_s=mu_k"] = 0.01 * math.sqrt(1.0 / 100.0)
     found = hs.advise(model, "amplitude.e", 0.01, integrators=False)
     check(found, values, full)

@@ -1,0 +1,22 @@
+"""Python's own parser, one thread at a time and without its warnings."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from threading import Lock
+from typing import Any
+
+_lock = Lock()
+
+
+def python_tree(text: str, mode: str = "exec") -> Any:
+    """The syntax tree of a text, as `ast.parse` gives it; ``mode="eval"`` for an expression.
+
+    Before Python 3.12 the making of the tree counts its depth in a place that all threads share, and ends with a
+    SystemError where two of them are at it (CPython issue 106905). Filters of warnings belong to all threads, too.
+    """
+    with _lock, warnings.catch_warnings():
+        # Python warns of odd spellings such as `1if x else 2`; that is no news to the user of a model
+        warnings.simplefilter("ignore")
+        return ast.parse(text, mode=mode)
