@@ -30,6 +30,7 @@ FLOORS = (
     "simulate",
     "ivp",
     "analysis",
+    "testing",
     "plot",
     "cli",
 )
@@ -53,6 +54,7 @@ LIBRARIES = {
         "simulate",
         "ivp",
         "analysis",
+        "testing",
         "plot",
     },
     "matplotlib": {"plot"},

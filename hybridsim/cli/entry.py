@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TextIO
 from hybridsim import __version__
 from hybridsim.cli import (
     advise,
+    atlas,
     cache,
     check,
     compare,
@@ -44,6 +45,7 @@ COMMANDS: tuple[ModuleType, ...] = (
     steady,
     sweep,
     study,
+    atlas,
     check,
     models,
     integrators,

@@ -59,7 +59,7 @@ class Integrator(ABC):
     7. What a method cannot do stands in ``lacks``: capability (a key of `CAPABILITIES`) to the reason. A model that
        needs it is refused with that reason.
     8. Evaluate only through ``flow``: it counts. Count rejected steps in ``flow.counters.rejected``.
-    9. ``tests/conformance`` holds every integrator to the event contract; run it on yours.
+    9. `hybridsim.testing` holds every integrator to the event contract; run it on yours.
     """
 
     name: ClassVar[str]

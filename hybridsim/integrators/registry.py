@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from functools import cache
 from importlib import import_module
@@ -67,6 +69,27 @@ def integrator_class(name: str) -> type[Integrator]:
     if name not in found:
         raise UsageError(f"there is no integrator {name!r}", remedy=nearest(name, found, kind="integrators"))
     return found[name]
+
+
+@contextmanager
+def registered(method: str | type[Integrator]) -> Iterator[str]:
+    """The name of an integrator; a class that nobody has registered can be named while the context lasts."""
+    if isinstance(method, str):
+        yield integrator_class(method).name
+        return
+    found = _registered()
+    before = found.get(method.name)
+    if before is not None and before is not method:
+        raise UsageError(
+            f"{method.__name__} is called {method.name!r}, and so is {before.__name__}",
+            remedy="give it a name of its own",
+        )
+    found[method.name] = method
+    try:
+        yield method.name
+    finally:
+        if before is None:
+            del found[method.name]
 
 
 @cache

@@ -11,11 +11,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from reference.hybrid_taylor import Mode, follow
 from reference.series import MP, Series, exp, sin_cos, tanh
+
+from hybridsim.testing.facts import HERE
 
 NAMES = {1: "slip+", -1: "slip-", 0: "stick"}
 
@@ -198,8 +199,7 @@ def main() -> None:
         "FMI-vdp": truth(smooth, "smooth", (2, 0), (0, 20), (1, 5, 10, 20)),
         "TANH-1e-3": truth(creep, "smooth", (MP.mpf("10.5"), 0), (0, 20), (5, 16, 20)),
     }
-    path = Path(__file__).with_name("truths.json")
-    path.write_text(json.dumps(truths, indent=1) + "\n")
+    (HERE / "truths.json").write_text(json.dumps(truths, indent=1) + "\n")
 
 
 if __name__ == "__main__":

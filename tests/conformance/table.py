@@ -14,10 +14,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import hybridsim as hs
-from conformance.catalogue import SCENES
-from conformance.facts import CASES
 from conformance.native import MECHANISMS, mechanism
-from conformance.suite import Outcome, outcome
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.facts import CASES
+from hybridsim.testing.suite import Outcome, outcome
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conformance.md"
 INTRODUCTION = """# What each integrator gets right

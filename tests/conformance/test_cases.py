@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 import hybridsim as hs
-from conformance import judge
-from conformance.catalogue import SCENES
 from conformance.native import mechanism
-from conformance.scene import VOCABULARY, Scene
-from conformance.suite import integrator, outcome
 from hybridsim.errors import HybridsimError
+from hybridsim.testing import judge
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.scene import VOCABULARY, Scene
+from hybridsim.testing.study import integrator
+from hybridsim.testing.suite import outcome
 
 INTEGRATORS = [one.name for one in hs.list_integrators()]
 # What a model visibly needs: a run is refused for it. The others show only in how a run goes.

@@ -6,10 +6,10 @@ import pytest
 
 import hybridsim as hs
 from conformance import recompute
-from conformance.catalogue import SCENES
-from conformance.facts import CASES, TRUTHS
-from conformance.judge import SCENES as FOLDER
-from conformance.judge import load
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.facts import CASES, TRUTHS
+from hybridsim.testing.judge import SCENES as FOLDER
+from hybridsim.testing.judge import load
 
 DIGITS = 2e-11  # the facts are printed with twelve or thirteen digits
 

@@ -8,14 +8,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from conformance.catalogue import SCENES
-from conformance.judge import load
-from conformance.scene import Scene
 
 import hybridsim as hs
 from hybridsim.engine import loop
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit, to_bernstein
 from hybridsim.integrators.taylor import Taylor
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.judge import load
+from hybridsim.testing.scene import Scene
 
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 

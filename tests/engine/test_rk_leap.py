@@ -6,9 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from conformance.catalogue import SCENES
-from conformance.judge import load
-from conformance.scene import Scene
 from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
@@ -19,6 +16,9 @@ from hybridsim.engine.rk_leap import first_length
 from hybridsim.engine.rk_step import forget, next_length
 from hybridsim.integrators.dop853 import Dop853
 from hybridsim.integrators.registry import integrator_class
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.judge import load
+from hybridsim.testing.scene import Scene
 
 METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]

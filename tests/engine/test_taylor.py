@@ -8,13 +8,13 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from conformance.judge import SCENES
 
 import hybridsim as hs
 from hybridsim.engine.series import SeriesRun, series_order
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
+from hybridsim.testing.judge import SCENES
 
 MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorted(SCENES.glob("*.toml"))]
 

@@ -33,8 +33,7 @@ json.dump({"status": sol.status, "warnings": sol.warnings, "integrator": sol.int
 """
 CONFORMANCE = """
 import json, sys
-from conformance.catalogue import SCENES
-from conformance.suite import conformance_failures
+from hybridsim.testing import SCENES, conformance_failures
 scenes = [scene for scene in SCENES if scene.name != "TORR"]  # right too, in some 40 s: order five at rtol 1e-12
 json.dump(conformance_failures("tsitouras", scenes), sys.stdout)
 """

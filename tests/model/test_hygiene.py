@@ -8,8 +8,9 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.model.hygiene import Caution, warnings_of
+from hybridsim.testing.judge import SCENES as FOLDER
 
-SCENES = sorted((Path(__file__).parents[1] / "conformance" / "scenes").glob("*.toml"))
+SCENES = sorted(FOLDER.glob("*.toml"))
 PLAIN = '[states]\nx = { start = 0, der = "v" }\nv = { start = 1, der = "-x" }\n'
 
 

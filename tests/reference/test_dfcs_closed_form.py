@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 import random
-from pathlib import Path
 
 import pytest
 
+from hybridsim.testing.facts import CASES
 from reference.arithmetic import multiprecision
 from reference.dfcs_closed_form import Motion, Oscillator, Undecided
 
-FACTS = json.loads((Path(__file__).parents[1] / "conformance" / "cases.json").read_text())
+FACTS = list(CASES.values())
 OSCILLATORS = [c for c in FACTS if c["id"].startswith(("FLAG-", "DH-", "DHV-", "FREE-", "THR-"))]
 MANY_DIGITS = multiprecision(30)
 

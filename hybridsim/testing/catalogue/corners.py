@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from conformance.facts import TRUTHS
-from conformance.scene import Scene, Truth
+from hybridsim.testing.facts import TRUTHS
+from hybridsim.testing.scene import Scene, Truth
 
 
 def scenes() -> tuple[Scene, ...]:

@@ -1,16 +1,10 @@
-"""Holds an integrator against the scenes: `conformance_failures(name)` returns what it got wrong.
-
-A scene is judged as its facts ask. Events are counted and their modes compared at every setting. The largest
-errors of event times and of states fall with the tolerance, tenfold or more for each step of a thousand, where
-an error below the tolerance asked for counts as that tolerance; at the end of the study they are within the
-scene's own tolerance. A fixed-step method is judged in the same way over steps of its own.
-"""
+"""The study of a scene with an integrator: runs from loose to tight, each held against the truth."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -19,11 +13,11 @@ from types import FrameType
 from typing import Any
 
 import hybridsim as hs
-from conformance import judge
-from conformance.catalogue import SCENES
-from conformance.scene import Scene
 from hybridsim.engine.recent import system_of
 from hybridsim.errors import HybridsimError
+from hybridsim.integrators.base import Integrator
+from hybridsim.testing import judge
+from hybridsim.testing.scene import Scene
 
 # Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
 STEPS = (300, 1200, 4800)
@@ -45,25 +39,14 @@ CUT_SHORT = 1000.0
 LOW_ORDER, LONG = 100.0, 50.0
 # A method with this option has the capability when it is set so.
 LIFTED = {"stick_velocity": ("zero", "exact-stick")}
-
-
-# Seconds for one run of a scene: the longest takes ten on a slow machine.
-LONGEST = 60
+# A run stopped by its limits with more than this times the steps of the setting before, whose tolerance was a thousand
+# times looser, does not come to an end: a method of order 2 needs 32 times as many.
+RUNAWAY = 100
+LONGEST = 60  # seconds for one run of a scene: the longest takes ten on a slow machine
 
 
 class Endless(Exception):
     """A run that does not come to an end."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Verdict on one integrator in one scene: right, wrong (with reasons) or lacks (with the reason)."""
-
-    integrator: str
-    scene: str
-    verdict: str
-    reasons: tuple[str, ...] = ()
-    errors: tuple[tuple[str, float, float], ...] = ()  # setting, error of times, error of states
 
 
 @dataclass(frozen=True)
@@ -76,7 +59,36 @@ class Setting:
     fall: float
 
 
-def integrator(name: str) -> Any:
+@dataclass(frozen=True)
+class Study:
+    """The runs of one scene with one integrator.
+
+    Parameters
+    ----------
+    done : the settings that ran, with what was measured.
+    tolerances : of event times and of states, that the last one is held to.
+    failure : the setting that did not run to a solution and the error it ended with, or None.
+    """
+
+    done: tuple[tuple[Setting, judge.Measured], ...]
+    tolerances: tuple[float, float]
+    failure: tuple[str, Exception] | None = None
+
+    def faults(self) -> list[str]:
+        """What was wrong, a sentence each; that errors do not fall is said only where nothing else is wrong."""
+        wrong = [f"{setting.text}: {sentence}" for setting, run in self.done for sentence in run.wrong]
+        if self.failure is not None:
+            text, error = self.failure
+            how = "refused" if isinstance(error, HybridsimError) else f"raised {type(error).__name__}"
+            wrong.append(f"{text}: {how}: {error}")
+        return wrong or judge_errors(self.done, self.tolerances)
+
+    def errors(self) -> tuple[tuple[str, float, float], ...]:
+        """Setting, error of times, error of states."""
+        return tuple((setting.text, run.time_error, run.state_error) for setting, run in self.done)
+
+
+def integrator(name: str) -> type[Integrator]:
     """The registered integrator of that name."""
     return next(one for one in hs.list_integrators() if one.name == name)
 
@@ -86,13 +98,13 @@ def option_names(one: Any) -> set[str]:
     return {field.name for field in fields(one)}
 
 
-def lacking(one: Any) -> dict[str, str]:
+def lacking(one: type[Integrator]) -> dict[str, str]:
     """What an integrator lacks at the options that its study uses."""
     lifted = {capability for option, (_, capability) in LIFTED.items() if option in option_names(one)}
     return {capability: reason for capability, reason in one.lacks.items() if capability not in lifted}
 
 
-def study(one: Any, scene: Scene) -> tuple[Setting, ...]:
+def settings_for(one: type[Integrator], scene: Scene) -> tuple[Setting, ...]:
     """The settings at which a scene is run, from loose to tight."""
     if "adaptive" not in one.lacks:
         is_long = abs(scene.span[1] - scene.span[0]) > LONG * scene.unit
@@ -109,8 +121,7 @@ def study(one: Any, scene: Scene) -> tuple[Setting, ...]:
             options = {"steps_per_period": steps, "period": scene.unit}
         if "eps_v" in known:
             options |= {"eps_v": interval * scene.speed, "max_bisections": 60}
-        excused = max(scene.floor, FIXED_STEP_FLOOR)
-        settings.append(Setting(f"unit/{steps}", {**fixed, **options}, excused, FIXED_STEP_FALL))
+        settings.append(fixed_step(steps, {**fixed, **options}, scene))
     return tuple(settings)
 
 
@@ -119,70 +130,82 @@ def adaptive(rtol: float, scene: Scene) -> Setting:
     return Setting(f"rtol {rtol:.0e}", {"rtol": rtol}, max(rtol, scene.floor), FALL)
 
 
-def outcome(name: str, scene: Scene, **options: Any) -> Outcome:
-    """Run one scene with one integrator (and its options) at all settings and judge it."""
-    one = integrator(name)
-    lacks = lacking(one)
-    for capability in sorted(scene.needs | ({"located"} if "contacts" in scene.needs else set())):
-        if capability in lacks:
-            return Outcome(name, scene.name, "lacks", (f"{capability}: {lacks[capability]}",))
-    _compile(name)
-    wrong: list[str] = []
+def fixed_step(steps: float, options: Mapping[str, Any], scene: Scene) -> Setting:
+    """The setting of one step."""
+    return Setting(f"unit/{steps:g}", options, max(scene.floor, FIXED_STEP_FLOOR), FIXED_STEP_FALL)
+
+
+def allowed_errors(one: type[Integrator], scene: Scene) -> tuple[float, float]:
+    """Errors of times and states that the tightest setting may have."""
+    if "adaptive" not in one.lacks:
+        return scene.tol_t, scene.tol_x
+    least = LOCATED if "release" in option_names(one) else NOT_LOCATED
+    return max(scene.tol_t, least), max(scene.tol_x, least)
+
+
+def carry_out(
+    name: str,
+    scene: Scene,
+    settings: tuple[Setting, ...],
+    tolerances: tuple[float, float],
+    lacks: Container[str] = (),
+    seconds: float = LONGEST,
+    **options: Any,
+) -> Study:
+    """Run a scene at all settings, as far as it is worth while; `seconds` bound each run."""
     done: list[tuple[Setting, judge.Measured]] = []
-    settings = list(study(one, scene))
-    tolerances = (scene.tol_t, scene.tol_x)
-    if "adaptive" in lacks:
-        fixed_step = LOCATED if "release" in option_names(one) else NOT_LOCATED
-        tolerances = (max(scene.tol_t, fixed_step), max(scene.tol_x, fixed_step))
-    for number, setting in enumerate(settings):
+    waiting = list(settings)
+    while waiting:
+        setting = waiting.pop(0)
         try:
-            with bounded_work():
-                measured = judge.measure(scene, judge.run(scene, name, **setting.options, **options), lacks)
-        except HybridsimError as error:
-            wrong.append(f"{setting.text}: refused: {error}")
-            break
+            with bounded_work(seconds):
+                run = judge.run(scene, name, **setting.options, **options)
+                measured = judge.measure(scene, run, lacks)
         except Exception as error:  # whatever it is, it is what a user would see
-            wrong.append(f"{setting.text}: raised {type(error).__name__}: {error}")
-            break
-        wrong += [f"{setting.text}: {sentence}" for sentence in measured.wrong]
+            return Study(tuple(done), tolerances, (setting.text, error))
+        if measured.status == "limit" and done and measured.steps < RUNAWAY * done[-1][1].steps:
+            tolerances = cut_short(tolerances, done[-1][0])
+            break  # no runaway, only more work than there is time for
         done.append((setting, measured))
-        last = number == len(settings) - 1
-        if "adaptive" in lacks:
+        if "rtol" not in setting.options:
             continue
-        if not last and measured.steps > scene.effort:
-            allowed = CUT_SHORT * setting.options["rtol"]
-            tolerances = (max(tolerances[0], allowed), max(tolerances[1], allowed))
+        if waiting and measured.steps > scene.effort:
+            tolerances = cut_short(tolerances, setting)
             break
-        if last and not wrong and setting.options["rtol"] != LAST_RESORT and not within(measured, tolerances):
-            settings.append(replace(adaptive(LAST_RESORT, scene), fall=1.0))
-    if not wrong:
-        wrong = judge_errors(done, tolerances)
-    rows = tuple((setting.text, measured.time_error, measured.state_error) for setting, measured in done)
-    return Outcome(name, scene.name, "wrong" if wrong else "right", tuple(wrong), rows)
+        is_last = not waiting and setting.options["rtol"] != LAST_RESORT
+        if is_last and not any(run.wrong for _, run in done) and not within(measured, tolerances):
+            waiting.append(replace(adaptive(LAST_RESORT, scene), fall=1.0))
+    return Study(tuple(done), tolerances)
+
+
+def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, float]:
+    """What a study may show that ends with this setting."""
+    allowed = CUT_SHORT * last.options.get("rtol", 0.0)
+    return max(tolerances[0], allowed), max(tolerances[1], allowed)
 
 
 @cache
-def _compile(name: str) -> None:
+def compile_for(name: str) -> None:
     """Have an integrator compiled: that may take as long as a machine needs, and must not be interrupted."""
     integrator(name)().prepare(system_of(hs.load("free-decay")))
 
 
 @contextmanager
-def bounded_work() -> Iterator[None]:
+def bounded_work(seconds: float = LONGEST) -> Iterator[None]:
     """Turn work without end into an Endless error (where the platform has alarms, in the main thread)."""
     if not hasattr(signal, "SIGALRM") or threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def give_up(number: int, frame: FrameType | None) -> None:
-        raise Endless(f"no end after {LONGEST} s")
+        raise Endless(f"no end after {seconds:g} s")
 
     before = signal.signal(signal.SIGALRM, give_up)
-    signal.alarm(LONGEST)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
 
 
@@ -191,7 +214,9 @@ def within(measured: judge.Measured, tolerances: tuple[float, float]) -> bool:
     return measured.time_error <= tolerances[0] and measured.state_error <= tolerances[1]
 
 
-def judge_errors(done: list[tuple[Setting, judge.Measured]], tolerances: tuple[float, float]) -> list[str]:
+def judge_errors(
+    done: tuple[tuple[Setting, judge.Measured], ...], tolerances: tuple[float, float]
+) -> list[str]:
     """Errors fall from setting to setting and end within the scene's tolerances."""
     wrong = []
     for what, attribute, tolerance in zip(
@@ -208,9 +233,3 @@ def judge_errors(done: list[tuple[Setting, judge.Measured]], tolerances: tuple[f
                 f"{errors[-1][0].text}: error of {what} {errors[-1][1]:.2g} is above {tolerance:.2g}"
             )
     return wrong
-
-
-def conformance_failures(name: str, scenes: Iterable[Scene] = SCENES) -> list[str]:
-    """What an integrator got wrong, one sentence each; empty if nothing. What it lacks is no failure."""
-    outcomes = [outcome(name, scene) for scene in scenes]
-    return [f"{one.scene}: {reason}" for one in outcomes if one.verdict == "wrong" for reason in one.reasons]

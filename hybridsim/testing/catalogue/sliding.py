@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from conformance.checks import equals, says
-from conformance.facts import CASES, TRUTHS
-from conformance.scene import END, Check, Scene, Truth
+from hybridsim.testing.checks import equals, says
+from hybridsim.testing.facts import CASES, TRUTHS
+from hybridsim.testing.scene import END, Check, Scene, Truth
 
 NEEDS = frozenset({"sliding"})
 SLIDING = "sliding"
@@ -132,7 +132,8 @@ def spirals_in(solution: Any) -> list[str]:
 def _along_the_circle() -> Scene:
     """The same up to t = 3.5, where it still slides."""
     scene = _circle()
-    truth = replace(scene.truth, events=scene.truth.events[:1], states=scene.truth.states[:2])
+    events = (scene.truth.events or ())[:1]
+    truth = replace(scene.truth, events=events, states=scene.truth.states[:2])
     return replace(scene, name="along-the-circle", span=(0.0, 3.5), truth=truth, needs=NEEDS)
 
 

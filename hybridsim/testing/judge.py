@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Container
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import hybridsim as hs
-from conformance.scene import END, Scene
+from hybridsim.testing.scene import END, Scene
 
 SCENES = Path(__file__).with_name("scenes")
 START = (
@@ -20,12 +20,28 @@ START = (
 
 @dataclass(frozen=True)
 class Measured:
-    """Errors of one run, relative (see `Scene`), and what was wrong beyond them."""
+    """One run held against the truth.
 
-    wrong: tuple[str, ...]
+    Parameters
+    ----------
+    ending, sequence, checks : sentences on how the run ended, on its events and modes, and from the truth's checks.
+    time_error, state_error : relative, see `Scene`.
+    status, steps, seconds : how the run ended and what it cost.
+    """
+
+    ending: tuple[str, ...]
+    sequence: tuple[str, ...]
+    checks: tuple[str, ...]
     time_error: float
     state_error: float
+    status: str
     steps: int
+    seconds: float
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        """All that was wrong beyond errors of numbers."""
+        return (*self.ending, *self.sequence, *self.checks)
 
 
 def label(event: Any) -> str:
@@ -39,10 +55,13 @@ def load(scene: Scene) -> Any:
     return hs.load(str(path) if path.exists() else scene.file)
 
 
-def run(scene: Scene, integrator: str, **settings: Any) -> Any:
-    """Simulate the scene."""
+def run(scene: Scene, integrator: str, form: str = "", **settings: Any) -> Any:
+    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0."""
+    model = load(scene)
+    if form:
+        model = model.regularized(form, v0=settings.pop("v0"))
     return hs.simulate(
-        load(scene),
+        model,
         scene.span,
         params=dict(scene.params),
         x0=dict(scene.start),
@@ -51,18 +70,30 @@ def run(scene: Scene, integrator: str, **settings: Any) -> Any:
     )
 
 
-def measure(scene: Scene, solution: Any, lacks: Mapping[str, str]) -> Measured:
+def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:
     """Hold a solution against the truth; checks of what the integrator lacks are left out."""
-    wrong = ending(scene, solution)
-    time_error = state_error = 0.0
+    wrong, time_error, state_error = ending(scene, solution), 0.0, 0.0
+    sequence: list[str] = []
     if not wrong and scene.truth.events is not None:
-        wrong, time_error = compare_events(scene, solution)
-    if not wrong:
+        sequence, time_error = compare_events(scene, solution)
+    if not wrong and not sequence:
         state_error = compare_states(scene, solution)
-    for capability, check in scene.truth.checks:
-        if capability not in lacks:
-            wrong += check(solution)
-    return Measured(tuple(wrong), time_error, state_error, int(solution.stats["steps"]))
+    checks = [
+        sentence
+        for capability, check in scene.truth.checks
+        if capability not in lacks
+        for sentence in check(solution)
+    ]
+    return Measured(
+        tuple(wrong),
+        tuple(sequence),
+        tuple(checks),
+        time_error,
+        state_error,
+        solution.status,
+        int(solution.stats["steps"]),
+        float(solution.stats["wall_time"]),
+    )
 
 
 def ending(scene: Scene, solution: Any) -> list[str]:

@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
-from reference.dfcs_closed_form import Motion, Oscillator
-
 import hybridsim as hs
-from conformance.checks import amplitude, exact_stick, no_transition
-from conformance.facts import CASES
-from conformance.scene import Scene, Truth
+from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator, Motion
+from hybridsim.testing.checks import amplitude, exact_stick, no_transition
+from hybridsim.testing.facts import CASES
+from hybridsim.testing.scene import Scene, Truth
 
-MODES = {1: "f:slip+", -1: "f:slip-", 0: "f:stick"}
 NAMES = ("m", "c", "k", "Fs", "Fk", "F0", "w")
 STUCK = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
 
 
+def closed_form(p: Mapping[str, float]) -> ForcedCoulombOscillator:
+    """The oscillator of a case."""
+    return ForcedCoulombOscillator(p["m"], p["c"], p["k"], p["Fk"], p["Fs"], p["F0"], p["w"])
+
+
+def at(motion: Motion, t: float) -> tuple[float, float]:
+    """Position and velocity at a time."""
+    x, v = motion(t)
+    return float(x), float(v)
+
+
 def events(motion: Motion, before: float = math.inf) -> tuple[tuple[float, str], ...]:
     """The mode changes of a closed-form motion."""
-    return tuple((change.t, MODES[change.mode]) for change in motion.changes if change.t < before)
+    return tuple((change.t, f"f:{change.target}") for change in motion.changes if change.t < before)
 
 
 def states(
-    motion: Motion, start: float, end: float, count: int
+    motion: Motion, span: tuple[float, float], count: int
 ) -> tuple[tuple[float, tuple[float, float]], ...]:
     """Samples of a closed-form motion, at times that no event shares."""
-    step = (end - start) / count
-    times = [start + (i + 0.37) * step for i in range(count)]
-    return tuple((t, motion.state(t)[:2]) for t in times)
+    step = (span[1] - span[0]) / count
+    times = [span[0] + (i + 0.37) * step for i in range(count)]
+    return tuple((t, at(motion, t)) for t in times)
 
 
 def oscillator(case: str, **changes: Any) -> Scene:
@@ -36,18 +46,18 @@ def oscillator(case: str, **changes: Any) -> Scene:
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
     x0, v0 = fact["x0"]
-    span = changes.pop("span", tuple(fact["t_span"]))
-    motion = Oscillator(**p).run(*span, x0, v0)
+    span: tuple[float, float] = changes.pop("span", tuple(fact["t_span"]))
+    motion = closed_form(p).motion(x0, v0, span)
     margin = changes.get("end_margin", 0.0)
     quantities = changes.pop("quantities", ())
     truth = changes.pop("truth", None) or Truth(
         events=events(motion, span[1] - margin if margin else math.inf),
-        states=states(motion, *span, 40) + ((span[1], motion.state(span[1])[:2]),),
+        states=states(motion, span, 40) + ((span[1], at(motion, span[1])),),
         quantities=quantities,
         checks=STUCK,
     )
     unit = 2 * math.pi / (p["w"] if p["F0"] else math.sqrt(p["k"] / p["m"]))
-    size = max(abs(v) for _, (_, v) in truth.states) if truth.states else 1.0
+    size = max((abs(row[1] or 0.0) for _, row in truth.states), default=1.0)
     return Scene(
         **{
             "name": case,
@@ -95,8 +105,10 @@ def dfcs(name: str, F0: float, ratio: float) -> Scene:
     p = model.parameter_values()
     limit = p["mu"] * p["N"]
     period = 2 * math.pi / p["omega"]
-    motion = Oscillator(p["m"], p["c"], p["k"], limit, limit, F0, p["omega"]).run(0, 100 * period, 0)
-    samples = states(motion, 0, 100 * period, 150)
+    motion = ForcedCoulombOscillator(p["m"], p["c"], p["k"], limit, limit, F0, p["omega"]).motion(
+        0.0, 0.0, (0.0, 100 * period)
+    )
+    samples = states(motion, (0.0, 100 * period), 150)
     return Scene(
         name,
         "dfcs",
@@ -119,10 +131,11 @@ def backward_orbit() -> Scene:
     p = {name: float(fact["params"][name]) for name in NAMES}
     t0, t1 = fact["t_span"]
     early, late = t0 + 0.25 * (t1 - t0), t0 + 0.75 * (t1 - t0)
-    motion = Oscillator(**p).run(t0, t1, *fact["x0"])
+    x0, v0 = fact["x0"]
+    motion = closed_form(p).motion(x0, v0, (t0, t1))
     turn, _ = fact["expected"]["turning_points"][0]
-    samples = tuple((t, motion.state(t)[:2]) for t in (early, 0.5 * (early + turn), 0.5 * (late + turn)))
-    x, v, _ = motion.state(late)
+    samples = tuple((t, at(motion, t)) for t in (early, 0.5 * (early + turn), 0.5 * (late + turn)))
+    x, v = at(motion, late)
     return oscillator(
         case,
         name="backward-orbit",
@@ -155,6 +168,7 @@ def threshold() -> Scene:
 
 
 def scenes() -> tuple[Scene, ...]:
+    """All of them."""
     return (
         *(oscillator(f"FLAG-flag_{which}") for which in ("a", "b_mus", "d_nodamp")),
         *(den_hartog(f"DH-{which}") for which in ("r2-f0.2", "r0.75-f0.3", "r1.5-f0.5")),

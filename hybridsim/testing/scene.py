@@ -1,4 +1,4 @@
-"""What a conformance scene is: a model, a run, and the truth about it."""
+"""What a scene is: a model, a run, the truth about it, and the trouble that it makes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,23 @@ VOCABULARY = (
 )
 TOLERANCES = (1e-6, 1e-9, 1e-12)
 
+TROUBLES = {
+    "events": "Events: when they are, how many, and in which order",
+    "stick": "Stick: when it begins, whether it holds, when it ends",
+    "sliding": "Sliding: along a surface, and off it again",
+    "accumulation": "Accumulation: infinitely many events in a finite time",
+    "stiffness": "Stiffness: rates that lie decades apart",
+    "stability": "Stability: steps and intervals beyond their limits, and long runs",
+    "sensitivity": "Sensitivity: where digits are lost",
+}
+
 END = math.inf  # as the time of a state: where the run ends
+
+
+def needs(*capabilities: str) -> frozenset[str]:
+    """Capabilities that a scene needs."""
+    return frozenset(capabilities)
+
 
 Check = Callable[[Any], list[str]]  # a solution -> what is wrong with it
 
@@ -58,10 +74,15 @@ class Truth:
 
 @dataclass(frozen=True)
 class Scene:
-    """A model file of scenes/ (or the name of a packaged model), a run of it, and the truth.
+    """A model, a run of it, and the truth about it.
 
     Parameters
     ----------
+    name : of the scene, unique among those that are run together.
+    file : a model file of the package's own scenes by its bare name, the name of a packaged model, or the path of a
+        ``.toml`` file.
+    span : (t0, t1) of the run.
+    truth : what must come out.
     needs : capabilities without which the scene cannot be run.
     unit : a time that is long for this motion, such as its period: errors of time are relative to it, and a
         fixed-step method divides it.
@@ -74,6 +95,11 @@ class Scene:
     speed : a speed that is fast for this motion, for methods with a zero-velocity interval.
     tolerances : rtol from loose to tight.
     effort : a run that took more steps than this is the last of its study.
+    trouble : the class of trouble, one of `TROUBLES`.
+    title, cause, story : what it is and why methods fail, in a few words each, and a paragraph: what goes
+        wrong, why, and which method to use.
+
+    Raises ValueError for a capability that is not in the vocabulary.
     """
 
     name: str
@@ -94,6 +120,10 @@ class Scene:
     speed: float = 1.0
     tolerances: tuple[float, ...] = TOLERANCES
     effort: int = 5000
+    trouble: str = ""
+    title: str = ""
+    cause: str = ""
+    story: str = ""
 
     def __post_init__(self) -> None:
         unknown = set(self.needs) - set(VOCABULARY)

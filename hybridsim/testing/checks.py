@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from conformance.scene import Check
+from hybridsim.testing.scene import Check
 
 
 def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...] = ()) -> Check:

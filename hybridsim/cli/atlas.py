@@ -1,0 +1,87 @@
+"""`hybridsim atlas [SCENE ...]`: scenes that break simulators against every integrator, with a verdict on each pair."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.cli import options, values
+from hybridsim.cli.output import print_json, require_folder
+from hybridsim.cli.progress import Progress
+from hybridsim.cli.session import Session
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.testing.atlas import Atlas
+
+_FOLDER = Path("atlas")
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "atlas",
+        help="what every integrator makes of the scenes that break simulators, and why",
+        description="Run scenes whose answer is known and which break simulators, with every integrator and with what "
+        "else people use, and say of each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
+        epilog="The folder gets atlas.json, matrix.png, index.md, and a page and a folder of pictures for each class. "
+        "All of it takes some ten minutes on two processors.",
+    )
+    parser.add_argument("scenes", metavar="SCENE", nargs="*", help="these scenes only (default: all)")
+    parser.add_argument(
+        "--class", dest="trouble", metavar="CLASS", default="", help="the scenes of this class"
+    )
+    parser.add_argument(
+        "--integrators",
+        metavar="A,B",
+        type=values.names,
+        help="these only, with the variants of each (default: all)",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="only the loosest setting of each study: gross failures"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=values.count, help="processes (default: one for each processor)"
+    )
+    options.add_out(parser, "atlas")
+    options.add_json(parser, "all verdicts")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace, session: Session) -> int:
+    """Run the matrix, print the counts and fill the folder."""
+    if args.scenes and args.trouble:
+        raise UsageError("scenes by name and --class", remedy="leave out one of the two")
+    folder: Path = args.out or _FOLDER
+    require_folder(folder, "--out")
+
+    from hybridsim.testing.atlas import atlas, scenes_named
+
+    scenes = scenes_named(args.scenes, args.trouble)
+    with Progress(session) as progress:
+        result = atlas(
+            scenes,
+            args.integrators,
+            quick=args.quick,
+            workers=args.workers or os.cpu_count() or 1,
+            progress=progress,
+        )
+    _write(result, folder, session)
+    if args.json:
+        print_json(result.to_plain())
+    else:
+        print(result.table())
+    return 0
+
+
+def _write(result: Atlas, folder: Path, session: Session) -> None:
+    from hybridsim.plot import save
+    from hybridsim.plot.atlas import matrix
+
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "atlas.json").write_text(result.to_json(), encoding="utf-8")
+    session.wrote(folder / "atlas.json")
+    save(matrix(result), folder / "matrix.png")
+    session.wrote(folder / "matrix.png")

@@ -1,0 +1,18 @@
+"""Scenes with known answers for integrators of your own: what they get right, what wrong, and why."""
+
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.scene import END, TOLERANCES, TROUBLES, VOCABULARY, Scene, Truth
+from hybridsim.testing.suite import Outcome, conformance_failures, outcome
+
+__all__ = [
+    "END",
+    "SCENES",
+    "TOLERANCES",
+    "TROUBLES",
+    "VOCABULARY",
+    "Outcome",
+    "Scene",
+    "Truth",
+    "conformance_failures",
+    "outcome",
+]

@@ -1,0 +1,17 @@
+"""The atlas: every scene with every integrator, what happens, and why."""
+
+from hybridsim.testing.atlas.cell import Cell, Row
+from hybridsim.testing.atlas.configurations import Configuration, configurations
+from hybridsim.testing.atlas.matrix import Atlas, atlas, scenes_named
+from hybridsim.testing.atlas.verdict import VERDICTS
+
+__all__ = [
+    "VERDICTS",
+    "Atlas",
+    "Cell",
+    "Configuration",
+    "Row",
+    "atlas",
+    "configurations",
+    "scenes_named",
+]

@@ -1,0 +1,101 @@
+"""One field of the matrix: a scene run by a configuration within a budget."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from hybridsim.testing.atlas.configurations import Configuration
+from hybridsim.testing.atlas.verdict import NOT_RUN, order, verdict
+from hybridsim.testing.scene import Scene, Truth
+from hybridsim.testing.study import Setting, carry_out, compile_for
+
+# What one run may take. The longest run of a right method takes two seconds and 2e6 steps where it is compiled.
+SECONDS = 4.0
+STEPS = 5e6
+LONG = 20.0  # units of time from which on only compiled methods run
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting of a study: errors relative as in `Scene`, steps and seconds of its run."""
+
+    setting: str
+    time_error: float
+    state_error: float
+    steps: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The verdict on a configuration in a scene.
+
+    Parameters
+    ----------
+    reason : what is not right, in one sentence.
+    order : of a fixed-step method, that the errors of states show; None where it cannot be seen.
+    """
+
+    scene: str
+    configuration: str
+    verdict: str
+    reason: str = ""
+    rows: tuple[Row, ...] = ()
+    order: float | None = None
+    seconds: float = 0.0
+
+    @property
+    def error(self) -> float | None:
+        """The larger of both errors at the last setting that ran."""
+        return max(self.rows[-1].time_error, self.rows[-1].state_error) if self.rows else None
+
+    def to_plain(self) -> dict[str, Any]:
+        """Plain data."""
+        return dataclasses.asdict(self) | {"error": self.error}
+
+
+def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) -> Cell:
+    """Run one field; `quick` runs the loosest setting of each study only."""
+    reason = configuration.applies(scene)
+    length = abs(scene.span[1] - scene.span[0]) / scene.unit
+    if not reason and length > LONG and length < 1e6 and not configuration.is_compiled:
+        reason = f"{length:.0f} units of time: long rows are for compiled methods"
+    if reason:
+        return Cell(scene.name, configuration.name, NOT_RUN, reason)
+    compile_for(configuration.integrator)
+    settings = configuration.settings(scene)
+    tolerances = configuration.tolerances(scene)
+    if quick:
+        settings, tolerances = settings[:1], loosened(tolerances, settings[0])
+    began = time.perf_counter()
+    study = carry_out(
+        configuration.integrator,
+        seen_by(scene, configuration),
+        settings,
+        tolerances,
+        seconds=2 * SECONDS,  # for what does not look at its limits
+        limits={"seconds": SECONDS, "steps": STEPS},
+        form=configuration.form,
+        **configuration.options,
+    )
+    found, reason = verdict(study)
+    rows = tuple(Row(s.text, r.time_error, r.state_error, r.steps, r.seconds) for s, r in study.done)
+    spent = time.perf_counter() - began
+    return Cell(scene.name, configuration.name, found, reason, rows, order(study.done), spent)
+
+
+def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, float]:
+    """What one loose run may show."""
+    allowed = 1e3 * setting.options.get("rtol", 1e-4)
+    return max(tolerances[0], allowed), max(tolerances[1], allowed)
+
+
+def seen_by(scene: Scene, configuration: Configuration) -> Scene:
+    """The scene as it can be asked of a configuration: regularised contacts have no modes to compare."""
+    if not configuration.form:
+        return scene
+    truth = scene.truth
+    return replace(scene, truth=Truth(None, truth.states, status=truth.status, end=truth.end))

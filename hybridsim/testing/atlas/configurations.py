@@ -1,0 +1,153 @@
+"""What the atlas runs: every integrator, and what else people use, each by a name and with a study of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import hybridsim as hs
+from hybridsim.errors import UsageError, nearest
+from hybridsim.integrators.base import Integrator
+from hybridsim.testing import judge
+from hybridsim.testing.scene import Scene
+from hybridsim.testing.study import (
+    NOT_LOCATED,
+    STEPS,
+    Setting,
+    allowed_errors,
+    fixed_step,
+    integrator,
+    settings_for,
+)
+
+# Regularised forms: their width in units of the scene's speed and the steps in its unit of time. Both fall together,
+# so that an explicit method stays stable where the friction force is of the order of mass * speed / unit.
+WIDTHS = (1e-2, 1e-3, 1e-4)
+FINE_STEPS = (1200, 12_000, 120_000)
+MOST_STEPS = 2e6  # in one run of these
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A way of running a scene that people use.
+
+    Parameters
+    ----------
+    name, title : what it is called in the matrix, and what it is.
+    integrator : the name of a registered integrator.
+    kind : "best", the integrator as well as it can be run; "published", with its defaults and three steps; "native",
+        with SciPy's own event handling; or the form of `Model.regularized` that is run instead of the model.
+    """
+
+    name: str
+    title: str
+    integrator: str
+    kind: str = "best"
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def method(self) -> type[Integrator]:
+        """The integrator's class."""
+        return integrator(self.integrator)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether long runs are cheap: the loop over the steps is compiled."""
+        return self.method.leaps or self.method.start is Integrator.start
+
+    @property
+    def form(self) -> str:
+        """The regularised form, or nothing."""
+        return self.kind if self.kind in ("tanh", "karnopp") else ""
+
+    def settings(self, scene: Scene) -> tuple[Setting, ...]:
+        """The runs of its study, from loose to tight."""
+        if self.kind == "published":
+            return tuple(
+                fixed_step(steps, {"steps_per_period": steps, "period": scene.unit}, scene) for steps in STEPS
+            )
+        if self.form:
+            length = abs(scene.span[1] - scene.span[0]) / scene.unit
+            return tuple(
+                replace(
+                    fixed_step(steps, {"step": scene.unit / steps, "v0": width * scene.speed}, scene),
+                    text=f"v0 {width:.0e}, unit/{steps}",
+                )
+                for width, steps in zip(WIDTHS, FINE_STEPS, strict=True)
+                if steps * length <= MOST_STEPS
+            )
+        return settings_for(self.method, scene)
+
+    def tolerances(self, scene: Scene) -> tuple[float, float]:
+        """Errors of times and states that the tightest setting may have."""
+        if self.form:
+            return max(scene.tol_t, NOT_LOCATED), max(scene.tol_x, NOT_LOCATED)
+        return allowed_errors(self.method, scene)
+
+    def applies(self, scene: Scene) -> str:
+        """Why there is nothing to run; empty if there is."""
+        if self.form and not judge.load(scene).contacts:
+            return "the model has no friction contact to regularise"
+        if self.form and not scene.truth.states:
+            return "what is known of the motion are its modes, and a regularised contact has none"
+        if self.form and not self.settings(scene):
+            return "too long for its steps"
+        return ""
+
+
+def configurations() -> tuple[Configuration, ...]:
+    """All: the registered integrators at their best, and what else people use."""
+    found: list[Configuration] = []
+    for one in hs.list_integrators():
+        if one.name == "rk4-dichotomy":
+            found += [
+                Configuration(
+                    "rk4-dichotomy",
+                    "the published method as published: 16 halvings, eps_v = 8e-4, the velocity kept in stick",
+                    one.name,
+                    "published",
+                ),
+                Configuration(
+                    "rk4-dichotomy refined",
+                    "the same with located release, velocity zero in stick and eps_v that falls with the step",
+                    one.name,
+                ),
+            ]
+        else:
+            found.append(Configuration(one.name, one.title, one.name))
+    for one in hs.list_integrators():
+        if one.name.startswith("scipy-"):
+            found.append(
+                Configuration(
+                    f"{one.name} native",
+                    f"{one.title} with the events of solve_ivp",
+                    one.name,
+                    "native",
+                    {"events": "native"},
+                )
+            )
+    for form in ("tanh", "karnopp"):
+        found.append(
+            Configuration(
+                f"rk4 {form}",
+                f"classic RK4 on the {form} form of friction, both step and width falling",
+                "rk4-sign",
+                form,
+            )
+        )
+    return tuple(found)
+
+
+def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
+    """Those of a name, or of an integrator of that name with all that belongs to it; all without names."""
+    every = configurations()
+    if names is None:
+        return every
+    known = {one.name for one in every} | {one.integrator for one in every}
+    for name in names:
+        if name not in known:
+            raise UsageError(
+                f"the atlas has no integrator {name!r}", remedy=nearest(name, known, kind="integrators")
+            )
+    return tuple(one for one in every if one.name in names or one.integrator in names)

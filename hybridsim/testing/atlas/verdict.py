@@ -1,0 +1,78 @@
+"""From the runs of a study to one verdict, with the reason and the order that the errors show."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from hybridsim.errors import HybridsimError
+from hybridsim.testing.judge import Measured
+from hybridsim.testing.study import Endless, Setting, Study, judge_errors
+
+RIGHT = "right"
+WRONG_ANSWER = "wrong answer"
+WRONG_SEQUENCE = "wrong mode sequence"
+HANG = "hang (bounded)"
+REFUSED = "refused"
+NOT_RUN = "not run"
+VERDICTS = {
+    RIGHT: "every event found and none invented, and errors that fall with the tolerance or the step",
+    WRONG_ANSWER: "the run ends as if all were well, and its numbers are wrong or do not become right",
+    WRONG_SEQUENCE: "an event missed, invented or out of order, or a mode that is not the motion's",
+    HANG: "no end within the time or the steps that a run may take",
+    REFUSED: "it says that it cannot, with the reason: before the run, or where it stops",
+    NOT_RUN: "nothing to run: no friction to regularise, or a long row and a method that steps in Python",
+}
+WRONG = (WRONG_ANSWER, WRONG_SEQUENCE)
+
+
+def verdict(study: Study) -> tuple[str, str]:
+    """The verdict, and the sentence about the first thing that is not right."""
+    for setting, run in study.done:
+        found, sentence = of_run(run)
+        if found != RIGHT:
+            return found, f"{setting.text}: {sentence}"
+    if study.failure is not None:
+        text, error = study.failure
+        if isinstance(error, Endless):
+            return HANG, f"{text}: {error}"
+        name = "" if isinstance(error, HybridsimError) else f"{type(error).__name__}: "
+        return REFUSED, f"{text}: {name}{one_line(str(error))}"
+    faults = judge_errors(study.done, study.tolerances)
+    return (WRONG_ANSWER, faults[-1]) if faults else (RIGHT, "")
+
+
+def of_run(run: Measured) -> tuple[str, str]:
+    """The verdict on one run, errors of numbers apart."""
+    if run.ending:
+        sentence = one_line(run.ending[0])
+        if run.status == "limit":
+            return HANG, sentence
+        # what stops early and says why has misled nobody
+        return (WRONG_ANSWER if run.status in ("finished", "terminated") else REFUSED), sentence
+    if run.sequence:
+        return WRONG_SEQUENCE, one_line(run.sequence[0])
+    if run.checks:
+        return WRONG_ANSWER, one_line(run.checks[0])
+    return RIGHT, ""
+
+
+def one_line(text: str) -> str:
+    """A message without its line breaks."""
+    return re.sub(r"\s+", " ", text).strip()
+
+
+def order(done: tuple[tuple[Setting, Measured], ...]) -> float | None:
+    """The order in the step that the errors of states show at the two finest settings; None if it cannot be seen."""
+    if len(done) < 2 or "rtol" in done[-1][0].options:
+        return None
+    (before, coarse), (setting, fine) = done[-2:]
+    lengths = [_steps(one.text) for one in (before, setting)]
+    usable = fine.state_error > setting.excused and coarse.state_error > before.excused
+    if not usable or not math.isfinite(coarse.state_error + fine.state_error):
+        return None
+    return math.log(coarse.state_error / fine.state_error) / math.log(lengths[1] / lengths[0])
+
+
+def _steps(text: str) -> float:
+    return float(text.rpartition("/")[2])

@@ -1,0 +1,47 @@
+"""The scenes that come with the package, by class of trouble."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hybridsim.testing.catalogue import (
+    accumulation,
+    coincidences,
+    contacts,
+    corners,
+    events,
+    oscillators,
+    sensitivity,
+    sliding,
+    stiffness,
+    timed,
+)
+from hybridsim.testing.scene import Scene
+
+# Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
+NONLINEAR = {
+    "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
+    "drag", "circle-surface", "sliding-circle",
+}  # fmt: skip
+
+
+def _with_linearity(scene: Scene) -> Scene:
+    return replace(scene, needs=scene.needs | {"nonlinear"}) if scene.file in NONLINEAR else scene
+
+
+SCENES: tuple[Scene, ...] = tuple(
+    _with_linearity(scene)
+    for part in (
+        oscillators,
+        contacts,
+        accumulation,
+        events,
+        stiffness,
+        timed,
+        coincidences,
+        corners,
+        sliding,
+        sensitivity,
+    )
+    for scene in part.scenes()
+)

@@ -1,0 +1,101 @@
+"""Scenes of events at one instant: guards listed twice, two ulp apart, flat, and resets onto guards."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.testing.checks import equals, says
+from hybridsim.testing.scene import Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Guards listed twice, at one instant, two ulp apart, zero at the start, flat, and resets onto guards."""
+    after = ("a:after", "b:after")
+    return (
+        Scene(
+            "same-guard-twice",
+            "twice",
+            (0.0, 3.0),
+            Truth(((1.0, "one"), (1.0, "two"), *((2.0, name) for name in after)), ((3.0, (3.0,)),)),
+            needs("monitors", "transitions"),
+            tol_t=1e-12,
+        ),
+        Scene(
+            "two-ulp-apart",
+            "near-pair",
+            (0.0, 2.0),
+            Truth(((1.0, "a:near"), (1.0, "b:near")), ((2.0, (2.0,)),)),
+            needs("transitions"),
+            tol_t=1e-12,
+        ),
+        Scene(
+            "past-the-guard",
+            "past-the-guard",
+            (0.0, 1.0),
+            Truth(((0.0, "mode:rest"),), ((1.0, (1.0, 0.0)),), checks=(("", equals(1.0, h=1.0, w=0.0)),)),
+            needs("transitions"),
+        ),
+        Scene(
+            "flat-guard",
+            "flat-guard",
+            (0.0, 2.0),
+            Truth(None, ((0.5, (0.0,)), (2.0, (-1.0,))), checks=(("", left_once),)),
+            needs("transitions", "monitors", "scheduled"),
+        ),
+        Scene(
+            "reset-onto-a-guard",
+            "chain",
+            (0.0, 2.0),
+            Truth(((1.0, "mode:second"), (1.0, "mode:third")), ((0.5, (0.5,)), (2.0, (4.0,)))),
+            needs("transitions"),
+            tol_t=1e-12,
+        ),
+        Scene(
+            "reset-across-itself",
+            "flip",
+            (0.0, 6.0),
+            Truth(
+                ((1.0, "edge"), (3.0, "edge"), (5.0, "edge")), ((2.0, (0.0,)), (6.0, (0.0,)), (0.5, (0.5,)))
+            ),
+            needs("monitors"),
+            tol_t=1e-12,
+        ),
+        Scene(
+            "u-and-its-cube",
+            "powers",
+            (0.0, 3.0),
+            Truth(((1.0, "u"), (1.0, "cube"), *((2.0, name) for name in after)), ((3.0, (3.0,)),)),
+            needs("monitors", "transitions"),
+            # a triple root is known to the cube root of the rounding, 6e-6
+            tol_t=1e-5,
+            floor=1e-5,
+        ),
+        Scene(
+            "clock-and-guard-at-once",
+            "same-instant",
+            (0.0, 2.0),
+            Truth(
+                ((1.0, "tick"), (1.0, "mode:falling")),
+                ((0.5, (0.5,)), (2.0, (0.0,))),
+                checks=(("", equals(2.0, ticks=1.0)),),
+            ),
+            needs("transitions", "scheduled"),
+            count_scheduled=True,
+            tol_t=1e-12,
+        ),
+        Scene(
+            "endless-cascade",
+            "cascade",
+            (0.0, 2.0),
+            Truth(None, ((0.5, (0.5,)),), status="cascade", end=1.0, checks=(("", says("over", "back")),)),
+            needs("transitions"),
+        ),
+    )
+
+
+def left_once(solution: Any) -> list[str]:
+    """The flat guard: one transition, at t = 1, and at most one crossing of the monitor, there."""
+    changes = [(event.t, event.target) for event in solution.events if event.kind == "transition"]
+    wrong = [] if changes == [(1.0, "lower")] else [f"transitions {changes}, not once to lower at 1"]
+    crossed = [event.t for event in solution.events if event.component == "down"]
+    return wrong + ([] if crossed in ([], [1.0]) else [f"the monitor fired at {crossed}"])

@@ -1,0 +1,104 @@
+"""Scenes of stick: other laws, a belt, and several contacts at once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.testing.checks import exact_stick
+from hybridsim.testing.facts import CASES, recomputed
+from hybridsim.testing.scene import Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Contacts with other laws, on a belt, and several at once."""
+
+    def belt(name: str, delta: float) -> Scene:
+        events, states = recomputed(name)
+        fact = CASES[name]
+        x, v = fact["x0"]
+        return Scene(
+            name,
+            "belt",
+            tuple(fact["t_span"]),
+            Truth(events, states, checks=(("exact-stick", exact_stick("f", {"v": 0.2})),)),
+            needs("contacts", "exact-stick"),
+            params={"delta": delta},
+            start={"x": x, "v": v},
+            unit=10.0,
+            start_is_event=False,
+        )
+
+    events, states = recomputed("MSL-stribeck")
+    resting = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
+    stribeck = Scene(
+        "MSL-stribeck",
+        "stribeck",
+        (0.0, 5.0),
+        Truth(events, states, checks=resting),
+        needs("contacts", "exact-stick"),
+        unit=4.0,
+        start_is_event=False,
+        speed=8.0,
+    )
+    events, states = recomputed("NOS-blocks0")
+    stops = tuple(("exact-stick", exact_stick(f"f{i}", {f"v{i}": 0.0}, rest=(f"q{i}",))) for i in (1, 2, 3))
+    blocks = Scene(
+        "NOS-blocks0",
+        "blocks",
+        (0.0, 12.0),
+        Truth(events, states, checks=stops),
+        needs("contacts", "exact-stick"),
+        unit=5.0,
+        start_is_event=False,
+    )
+    return belt("LEINE-3", 3.0), belt("NOS-codim1", 1.0), stribeck, blocks, tied(), turning_belt()
+
+
+def tied() -> Scene:
+    """Coupled contacts at their limits together: a limit that another force's jump undoes is none."""
+    release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
+
+    def after(t: float) -> tuple[float, float]:
+        """x2'' + 30 x2 = 7.5 sin(4 t) - 2.1 from rest at the release, the first body in stick."""
+        x0 = -forced * math.sin(4 * release) + 0.07
+        v0 = -4 * forced * math.cos(4 * release) / own
+        c, s = math.cos(own * (t - release)), math.sin(own * (t - release))
+        x = x0 * c + v0 * s + forced * math.sin(4 * t) - 0.07
+        return x, own * (v0 * c - x0 * s) + 4 * forced * math.cos(4 * t)
+
+    states = tuple((t, (0.0, 0.0, *after(t))) for t in (0.15, 0.2))
+    return Scene(
+        "tied-limits",
+        "tied-limits",
+        (0.0, 0.2),
+        Truth(((release, "b:slip+"),), states),
+        needs("contacts", "exact-stick", "adaptive"),  # a fixed step finds both limits passed
+        start_is_event=False,
+        unit=0.2,
+    )
+
+
+def turning_belt() -> Scene:
+    """An input that jumps carries the surface away: what stuck to it slips."""
+    turns = ["f:stick", "f:slip+", "f:slip-"]
+    states = ((0.5, (0.5,)), (1.5, (1.0,)), (3.25, (-0.5,)), (4.5, (0.25,)))
+    return Scene(
+        "turning-belt",
+        "turning-belt",
+        (0.0, 5.0),
+        Truth(None, states, checks=(("", sequence(turns)),)),
+        needs("contacts", "exact-stick", "scheduled"),
+        unit=1.0,
+        start_is_event=False,
+    )
+
+
+def sequence(wanted: list[str]) -> Any:
+    """The changes of modes, in order; their times are looked at through the states."""
+
+    def check(solution: Any) -> list[str]:
+        found = [f"{e.component}:{e.target}" for e in solution.events if e.component]
+        return [] if found == wanted else [f"{found}, not {wanted}"]
+
+    return check
