@@ -11,6 +11,7 @@ from hybridsim.engine.impulse_rows import impulses, restitutions, speed_name
 from hybridsim.engine.layout import SIGNAL_SLOTS
 from hybridsim.engine.lower import Lowering, Program, user
 from hybridsim.engine.program import Assign, Item, Switch, needed
+from hybridsim.engine.stepped_rows import stepped
 from hybridsim.engine.tape import TapeBuilder
 from hybridsim.expr.symbolic import derivative
 from hybridsim.model.rewriting import VARIABLE
@@ -124,6 +125,7 @@ class Emitter:
             self._function("effects", [(f"out[{k}]", e) for k, e in enumerate(self.lowering.effects)]),
             self._function("impulses", impulses(self.lowering)),
             self._function("restitutions", restitutions(self.lowering)),
+            self._function("stepped", stepped(self.lowering)),
             self._function("rates", [(f"out[{k}]", r) for k, r in enumerate(program.rates)]),
             self._choose(),
             self._reset(),

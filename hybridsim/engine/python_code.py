@@ -43,7 +43,9 @@ class PythonCode:
         self.module = SimpleNamespace(
             flow=self.forms.flow,
             **{name: self.forms.row(scalars) for name, scalars in self._rows.items()},
-            **dict.fromkeys(("surfaces", "jumps", "effects", "rates", "impulses", "restitutions"), nothing),
+            **dict.fromkeys(
+                ("surfaces", "jumps", "effects", "rates", "impulses", "restitutions", "stepped"), nothing
+            ),
             choose=self._choose,
             reset=self._reset,
         )

@@ -8,7 +8,8 @@ import numpy as np
 
 from hybridsim.engine.jit import call, inlined
 
-BOUND, FULL, GUARD, MONITOR, NOT_FINITE = 0, 1, 2, 3, 4  # why a stretch of steps ended
+# why a stretch of steps ended
+BOUND, FULL, GUARD, MONITOR, NOT_FINITE, RESTITUTION = 0, 1, 2, 3, 4, 5
 GOES_ON = -1
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +19,8 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
-from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE
+from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTITUTION
+from hybridsim.integrators.gaps import gaps
 
 _STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # what a run needs to go on
 _ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
@@ -66,10 +67,13 @@ class March(Protocol):
 
 
 def surface_table(system: System) -> np.ndarray:
-    """A row for each component with a surface: its number, above, below, hold, upper and lower guard of the latter."""
+    """A row for each component with a surface: its number, above, below, hold, upper and lower guard of the latter.
+
+    -1 stands for what a gap does not have.
+    """
     return np.array(
         [
-            (c, a.above, a.below, a.hold, *(a.guards[a.hold][:2]))
+            (c, a.above, a.below, a.hold, *((*a.guards[a.hold], -1)[:2]))
             for c, a in enumerate(system.automata)
             if a.has_surface
         ],
@@ -89,6 +93,7 @@ class FixedStepRun:
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
+        self._holds = np.array([a.hold for a in system.automata], dtype=np.int64)
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
         self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
         self.accumulation = Accumulation(located, 4.0 * located)
@@ -121,6 +126,8 @@ class FixedStepRun:
         else:
             due = self.timetable.due_at_start(self.origin)
             self.timetable.kept(self.origin)
+            if self._overlaps(range(len(self.z))):
+                return
             if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
                 return
         while self.origin != self.end:
@@ -161,6 +168,8 @@ class FixedStepRun:
         )
         start_z = self.z.copy()
         rows = (times, states, modes)
+        if self.turned and self._overlaps(np.flatnonzero(self.z == self._holds).tolist()):
+            return True
         z = self._sides_taken() if self.turned else self.z
         self.turned = False
         count, why = self.march.run(numbers, bound, p, (self.x, z), self.fresh, rows)
@@ -176,6 +185,12 @@ class FixedStepRun:
             self.record.status = "step-failure"
             self.record.message = (
                 f"after t = {float(instant)!r}: the state or a guard is not a number after one step"
+            )
+            return True
+        if why == RESTITUTION:
+            self.record.status = "inconsistent"
+            self.record.message = (
+                f"at t = {float(instant)!r}: the restitution of an impact does not lie between 0 and 1"
             )
             return True
         if why == FULL:
@@ -199,9 +214,29 @@ class FixedStepRun:
         )[0]
         for c, value in zip(self.system.surface_of, values.tolist(), strict=True):
             automaton = self.system.automata[c]
-            if z[c] == automaton.hold and value != 0.0:
+            if z[c] == automaton.hold and value != 0.0 and not automaton.is_unilateral:
                 z[c] = automaton.above if value > 0.0 else automaton.below
+        for c, (gap, is_moving) in self._gaps().items():
+            if gap or is_moving:
+                z[c] = self.system.automata[c].above
         return z
+
+    def _gaps(self) -> dict[int, tuple[int, bool]]:
+        """See `gaps`; of the present states."""
+        if not self.system.is_unilateral.any():
+            return {}
+        p = self._vector()
+        p[self.system.layout.pin_at] = 0.0
+        return gaps(self.system, self.x, p, self.z)
+
+    def _overlaps(self, of: Iterable[int]) -> bool:
+        """Whether a gap of these components is negative where it cannot be, which ends the run."""
+        below = [c for c, (gap, _) in self._gaps().items() if gap < 0 and c in of]
+        if below:
+            names = ", ".join(self.system.automata[c].name for c in below)
+            self.record.status = "inconsistent"
+            self.record.message = f"at t = {float(self.origin)!r}: the gap of {names} is below zero"
+        return bool(below)
 
     # -- events of guards and monitors beside the surfaces --------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Moreau-Jean time stepping: no event is located, the forces of a step solve the law at its end."""
+"""Moreau-Jean time stepping: no event is located, the forces of a step solve the laws at its end."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hybridsim.errors import UsageError
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.fixed_step_length import fixed_step_length, refuse_longer
 from hybridsim.integrators.fixed_step_run import FixedStepRun, surface_table
+from hybridsim.integrators.moreau_impacts import UNILATERAL
 from hybridsim.integrators.moreau_kernels import moreau_step, moreau_steps, room_for
 
 _HALVINGS = 16  # of a step in which a declared guard or monitor crosses zero
@@ -21,7 +22,7 @@ _HALVINGS = 16  # of a step in which a declared guard or monitor crosses zero
 
 @dataclass(frozen=True)
 class Moreau(Integrator):
-    """Moreau-Jean time stepping: a fixed step, implicit in the friction forces, that knows no events.
+    """Moreau-Jean time stepping: a fixed step, implicit in the forces of contacts, that knows no events.
 
         X = x + h (theta a(t + h, X) + (1 - theta) a(t, x)) + h sum_k B_k f_k,   f_k in the law of contact k at v_k(X)
 
@@ -29,6 +30,14 @@ class Moreau(Integrator):
     far as the limit of stick goes, else that of slip at the new velocity; together they are found by projected
     Gauss-Seidel sweeps, inside Newton's iteration for X. A step may hold any number of stops, slips and reversals: none
     is missed, each is late by up to a step. A contact that sticks has its velocity exactly zero.
+
+    Of a gap g with the rate u and the restitution e (`hybridsim.Impact`) the force p is an impulse over the step,
+
+        0 <= p,   u(X) >= e max(-u(x), 0),   one of the two with equality,   where g is closed or g + u h/2 <= 0 at x
+
+    and friction that it loads has limits that grow with it. A gap is `closed`, it and its rate exactly zero, where it
+    is pushed and does not rebound; bounces end there once one is over within a step. Until then a gap may be negative
+    by up to half a step's way, and bounces, which leave the mode as it is, are no events.
 
     Parameters
     ----------
@@ -40,8 +49,9 @@ class Moreau(Integrator):
     iterations : of Newton's method in a step at most.
 
     When to choose it: many contacts, accumulations of events, and as a route to the answer that shares no decision with
-    those that locate events. Error of first order in the step; general automata, resets and monitors as in other
-    fixed-step methods.
+    those that locate events. Error of first order in the step: in the states, and where velocities jump in their mean
+    over time (L1). General automata, resets and monitors as in other fixed-step methods. Friction and rebound together
+    may gain energy by Newton's law (Kane's paradox), which methods that locate impacts reduce and this one does not.
     Source: M. Jean, Comput. Methods Appl. Mech. Engrg. 177 (1999) 235, doi:10.1016/S0045-7825(98)00383-1; V. Acary and
     B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, doi:10.1007/978-3-540-75392-6.
     """
@@ -55,12 +65,12 @@ class Moreau(Integrator):
     when: ClassVar[str] = "many contacts; accumulations; a second opinion"
     lacks: ClassVar[dict[str, str]] = {
         "adaptive": "its step is fixed: rtol and atol do not enter",
-        "located": "no event is located: stops and reversals show at the end of a step, a reversal as a stick of one",
+        "located": "no event is located: stops, reversals and contacts show where the step that they are in begins, "
+        "a reversal as a stick of one; a bounce is no event",
         "stiff": "its iteration for the new state needs steps that resolve stiff rates",
         "multiple-roots": "only the signs at the ends of a step are compared",
         "backward": "the law of a contact that sticks has no past",
         "sliding": "its solve is made for friction forces; what a switching surface weighs needs another",
-        "impacts": "its solve is made for friction forces, not yet for the impulses of contacts that close",
         "functions": "it takes forces apart that are declared by expressions",
     }
 
@@ -96,19 +106,26 @@ class MoreauMarch:
     def __init__(
         self, system: System, step: float, settings: tuple[float, float, int], x0: np.ndarray
     ) -> None:
-        self.step, self._settings = step, settings
+        self.step = step
         self.counts = np.zeros(3, dtype=np.int64)
-        table = surface_table(system)
+        table, has_impacts = surface_table(system), bool(system.is_unilateral.any())
         unknowns = {c.name: c.surface.unknown for c in system.model.all_components() if c.surface}
         forces = [system.quantities.index(unknowns[system.automata[c].name]) for c in table[:, 0].tolist()]
-        self._table = np.concatenate([table, np.array(forces, dtype=np.int64)[:, None]], axis=1)
-        names = ("flow", "guards", "quantities", "surfaces", "project", "monitors")
+        self._settings = (*settings, has_impacts)
+        columns = [forces, system.is_unilateral[table[:, 0]]]
+        self._table = np.concatenate([table, np.array(columns, dtype=np.int64).T], axis=1)
+        last = ("stepped", "restitutions") if has_impacts else ("flow", "flow")  # these are not called
+        names = ("flow", "guards", "quantities", "surfaces", "project", "monitors", *last)
         self._functions = tuple(system.address(n) for n in names)
+        evaluated = np.zeros((len(table), system.n))
+        for k in np.flatnonzero(self._table[:, UNILATERAL]):
+            c = int(table[k, 0])
+            evaluated[k, [*system.pins.get(c, ()), *system.projected.get(c, ())]] = 1
         nominal = np.array([s.nominal or 0.0 for s in system.model.states])
         sizes = np.where(nominal > 0.0, nominal, np.where(x0 != 0.0, np.abs(x0), 1.0))
         self._room = room_for(
             system.n, len(table), len(system.automata), len(system.quantities), system.guard_count,
-            len(system.monitor_names), sizes,
+            len(system.monitor_names), sizes, evaluated,
         )  # fmt: skip
 
     def run(
@@ -141,7 +158,7 @@ class MoreauMarch:
         failed = int(self.counts[2])
         if not failed:
             return []
-        _, tolerance, iterations = self._settings
+        _, tolerance, iterations, _ = self._settings
         return [
             f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: take smaller ones"
         ]
