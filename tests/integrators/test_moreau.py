@@ -113,7 +113,7 @@ def test_steps_that_do_not_converge_are_counted() -> None:
 
 def test_static_friction_in_coupled_contacts_comes_loose_at_its_limit() -> None:
     """What sticks and slips in turns within a step must not stay above its limit (tied-limits, but for a load)."""
-    path = Path(__file__).parents[1] / "conformance" / "scenes" / "tied-limits.toml"
+    path = Path(hs.__file__).parent / "testing" / "scenes" / "tied-limits.toml"
     model = hs.Model.from_toml(path.read_text("utf-8").replace("normal = 20.0", "normal = 25"), str(path))
     sol = hs.simulate(model, (0, 0.2), integrator="moreau", step=1e-3)
     assert sol.warnings == ()
