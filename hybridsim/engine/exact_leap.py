@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
@@ -27,7 +28,6 @@ from hybridsim.engine.linear_kernels import (
     states_of,
     to_modal,
 )
-from hybridsim.engine.ordinary_event import Before, find_modes, put
 from hybridsim.engine.segment_end import is_crowded, moved_on, settle_and_move_on, state_errors
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
@@ -45,13 +45,7 @@ class Room(NamedTuple):
     terms: np.ndarray
     starts: np.ndarray
     hints: np.ndarray
-    y: np.ndarray
-    y1: np.ndarray
-    y_error: np.ndarray
-    z: np.ndarray
-    p: np.ndarray
     scale: np.ndarray
-    slopes: np.ndarray
     pace: np.ndarray
 
 
@@ -150,12 +144,12 @@ def exact_leap(
     places, target, clock, state, work as for `leap`; longest: of a segment. room: scratch arrays. record: what the
     segments and events are written to.
     """
-    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    rates, origin_at, phases_at = places
     place = (origin_at, phases_at)
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    c, v, terms, scale, slopes = room.c, room.v, room.terms, room.scale, room.slopes
-    y, y1, y_error, z1, p1 = room.y, room.y1, room.y_error, room.z, room.p
+    c, v, terms, scale = room.c, room.v, room.terms, room.scale
+    y, y1, y_error, slopes = work.y, work.x_after, work.y_error, work.slopes
     ends, clocks, rows, modes = record.ends, record.clocks, record.rows, record.modes
     vectors, coordinates, fires, jumps = record.vectors, record.coordinates, record.fires, record.jumps
     n, n_segments = x.shape[0], 0
@@ -220,11 +214,7 @@ def exact_leap(
         errors_of_time(lin, 0.0, s_error, p, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
-        event = Before(0.0, s_error, y, y_error, p, z)
-        if not settle_and_move_on(
-            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,
-            (y1, slopes, z1, p1),
-        ):  # fmt: skip
+        if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
             return STOPPED, n_segments

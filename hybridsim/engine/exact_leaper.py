@@ -9,15 +9,15 @@ import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.exact_leap import Record, Room, exact_leap
 from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
-from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
-from hybridsim.engine.segment_end import State
+from hybridsim.engine.segment_end import State, reach_settling
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -42,8 +42,6 @@ class ExactLeaper:
             np.asarray(system.rates),
             layout.origin_at,
             layout.phases_at,
-            layout.discrete_at,
-            layout.discrete,
         )
 
     @property
@@ -73,12 +71,14 @@ class ExactLeaper:
         tapes = self.shelf.tapes
         self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
         tables, spare = tables_of(self.system, tapes.modes, p, self.horizon)
+        as_packed = packed(state)
         try:
             work, room = spare.pop()
         except IndexError:
             work, room = self._scratch(tables)
+            reach_settling(self.automata, tapes, self.system.registers.inputs, tables, as_packed, work)
         rows = self._record(tables)
-        as_packed, record_packed, began = packed(state), packed(rows), perf_counter()
+        record_packed, began = packed(rows), perf_counter()
         code, count = exact_leap(
             self.functions, self.automata, tapes, self.system.registers.inputs, tables, self.places, self.longest,
             to, clock, as_packed, work, room, record_packed,
@@ -103,10 +103,8 @@ class ExactLeaper:
             terms=np.zeros((2, TERMS)),
             starts=np.zeros((self.system.guard_count, TERMS + 2)),
             hints=np.zeros(tables.farthest.shape),
-            z=np.empty(len(self.system.automata), dtype=np.int64),
-            p=np.empty(self.system.layout.size),
+            scale=np.empty(n),
             pace=np.empty(3),
-            **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes")},
         )
         return work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1), packed(room)
 

@@ -35,7 +35,7 @@ if ENABLED:
     import numba
     from llvmlite import ir
     from numba import types
-    from numba.core import event
+    from numba.core import cgutils, event
     from numba.extending import intrinsic
 
     from hybridsim.engine.machine_code import compile_text, machine_name
@@ -53,7 +53,8 @@ if ENABLED:
         """Adds up what each thread spends on compiling kernels, or on reading them from the cache; sets the effort.
 
         With the second level of LLVM's passes the engine is ready an eighth sooner than with numba's default, the
-        third, and its kernels are as fast. Compiling holds numba's lock, so the setting, which is everybody's, is ours meanwhile.
+        third, and its kernels are as fast. Compiling holds numba's lock, so the setting, which is everybody's, is ours
+        meanwhile.
         """
 
         def __init__(self) -> None:
@@ -132,6 +133,10 @@ if ENABLED:
         """A short kernel, made part of its callers."""
         return _compiled(function, forceinline=True, _nrt=False)
 
+    def merged(function: Callable[..., Any]) -> Callable[..., Any]:
+        """A part of the one kernel that calls it, with a name of its own; it is never compiled by itself."""
+        return _compiled(function, inline="always", _nrt=False)
+
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
         return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
@@ -142,12 +147,7 @@ if ENABLED:
         kept = path.with_name(f"{path.stem}.{name}.{machine_name()}.o")
         return compile_text(path.read_text(encoding="utf-8"), name, kept)
 
-    def kernel_address(function: Callable[..., int], *packs: Any) -> int:
-        """Compile a kernel of packs that returns a whole number; its address, for `call_kernel`.
-
-        A kernel that calls others is compiled together with them, again for each caller; large ones that are reached
-        by their address are compiled once.
-        """
+    def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
         made = _with_cache_folder(
             str(kernel_folder()),
             lambda: numba.cfunc(
@@ -158,14 +158,15 @@ if ENABLED:
         return int(made.address)
 
     @intrinsic
-    def call_kernel(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-        """Call the kernel of four packs at an address."""
-        signature = types.int64(types.int64, a, b, c, d)
+    def call_kernel(typingctx: Any, address: Any, packs: Any) -> Any:
+        """Call the kernel at an address with a tuple of packs."""
+        signature = types.int64(types.int64, packs)
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             word = ir.IntType(64)
-            kind = ir.FunctionType(word, [word] * 4)
-            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), list(args[1:]))
+            kind = ir.FunctionType(word, [word] * len(packs))
+            words = cgutils.unpack_tuple(builder, args[1], len(packs))
+            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), words)
 
         return signature, generate
 
@@ -194,19 +195,18 @@ else:
         """Leave the function as it is: the compiler is switched off."""
         return function
 
-    inlined = allocating_kernel = polynomial_kernel = kernel
+    inlined = merged = allocating_kernel = polynomial_kernel = kernel
 
     def seconds_compiling() -> float:
         """None: nothing is compiled."""
         return 0.0
 
-    def kernel_address(function: Callable[..., int], *packs: Any) -> int:
-        """A number by which `call_kernel` finds the function."""
+    def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
         if function not in _reached:
             _reached.append(function)
         return _reached.index(function)
 
-    def call_kernel(address: int, *packs: Any) -> int:
+    def call_kernel(address: int, packs: tuple[Any, ...]) -> int:
         """Call a function of packs."""
         return int(_reached[address](*packs))
 
@@ -226,6 +226,21 @@ else:
     def call(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> int:
         """Call the model function."""
         return function(t, x, p, z, out)
+
+
+_addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the forms of their packs
+
+
+def kernel_address(function: Callable[..., int], *packs: Any) -> int:
+    """Address of a kernel of packs that returns a whole number, for `call_kernel`; compiled if need be.
+
+    A kernel that calls others is compiled together with them, again for each caller; large ones that are reached by
+    their address are compiled once. Without a compiler it is a number by which the function is found.
+    """
+    key = (function, *(getattr(pack, "numba_type", None) for pack in packs))
+    if key not in _addresses:
+        _addresses[key] = _kernel_at(function, *packs)
+    return _addresses[key]
 
 
 @cache

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.engine.ordinary_event import Before, find_modes, put
 from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -34,13 +34,7 @@ class Room(NamedTuple):
     a: np.ndarray
     b: np.ndarray
     stack: np.ndarray
-    y: np.ndarray
-    y1: np.ndarray
-    y_error: np.ndarray
-    z: np.ndarray
-    p: np.ndarray
     scale: np.ndarray
-    slopes: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
     floors: np.ndarray
@@ -200,25 +194,17 @@ def leap(
 ) -> tuple[int, int, int]:
     """Go from event to event; returns why it ended and how many steps and segments were committed.
 
-    places: rates, then where in p the origin, the phases and the discrete states are, and how many of these there are.
+    places: rates, then where in p the origin and the phases are.
     control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
     the segment, moved on. state: x, x_error, z, p, sides, orders, floors at the start of the segment, moved on. room:
     scratch arrays. record: what the committed steps, segments and events are written to.
     """
-    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    rates, origin_at, phases_at = places
     rtol, atol, order, max_step, longest = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
     V, W, a, b, stack = room.V, room.W, room.a, room.b, room.stack
-    y, y1, y_error, u, q, scale, slopes = (
-        room.y,
-        room.y1,
-        room.y_error,
-        room.z,
-        room.p,
-        room.scale,
-        room.slopes,
-    )
+    y, y1, y_error, slopes, scale = work.y, work.x_after, work.y_error, work.slopes, room.scale
     side_now, order_now, floor_now = room.sides, room.orders, room.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
@@ -310,11 +296,7 @@ def leap(
             s_error = max(s_error, abs(value / slope))
         call(functions.flow, s, y, p, z, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
-        at = Before(s, s_error, y, y_error, p, z)
-        if not settle_and_move_on(
-            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), at, fired, clock, state, work,
-            (y1, slopes, u, q),
-        ):  # fmt: skip
+        if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments
         put(y1, jumps[n_segments, 1])
         n_segments += 1

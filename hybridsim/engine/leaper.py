@@ -13,13 +13,13 @@ import numpy as np
 
 from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
-from hybridsim.engine.ordinary_event import functions_of, work_space
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
-from hybridsim.engine.segment_end import State
+from hybridsim.engine.segment_end import State, reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Leaps, Tolerances
@@ -85,8 +85,6 @@ class Leaper(ABC):
             system.rates,
             layout.origin_at,
             layout.phases_at,
-            layout.discrete_at,
-            layout.discrete,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
         self.steps = min(max(_ROOM // (system.n * columns), _FEWEST), _STEPS)  # that there is room for
@@ -165,6 +163,7 @@ class Leaper(ABC):
             work, room = self.spare.pop()
         except IndexError:
             work, room = work_space(self.system), self._room()
+            reach_settling(self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, as_packed, work)
         instants = []
         while True:
             rows, began = packed(self._rows()), perf_counter()
@@ -248,7 +247,7 @@ class TaylorLeaper(Leaper):
 
     def _room(self) -> Any:
         system, order, n = self.system, self.order, self.system.n
-        registers, count, guards = system.registers.count, len(system.automata), system.guard_count
+        registers, guards = system.registers.count, system.guard_count
         room: Room = packed(
             Room(
                 V=np.zeros((registers, order + 1)),
@@ -256,11 +255,9 @@ class TaylorLeaper(Leaper):
                 a=np.empty(order + 1),
                 b=np.empty(order + 1),
                 stack=np.empty((64, order + 3)),
-                z=np.empty(count, dtype=np.int64),
-                p=np.empty(system.layout.size),
                 floors=np.empty(guards),
                 pace=np.empty(3),
-                **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes")},
+                scale=np.empty(n),
                 **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "watched")},
             )
         )

@@ -11,12 +11,13 @@ import math
 from typing import Any
 
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
+from hybridsim.engine.event_verdicts import guard_series
+from hybridsim.engine.event_work import Before, find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
-from hybridsim.engine.ordinary_event import Before, find_modes, guard_series, put
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
 from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
 from hybridsim.engine.taylor import advance, expand
@@ -131,14 +132,15 @@ def land(
     z: Any,
     is_holding: bool,
     room: Any,
+    work: Any,
 ) -> tuple[int, float]:
     """Repeat the step of length h up to where a function (a register of the tape) is zero, at d by the dense output.
 
-    The step starts from room.y; its end is in room.y1, the series there in room.right, of all registers in room.W.
+    The step starts from work.y; its end is in work.x_after, the series there in room.right, of all registers in room.W.
     Newton's method corrects the time until it is good to rounding; a correction within reach of the series at the end
     needs no new step.
     """
-    W, right, y, y1, last = room.W, room.right, room.y, room.y1, room.right.shape[1] - 1
+    W, right, y, y1, last = room.W, room.right, work.y, work.x_after, room.right.shape[1] - 1
     rows, time, states = (
         tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]],
         inputs.time[0],
@@ -154,8 +156,8 @@ def land(
         if not error <= 1.0:
             return REJECTED, d
         if is_holding:
-            call(functions.project, s + d, y1, p, z, room.slopes)
-            put(room.slopes, y1)
+            call(functions.project, s + d, y1, p, z, work.slopes)
+            put(work.slopes, y1)
         if not series_of(rows, guard_rows, time, states, derivatives, s + d, y1, W, right):
             return LOST, d
         value, slope = W[register, 0], W[register, 1]
@@ -201,12 +203,12 @@ def is_zero(
 ) -> bool:
     """Whether a guard is zero within twice the rounding of the state and that of the instant."""
     s_error = 8.0 * 2.0**-52 * s
-    call(functions.flow, s, y, p, z, room.slopes)
-    state_errors(automata, s_error, y, room.scale, x_error, z, room.slopes, room.y_error)
+    call(functions.flow, s, y, p, z, work.slopes)
+    state_errors(automata, s_error, y, room.scale, x_error, z, work.slopes, work.y_error)
     for i in range(y.shape[0]):
-        room.y_error[i] *= 2.0
-    event = Before(s, s_error, y, room.y_error, p, z)
-    guard_series(tapes, inputs, lin, k, event, y, room.y_error, work)
+        work.y_error[i] *= 2.0
+    event = Before(s, s_error, y, work.y_error, p, z)
+    guard_series(tapes, inputs, lin, k, event, y, work.y_error, work)
     return abs(work.values[fired, 0]) <= work.bounds[fired, 0]
 
 
@@ -234,13 +236,13 @@ def rk_leap(
     polynomial. control: rtol, atol, order of the guards' series, max_step, longest segment, and in an array the length
     of the first step of all (0: to be found), which is used up. The others are as for `leap`.
     """
-    rates, origin_at, phases_at, discrete_at, n_discrete = places
+    rates, origin_at, phases_at = places
     tableau, leading, error_order, hermite = method
     rtol, atol, order, max_step, longest, first = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    W, left, right, y, y1 = room.W, room.left, room.right, room.y, room.y1
-    scale, slopes = room.scale, room.slopes
+    W, left, right = room.W, room.left, room.right
+    scale, slopes, y, y1 = room.scale, work.slopes, work.y, work.x_after
     side_now, order_now, floor_now = room.sides, room.orders, room.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
@@ -325,7 +327,7 @@ def rk_leap(
             if outcome == FOUND:
                 code, at = land(
                     functions, tableau, tolerances, tapes, k, guard_rows, inputs, tapes.guards[k, g], s, at, d, p, z,
-                    is_holding, room,
+                    is_holding, room, work,
                 )  # fmt: skip
                 if code == LOST:
                     return STOPPED, first_step, n_segments
@@ -375,12 +377,8 @@ def rk_leap(
         if slope != 0.0 and abs(value / slope) < math.inf:
             s_error = max(s_error, abs(value / slope))
         call(functions.flow, s, y, p, z, slopes)
-        state_errors(automata, s_error, y, scale, x_error, z, slopes, room.y_error)
-        event = Before(s, s_error, y, room.y_error, p, z)
-        if not settle_and_move_on(
-            functions, automata, tapes, inputs, lin, (n_discrete, discrete_at), event, fired, clock, state, work,
-            (y1, slopes, room.z_after, room.p_after),
-        ):  # fmt: skip
+        state_errors(automata, s_error, y, scale, x_error, z, slopes, work.y_error)
+        if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments
         put(y1, jumps[n_segments, 1])
         n_segments += 1

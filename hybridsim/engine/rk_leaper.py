@@ -40,14 +40,8 @@ class Room(NamedTuple):
     guards_left: np.ndarray
     guards_right: np.ndarray
     lack: np.ndarray
-    y: np.ndarray
-    y1: np.ndarray
-    y_error: np.ndarray
     scale: np.ndarray
-    slopes: np.ndarray
     dx: np.ndarray
-    z_after: np.ndarray
-    p_after: np.ndarray
     watched: np.ndarray
     numbers: np.ndarray
     sides: np.ndarray
@@ -101,9 +95,7 @@ class RungeKuttaLeaper(Leaper):
                 guards_left=np.empty((guards, TERMS)),
                 guards_right=np.empty((guards, TERMS)),
                 lack=np.empty(TERMS),
-                **{name: np.empty(n) for name in ("y", "y1", "y_error", "scale", "slopes", "dx")},
-                z_after=np.empty(len(system.automata), dtype=np.int64),
-                p_after=np.empty(system.layout.size),
+                **{name: np.empty(n) for name in ("scale", "dx")},
                 **{
                     name: np.empty(guards, dtype=np.int64)
                     for name in ("watched", "numbers", "sides", "orders")

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import inlined, kernel
-from hybridsim.engine.ordinary_event import SETTLED, put, settle_ordinary
+from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
+from hybridsim.engine.ordinary_event import settle_event
 from hybridsim.engine.timepair import two_sum
 
 _SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
@@ -61,39 +62,31 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
     return two_sum(high, rest + low)
 
 
-@kernel
+def reach_settling(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
+    """Compile the kernel that settles events, if need be, and put its address where loops find it."""
+    work.reached[0] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
+
+
+@inlined
 def settle_and_move_on(
-    functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    discrete: Any,
-    at: Any,
+    s: float,
+    s_error: float,
     fired: int,
     clock: Any,
     state: Any,
     work: Any,
-    room: Any,
 ) -> bool:
     """Settle an ordinary event and make what follows it the start of the next segment; False leaves all as it was.
 
-    lin: tables of linear modes, empty for others. discrete: how many discrete states there are and where in p. at:
-    `Before`. state: `State`, moved on with the clock. room: (n,), (n,), like z, like p.
+    y, y_error of the work space are the state at the event. lin: tables of linear modes, empty for others. state:
+    `State`, moved on with the clock.
     """
-    x_after, x_error_after, z_after, p_after = room
-    outcome, _ = settle_ordinary(
-        functions, automata, tapes, inputs, lin, at, fired, discrete, x_after, x_error_after, z_after, p_after, work
-    )  # fmt: skip
-    if outcome != SETTLED:
+    work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
+    if call_kernel(work.reached[0], (automata, tapes, inputs, lin, state, work)) == 0:
         return False
-    put(x_after, state.x)
-    put(x_error_after, state.x_error)
-    put(z_after, state.z)
-    if automata.hold[automata.owner[fired]] < 0:
-        put(p_after, state.p)
-    put(work.sides, state.sides)
-    put(work.orders, state.orders)
-    put(work.floors, state.floors)
-    clock[0], clock[1] = moved_on(clock[0], clock[1], at.s)
+    clock[0], clock[1] = moved_on(clock[0], clock[1], s)
     return True

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from hybridsim.engine.event_work import put
 from hybridsim.engine.jit import call, kernel
-from hybridsim.engine.ordinary_event import put
 
 UNILATERAL = 7  # column of the table that says whether a surface is a gap
 UP, DOWN, MOST, LEAST = range(

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.event_work import put
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.engine.ordinary_event import put
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rosenbrock_step import factor, solve
 from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, NOT_FINITE, RESTITUTION, passed

@@ -33,7 +33,7 @@ def decided(plant: Any, laws: Any, state: Any, room: Any, j: int, tau: float, fi
     The node's series are replaced by its positions and velocities at tau, velocities exact.
     """
     state.whole[NODE], state.whole[FIRED], state.real[AT] = j, fired, tau
-    return call_kernel(state.kernels[DECIDE], plant, laws, state, room)
+    return call_kernel(state.kernels[DECIDE], (plant, laws, state, room))
 
 
 def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:

@@ -297,4 +297,4 @@ def expanded(
     """Expand the patch of so many nodes, coordinates and contacts about tau, to order `top` of its positions."""
     state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER] = count, nd, nc, top
     state.real[AT] = tau
-    call_kernel(state.kernels[EXPAND], plant, laws, state, room)
+    call_kernel(state.kernels[EXPAND], (plant, laws, state, room))

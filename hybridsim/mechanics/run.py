@@ -156,18 +156,12 @@ class MechanicalRun:
 @kernel
 def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any) -> int:
     """Call a kernel of packs."""
-    return call_kernel(address, plant, laws, state, room)
-
-
-_addresses: dict[tuple[Any, ...], tuple[int, ...]] = {}  # by the forms of the packs
+    return call_kernel(address, (plant, laws, state, room))
 
 
 def reach_kernels(arrays: State, *packs: Any) -> None:
     """Compile the large kernels if need be, and put their addresses where the others find them."""
-    forms = tuple(getattr(pack, "numba_type", None) for pack in packs)
-    if forms not in _addresses:
-        _addresses[forms] = tuple(kernel_address(function, *packs) for function in (expand, stretch, decide))
-    arrays.kernels[:] = _addresses[forms]
+    arrays.kernels[:] = [kernel_address(function, *packs) for function in (expand, stretch, decide)]
 
 
 def new_state(built: Built, order: int) -> State:

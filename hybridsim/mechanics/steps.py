@@ -208,5 +208,5 @@ def stretched(plant: Any, laws: Any, state: Any, room: Any, longest: float, rtol
     NaN where there are none.
     """
     state.real[LONGEST], state.real[RTOL] = longest, rtol
-    call_kernel(state.kernels[STRETCH], plant, laws, state, room)
+    call_kernel(state.kernels[STRETCH], (plant, laws, state, room))
     return state.real[LENGTH]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
+from hybridsim.engine import modules
 from hybridsim.engine.guard_parts import GuardParts
 from hybridsim.engine.mode_tables import TapeShelf
 from hybridsim.engine.system import System
@@ -28,24 +29,21 @@ def interrupted_once(function: Callable[..., Any], by: Callable[[], Any]) -> Cal
 
 
 def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    code = System(hs.load("dfcs")).code
-    code._kept.pop("flow", None)
+    code = modules.Compiled(System(hs.load("dfcs")).code.module, 0.0)
     overtaking: list[int] = []
     compile_function = interrupted_once(
         lambda module, name: (object(), name), lambda: overtaking.append(code.address("flow"))
     )
     monkeypatch.setattr("hybridsim.engine.jit.compile_model_function", compile_function)
     late = code.address("flow")
-    kept = code._kept.pop("flow")
-    assert overtaking == [late] == [kept[0]]
+    assert overtaking == [late] == [code._kept["flow"][0]]
 
 
 def test_what_is_shared_is_the_same_for_all() -> None:
-    code = System(hs.load("dfcs")).code
+    code = modules.Compiled(System(hs.load("dfcs")).code.module, 0.0)
     overtaking: list[Any] = []
     make = interrupted_once(object, lambda: overtaking.append(code.shared("a thing", make)))
     assert code.shared("a thing", make) is overtaking[0]
-    del code._shared["a thing"]
 
 
 def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:
