@@ -251,7 +251,7 @@ def announce_compilation() -> None:
     if ENABLED and not announced.exists():
         announced.parent.mkdir(parents=True, exist_ok=True)
         announced.touch()
-        _tell("hybridsim: compiling the engine, once (some 20 s) ...")
+        _tell("hybridsim: compiling the engine, once (half a minute) ...")
 
 
 _told: set[str] = set()  # in this process: one line is enough

@@ -111,7 +111,7 @@ def room_for(
             sizes=np.array(sizes, dtype=float), monitors=np.zeros(max(monitors, 1)),
             monitors_after=np.zeros(max(monitors, 1)), S=np.zeros((none, n)), loads=np.zeros((4, none, none)),
             rows=np.zeros(none * (1 + 2 * n + 4 * none)), active=np.zeros(none, dtype=np.int64),
-            approach=np.zeros(n + none), evaluated=np.array(evaluated, dtype=np.int64).reshape(-1, n),
+            approach=np.zeros(n + none), evaluated=np.array(evaluated, dtype=np.int64).reshape(len(evaluated), n),
         )
     )  # fmt: skip
 
