@@ -28,10 +28,12 @@ from hybridsim.errors import SimulationError as SimulationError
 from hybridsim.errors import UsageError as UsageError
 from hybridsim.integrators import list_integrators as list_integrators
 from hybridsim.ivp import to_ivp as to_ivp
+from hybridsim.mechanics.impact import MechanicalImpact as MechanicalImpact
 from hybridsim.mechanics.scenes import chain_on_belt as chain_on_belt
 from hybridsim.mechanics.scenes import three_coupled_blocks as three_coupled_blocks
 from hybridsim.mechanics.scenes import two_blocks_on_belt as two_blocks_on_belt
 from hybridsim.mechanics.solution import MechanicalSolution as MechanicalSolution
+from hybridsim.mechanics.stepped_solution import SteppedSolution as SteppedSolution
 from hybridsim.mechanics.system import Harmonic as Harmonic
 from hybridsim.mechanics.system import MechanicalContact as MechanicalContact
 from hybridsim.mechanics.system import MechanicalSystem as MechanicalSystem

@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.integrators.base import Integrator
     from hybridsim.mechanics.solution import MechanicalSolution
+    from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.solution import Solution
 
 
 @overload
 def simulate(
     model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any
-) -> MechanicalSolution: ...
+) -> MechanicalSolution | SteppedSolution: ...
 @overload
 def simulate(
     model: Model | str | PathLike[str],
@@ -63,13 +64,13 @@ def simulate(
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
-) -> Solution | MechanicalSolution:
+) -> Solution | MechanicalSolution | SteppedSolution:
     """Run a model from t0 to t1 and return its trajectory, its events and its cost.
 
     Parameters
     ----------
     model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which
-        runs by Taylor series of its own.
+        runs by Taylor series of its own, or by ``moreau``.
     t_span : (t0, t1); t1 < t0 runs backward in time.
     params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.

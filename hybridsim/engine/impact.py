@@ -38,8 +38,25 @@ def strike(settling: Settling, open_: set[int]) -> Failure | None:
             has_collided = has_collided or struck
     if has_collided:
         settling.jumped = True
+        open_ -= _set_off(settling)
         open_ |= settling.take_sides()
     return None
+
+
+def _set_off(settling: Settling) -> set[int]:
+    """Friction contacts that have a velocity: an impact on their body may have given it to them."""
+    system, (values, bounds) = settling.system, _surfaces(settling)
+    moving = np.abs(values[:, 0]) > bounds[:, 0]
+    return {c for k, c in enumerate(system.surface_of) if moving[k] and not system.automata[c].is_unilateral}
+
+
+def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of the surfaces with bounds, the states as they are and not as a mode would hold them."""
+    at, system = settling.at, settling.system
+    free = at.p.copy()
+    free[system.layout.pin_at] = 0.0
+    series: Any = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
+    return series.surfaces, series.surface_bounds
 
 
 class _Collision:
@@ -93,12 +110,7 @@ class _Collision:
 
     @cached_property
     def _surfaces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coefficients of the surfaces with bounds, the states as they are and not as a mode would hold them."""
-        at = self.at
-        free = at.p.copy()
-        free[self.system.layout.pin_at] = 0.0
-        series: Any = self.system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
-        return series.surfaces, series.surface_bounds
+        return _surfaces(self.settling)
 
     def _join(self) -> None:
         """Friction without a velocity is decided together with the force that may load it from now on."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.expr import parse
 from hybridsim.mechanics.system import Harmonic
-from hybridsim.model import Contact, Model, Parameter, State
+from hybridsim.model import Contact, Impact, Model, Parameter, State
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.system import MechanicalSystem
@@ -21,8 +21,9 @@ def as_model(system: MechanicalSystem) -> Model:
 
     n, inverse = system.n, np.linalg.inv(system.M.toarray())
     K, C = inverse @ system.K.toarray(), inverse @ system.C.toarray()
-    B = np.array(
-        [[sum(inverse[i, j] * w for j, w in c.direction) for c in system.contacts] for i in range(n)]
+    B, D = (
+        np.array([[sum(inverse[i, j] * w for j, w in c.direction) for c in of] for i in range(n)])
+        for of in (system.contacts, system.impacts)
     )
     rates = sorted(
         {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
@@ -36,6 +37,7 @@ def as_model(system: MechanicalSystem) -> Model:
         terms += [_term(-K[i, j], system.names[j]) for j in range(n)]
         terms += [_term(-C[i, j], system.velocities[j]) for j in range(n)]
         terms += [_term(-B[i, c], contact.name) for c, contact in enumerate(system.contacts)]
+        terms += [_term(D[i, c], impact.name) for c, impact in enumerate(system.impacts)]
         start, speed = parse(float(system.q0[i])), parse(float(system.v0[i]))
         states += [State(x, start, parse(v)), State(v, speed, parse("".join(terms) or 0))]
     contacts = [
@@ -49,6 +51,14 @@ def as_model(system: MechanicalSystem) -> Model:
         states=tuple(states),
         parameters=tuple(Parameter(name, parse(rate)) for rate, name in omega.items()),
         contacts=tuple(contacts),
+        impacts=tuple(
+            Impact(
+                i.name,
+                parse(_combination(i.direction, system.names) + _term(i.gap, "1.0")),
+                parse(i.restitution),
+            )
+            for i in system.impacts
+        ),
     )
 
 
@@ -70,11 +80,14 @@ def _signal(terms: Any, omega: dict[float, str]) -> str:
 
 
 def _velocity(system: MechanicalSystem, contact: Any, omega: dict[float, str]) -> str:
-    weights = "".join(
-        f" + {system.velocities[i]}" if w == 1.0 else f" - {system.velocities[i]}" if w == -1.0
-        else _term(w, system.velocities[i])
-        for i, w in contact.direction
-    )  # fmt: skip
+    weights = _combination(contact.direction, system.velocities)
     if contact.base == 0.0:
         return weights
     return f"{weights} - ({_signal((contact.base,), omega)})"
+
+
+def _combination(direction: Any, names: tuple[str, ...]) -> str:
+    return "".join(
+        f" + {names[i]}" if w == 1.0 else f" - {names[i]}" if w == -1.0 else _term(w, names[i])
+        for i, w in direction
+    )

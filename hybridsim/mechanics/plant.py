@@ -128,21 +128,26 @@ def build(system: MechanicalSystem) -> Built:
     node_con = np.searchsorted(con_node, np.arange(count + 1))
     sizes = np.diff(node_con)
     blocks = [G[a:b, a:b].toarray().ravel() for a, b in pairwise(node_con)]
-    rates = sorted({t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
-                   | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})  # fmt: skip
-    still, harmonics = _forcing(system, inverse, dofs, rates)
+    rates = rates_of(system)
+    still, harmonics = forcing(system, inverse, dofs, rates)
     ordered = [system.contacts[i] for i in contacts]
-    laws, tape, par, is_linear = _laws(ordered)
-    base, base_rate = _bases(ordered, rates)
-    limits, smooth = _limits(ordered)
+    laws, tape, par, is_linear = law_tapes(ordered)
+    base, base_rate = bases(ordered, rates)
+    limits, smooth = stick_limits(ordered)
     plant = Plant(
-        _ints(node_dof), _ints(node_con), _ints(node_of), _ints(con_node),
-        *_parts(K), *_parts(C), *_parts(B), *_parts(W),
-        _ints(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
+        integers(node_dof), integers(node_con), integers(node_of), integers(con_node),
+        *parts(K), *parts(C), *parts(B), *parts(W),
+        integers(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
         *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates, dtype=float),
-        base, base_rate, limits, smooth, tape, par, _ints(np.diff(W.indptr) == 1),
+        base, base_rate, limits, smooth, tape, par, integers(np.diff(W.indptr) == 1),
     )  # fmt: skip
     return Built(plant, laws, dofs, contacts, is_linear)
+
+
+def rates_of(system: MechanicalSystem) -> list[float]:
+    """All angular frequencies, ascending."""
+    of_forces = {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
+    return sorted(of_forces | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})
 
 
 def _inverse(system: MechanicalSystem) -> Any:
@@ -179,15 +184,17 @@ def _require_positive(system: MechanicalSystem, is_positive: bool) -> None:
         )
 
 
-def _ints(values: Any) -> np.ndarray:
+def integers(values: Any) -> np.ndarray:
+    """Whole numbers for kernels."""
     return np.ascontiguousarray(values, dtype=np.int64)
 
 
-def _parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A sparse matrix by rows: (ptr, col, val)."""
     matrix = sparse.csr_array(matrix)
     matrix.eliminate_zeros()
     matrix.sort_indices()
-    return _ints(matrix.indptr), _ints(matrix.indices), np.ascontiguousarray(matrix.data, dtype=float)
+    return integers(matrix.indptr), integers(matrix.indices), np.ascontiguousarray(matrix.data, dtype=float)
 
 
 def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -199,13 +206,13 @@ def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndar
     graph = sparse.csr_array((np.ones(2 * apart.sum()), (np.r_[a[apart], b[apart]], np.r_[b[apart], a[apart]])),
                              shape=(count, count))  # fmt: skip
     graph.sum_duplicates()
-    return _ints(graph.indptr), _ints(graph.indices)
+    return integers(graph.indptr), integers(graph.indices)
 
 
-def _forcing(
+def forcing(
     system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]
 ) -> tuple[Any, tuple[Any, Any, Any]]:
-    """Constant acceleration (n,), and (ptr, rate, [sine, cosine]) of each coordinate."""
+    """Constant acceleration (n,), and (ptr, rate, [sine, cosine]) of each coordinate; forces if M is 1."""
     n, place = system.n, np.argsort(dofs)
     still = np.zeros(n)
     entries: dict[tuple[int, int], np.ndarray] = {}
@@ -227,10 +234,11 @@ def _forcing(
     used = (both[0] != 0) | (both[1] != 0)
     ptr = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
     val = np.stack([both[0][used], both[1][used]], axis=1)
-    return inverse @ still, (_ints(ptr), _ints(np.nonzero(used)[1]), np.ascontiguousarray(val))
+    return inverse @ still, (integers(ptr), integers(np.nonzero(used)[1]), np.ascontiguousarray(val))
 
 
-def _bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
+def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 3) constant, sine, cosine of the speed of each base, and the number of its rate, -1 where it is constant."""
     base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
     for i, contact in enumerate(contacts):
         if isinstance(contact.base, Harmonic):
@@ -240,13 +248,13 @@ def _bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.nd
     return base, rate
 
 
-def _limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
+def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
     """Most force in stick, forward and backward, and whether the force at the onset of slip is the same."""
     limits = np.zeros((len(contacts), 2))
     smooth = np.zeros((len(contacts), 2), dtype=np.int64)
     for i, contact in enumerate(contacts):
         law, given = contact.law, {"N": contact.normal, **contact.values()}
-        for side, (slip, stick) in enumerate(_sides(law)):
+        for side, (slip, stick) in enumerate(sides(law)):
             limits[i, side] = evaluate(stick, given)
             onset = evaluate(slip, {**given, "v": 0.0})
             smooth[i, side] = onset == limits[i, side] or is_same(slip, stick, "v")
@@ -258,12 +266,12 @@ def _limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
     return limits, smooth
 
 
-def _sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+def sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
     """(slip, stick), forward and backward."""
     return (law.slip, law.stick), (law.slip_backward or law.slip, law.stick_backward or law.stick)
 
 
-def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
+def law_tapes(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
     """Tapes, their number for each contact and side, and the constants of each contact."""
     tapes: list[ScalarTape] = []
     known: dict[tuple[str, str], int] = {}
@@ -274,7 +282,7 @@ def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarr
         names = tuple(contact.law.parameters)
         values = contact.values()
         par[i, : len(names) + 1] = [contact.normal, *(values[name] for name in names)]
-        for side, (slip, _) in enumerate(_sides(contact.law)):
+        for side, (slip, _) in enumerate(sides(contact.law)):
             key = (contact.law.name + "/".join(names), slip.text)
             if key not in known:
                 known[key] = len(tapes)
@@ -287,20 +295,20 @@ def _laws(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarr
             number[i, side] = known[key]
     laws = Laws(
         *_rows([t.rows for t in tapes]), *_rows([t.constant_rows for t in tapes]),
-        _ints([t.registers for t in tapes]), _ints([t.moving[0] for t in tapes]), _ints([t.out for t in tapes]),
-        *_flat([t.constants for t in tapes]),
-        _ints([r for t in tapes for r, _ in t.numbers]), np.array([x for t in tapes for _, x in t.numbers],
-        dtype=float), _ints(np.concatenate([[0], np.cumsum([len(t.numbers) for t in tapes])])),
+        integers([t.registers for t in tapes]), integers([t.moving[0] for t in tapes]),
+        integers([t.out for t in tapes]), *_flat([t.constants for t in tapes]),
+        integers([r for t in tapes for r, _ in t.numbers]), np.array([x for t in tapes for _, x in t.numbers],
+        dtype=float), integers(np.concatenate([[0], np.cumsum([len(t.numbers) for t in tapes])])),
     )  # fmt: skip
     return laws, number, par, not any(len(t.rows) for t in tapes)
 
 
 def _rows(parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     stacked = np.concatenate([np.zeros((0, 5), dtype=np.int64), *parts])
-    return _ints(stacked), _ints(np.concatenate([[0], np.cumsum([len(p) for p in parts])]))
+    return integers(stacked), integers(np.concatenate([[0], np.cumsum([len(p) for p in parts])]))
 
 
 def _flat(parts: list[tuple[int, ...]]) -> tuple[np.ndarray, np.ndarray]:
-    return _ints([r for p in parts for r in p]), _ints(
+    return integers([r for p in parts for r in p]), integers(
         np.concatenate([[0], np.cumsum([len(p) for p in parts])])
     )

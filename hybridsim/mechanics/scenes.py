@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.errors import UsageError
 from hybridsim.expr import parse
+from hybridsim.mechanics.impact import MechanicalImpact
 from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
 from hybridsim.model.library import load_law
 
@@ -20,6 +22,8 @@ def chain_on_belt(
     belt: float = 0.2,
     spread: float = 0.5,
     seed: int = 0,
+    gap: float | None = None,
+    restitution: float = 0.5,
 ) -> MechanicalSystem:
     """A chain of n blocks on a moving belt, each held by a leaf spring: the model of Burridge and Knopoff.
 
@@ -31,6 +35,11 @@ def chain_on_belt(
     coupling, leaf : stiffness between neighbours, and of each block to the frame.
     delta, belt : how fast friction falls with speed, and the belt's speed.
     spread, seed : the blocks start at rest, at random within +-spread.
+    gap, restitution : given, neighbours collide where they come closer by so much than they are with all springs slack.
+
+    Errors
+    ------
+    UsageError for a gap that the start may overlap: spread has to be below gap/2.
 
     Look at
     -------
@@ -51,12 +60,20 @@ def chain_on_belt(
     contacts = [
         MechanicalContact(f"f{i + 1}", {i: 1.0}, 1.0, load_law("hyperbolic"), law, belt) for i in range(n)
     ]
+    if gap is not None and not 2.0 * spread < gap:
+        raise UsageError(
+            f"gap is {gap!r}, and the blocks start within +-{spread!r}", remedy="give a spread below gap/2"
+        )
+    stops = range(n - 1) if gap is not None else ()
     return MechanicalSystem(
         np.ones(n),
         None,
         sparse.diags_array([diagonal, beside, beside], offsets=[0, 1, -1]),
         None,
         contacts,
+        impacts=[
+            MechanicalImpact(f"p{i + 1}", {i: -1.0, i + 1: 1.0}, gap or 0.0, restitution) for i in stops
+        ],
         q0=np.random.default_rng(seed).uniform(-spread, spread, n),
         name=f"chain-{n}",
         title="Chain of blocks on a belt",

@@ -14,6 +14,7 @@ from hybridsim.errors import UsageError, nearest
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.solution import MechanicalSolution
+    from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.mechanics.system import MechanicalSystem
 
 
@@ -30,7 +31,7 @@ def simulate_mechanical(
     save: str | float = "all",
     progress: Callable[[float], None] | None = None,
     **refused: Any,
-) -> MechanicalSolution:
+) -> MechanicalSolution | SteppedSolution:
     """Run a `MechanicalSystem`; see `hybridsim.simulate.simulate` for the arguments.
 
     Errors
@@ -39,15 +40,28 @@ def simulate_mechanical(
     """
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
+    from hybridsim.integrators.fixed_step_length import refuse_longer
     from hybridsim.mechanics.plant import build
     from hybridsim.mechanics.run import MechanicalRun
     from hybridsim.mechanics.solution import MechanicalSolution
 
     name = arguments.integrator_name(integrator)
-    if name not in ("auto", "taylor"):
+    if name not in ("auto", "taylor", "moreau"):
         raise UsageError(
             f"{name} does not run a MechanicalSystem", remedy=f"choose taylor, or run to_model() with {name}"
         )
+    if system.impacts and name != "moreau":
+        raise UsageError(
+            f"{name} does not run a MechanicalSystem with impacts",
+            remedy='choose integrator="moreau", step=..., or run to_model() of a small one',
+        )
+    method: Any = None
+    if name == "moreau":
+        from hybridsim.integrators.registry import make_integrator
+
+        known = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
+        method = make_integrator(name, {key: refused.pop(key) for key in known if key in refused})
+        arguments.refuse_unused(method, rtol=rtol, atol=atol)
     for argument, value in refused.items():
         if value:
             raise UsageError(
@@ -67,6 +81,16 @@ def simulate_mechanical(
     callback = arguments.callback(progress)
     announce_compilation()
     began = time.perf_counter()
+    if method is not None:
+        from hybridsim.mechanics.stepped_run import SteppedRun
+        from hybridsim.mechanics.stepped_solution import SteppedSolution
+
+        stepped = SteppedRun(system, method, span, start, save == "all")
+        refuse_longer(stepped.step, longest, name)
+        built_in = time.perf_counter() - began
+        stepped.go(callback)
+        built_in += stepped.compile_time
+        return SteppedSolution(stepped, grid, str(save), time.perf_counter() - began - built_in, built_in)
     run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all")
     built_in = time.perf_counter() - began
     run.go(callback)

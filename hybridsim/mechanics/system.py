@@ -11,6 +11,8 @@ import numpy as np
 from hybridsim.errors import UsageError
 from hybridsim.expr import Expression
 from hybridsim.expr.evaluate import resolve
+from hybridsim.mechanics.direction import finite, weights
+from hybridsim.mechanics.impact import MechanicalImpact
 from hybridsim.model.declared import Declared
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.law import FrictionLaw
@@ -78,27 +80,14 @@ class MechanicalContact(Declared):
                 f"the law '{self.law.name}' has {what}",
                 "a mechanical system takes laws of slip and stick; write others as hs.Contact of an hs.Model",
             )
-        object.__setattr__(self, "normal", self._number("normal", self.normal))
+        object.__setattr__(self, "normal", finite(self, "normal", self.normal))
         if not self.normal >= 0.0:
             raise self._fault(f"normal is {self.normal!r}", "give a load >= 0")
         if not isinstance(self.base, Harmonic):
-            object.__setattr__(self, "base", self._number("base", self.base))
-        count = 0 if isinstance(self.direction, Mapping) else len(self.direction)
+            object.__setattr__(self, "base", finite(self, "base", self.base))
+        pairs, count = weights(self, self.direction)
         object.__setattr__(self, "weights", count)
-        weights = self.direction.items() if isinstance(self.direction, Mapping) else enumerate(self.direction)
-        pairs = tuple((int(i), self._number("direction", w)) for i, w in weights if w != 0)
-        if not pairs:
-            raise self._fault("the direction is zero", "give at least one weight that is not zero")
         object.__setattr__(self, "direction", pairs)
-
-    def _number(self, what: str, value: Any) -> float:
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = np.nan
-        if not np.isfinite(number):
-            raise self._fault(f"{what} is {value!r}", "give finite numbers")
-        return number
 
     def values(self) -> dict[str, float]:
         """The law's parameters in numbers, defaults included.
@@ -117,7 +106,7 @@ class MechanicalContact(Declared):
 class MechanicalSystem:
     """A linear structure with dry contacts, as data for compiled kernels.
 
-        M q'' + C q' + K q = forcing(t) - sum_i w_i f_i,      f_i = law_i(w_i . q' - base_i)
+        M q'' + C q' + K q = forcing(t) - sum_i w_i f_i + sum_j d_j p_j,      f_i = law_i(w_i . q' - base_i)
 
     Which contacts stick after an event is decided for all contacts that act on each other at once, as one
     complementarity problem of their accelerations (of the derivatives after them, where these do not tell).
@@ -128,6 +117,7 @@ class MechanicalSystem:
     may be None.
     forcing : None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from coordinates.
     contacts : `MechanicalContact` objects.
+    impacts : `MechanicalImpact` objects, of directions d_j; with them a system is run by ``moreau``.
     q0, v0 : initial positions and velocities (n,), zero if not given.
     names : of the coordinates, q1, q2, ... if not given; their velocities are v1, v2, ... or ``v_`` and the name.
     name, title, source : as of a `Model`.
@@ -156,6 +146,7 @@ class MechanicalSystem:
         forcing: Any = None,
         contacts: Iterable[MechanicalContact] = (),
         *,
+        impacts: Iterable[MechanicalImpact] = (),
         q0: Any = None,
         v0: Any = None,
         names: Sequence[str] | None = None,
@@ -167,7 +158,7 @@ class MechanicalSystem:
         self.M = _matrix(M, "M", None)
         self.n = self.M.shape[0]
         self.C, self.K = _matrix(C, "C", self.n), _matrix(K, "K", self.n)
-        self.contacts = tuple(contacts)
+        self.contacts, self.impacts = tuple(contacts), tuple(impacts)
         self.forcing = self._forces(forcing)
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
         self.names = tuple(names) if names is not None else tuple(f"q{i + 1}" for i in range(self.n))
@@ -210,34 +201,54 @@ class MechanicalSystem:
     def _check(self) -> None:
         if len(self.names) != self.n:
             raise UsageError(f"{self.name}: {len(self.names)} names for {self.n} coordinates")
-        every = [*self.names, *self.velocities, *(c.name for c in self.contacts)]
+        every = [*self.names, *self.velocities, *(c.name for c in self.all_contacts)]
         twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
         if twice:
             raise UsageError(
                 f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own"
             )
-        for contact in self.contacts:
-            if not isinstance(contact, MechanicalContact):
-                raise UsageError(
-                    f"{self.name}: contacts hold {contact!r}", remedy="give hs.MechanicalContact(...) objects"
-                )
+        for part, kind in (("contacts", MechanicalContact), ("impacts", MechanicalImpact)):
+            for given in getattr(self, part):
+                if not isinstance(given, kind):
+                    raise UsageError(
+                        f"{self.name}: {part} hold {given!r}", remedy=f"give hs.{kind.__name__}(...) objects"
+                    )
+        for contact in self.all_contacts:
+            what = "contact" if isinstance(contact, MechanicalContact) else "impact"
             if contact.weights not in (0, self.n):
                 raise UsageError(
-                    f"contact {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
+                    f"{what} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
                     remedy="give one for each, or a mapping from coordinates",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
-                        f"contact {contact.name}: its direction names the coordinate {i} of {self.n}",
+                        f"{what} {contact.name}: its direction names the coordinate {i} of {self.n}",
                         remedy="count from 0",
                     )
+
+    @property
+    def all_contacts(self) -> tuple[MechanicalContact | MechanicalImpact, ...]:
+        """The contacts, then the impacts."""
+        return (*self.contacts, *self.impacts)
 
     def with_(self, **changes: Any) -> MechanicalSystem:
         """A copy with some arguments of the constructor changed."""
         own: dict[str, Any] = {
             key: getattr(self, key)
-            for key in ("M", "C", "K", "forcing", "contacts", "q0", "v0", "name", "title", "source")
+            for key in (
+                "M",
+                "C",
+                "K",
+                "forcing",
+                "contacts",
+                "impacts",
+                "q0",
+                "v0",
+                "name",
+                "title",
+                "source",
+            )
         }
         own["names"] = None if self.velocities[0] == "v1" else self.names
         return MechanicalSystem(**{**own, **changes})
@@ -249,7 +260,9 @@ class MechanicalSystem:
         return as_model(self)
 
     def __repr__(self) -> str:
-        return f"<MechanicalSystem {self.name}: {self.n} coordinates, {len(self.contacts)} contacts>"
+        return f"<MechanicalSystem {self.name}: {self.n} coordinates, {len(self.contacts)} contacts" + (
+            f", {len(self.impacts)} impacts>" if self.impacts else ">"
+        )
 
 
 def _matrix(given: Any, what: str, n: int | None) -> Any:

@@ -188,6 +188,26 @@ def test_what_still_slides_after_the_landing_is_slowed_by_its_weight():
     assert stop.t == pytest.approx(landed + slow / (0.3 * G), rel=1e-9)
 
 
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "exact"])
+def test_a_body_that_sticks_by_its_own_weight_is_set_off_by_a_blow(integrator):
+    model = hs.Model(
+        "shove",
+        states=[
+            hs.State("x", -1, der="v", nominal=1), hs.State("v", 1, der="-p", nominal=1),
+            hs.State("y", 0, der="w", nominal=1), hs.State("w", 0, der="p - f", nominal=1),
+        ],
+        impacts=[hs.Impact("p", gap="y - x", restitution=0.6)],
+        contacts=[hs.Contact("f", "w", 1, "coulomb", {"mu": 0.3})],
+    )  # fmt: skip
+    solution = hs.simulate(model, (0, 2), integrator=integrator, rtol=1e-11)
+    assert solution.success
+    # equal masses: (1 + e)/2 for the one that was at rest, (1 - e)/2 for the other; friction has no impulse of its own
+    blow = solution.events[0]
+    assert blow.t == pytest.approx(1, rel=1e-12)
+    assert blow.x_plus == pytest.approx([0, 0.2, 0, 0.8], abs=1e-12)
+    assert solution(2.0)[[2, 3]] == pytest.approx([0.8 - 0.15, 0.8 - 0.3], rel=1e-11)
+
+
 def rattle():
     return hs.Model(
         "rattle",

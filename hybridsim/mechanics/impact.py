@@ -1,0 +1,57 @@
+"""A unilateral contact of a mechanical system: a gap that is linear in the coordinates, with restitution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from hybridsim.mechanics.direction import finite, weights
+from hybridsim.model.declared import Declared
+
+
+@dataclass(frozen=True)
+class MechanicalImpact(Declared):
+    """A unilateral contact of a `MechanicalSystem`: a stop, a clearance, two neighbours that collide.
+
+        g = gap + direction . q >= 0,   its force p >= 0 acts as + direction p,
+        0 <= P,   u+ >= e max(-u-, 0),  one of the two with equality, u = direction . q'  (`hybridsim.Impact`)
+
+    Parameters
+    ----------
+    name : of the normal force.
+    direction : the weights (n,), or a mapping from numbers of coordinates to weights: +1 for the body that the force
+        pushes along its coordinate, -1 for the one behind it.
+    gap : how wide it is at q = 0.
+    restitution : e, from 0 (no rebound) to 1 (no loss).
+
+    Errors
+    ------
+    UsageError for what is no finite number, a direction of zeros, a restitution outside of [0, 1].
+
+    When to use
+    -----------
+    Many contacts that close, by time stepping: ``hs.simulate(system, t_span, integrator="moreau", step=...)``.
+
+    Examples
+    --------
+    >>> MechanicalImpact("p", {0: 1.0, 1: -1.0}, gap=0.1, restitution=0.5).direction
+    ((0, 1.0), (1, -1.0))
+    """
+
+    name: str
+    direction: Any
+    gap: float
+    restitution: float
+    weights: int = field(init=False, default=0, repr=False, compare=False)  # as many as were given in a row
+
+    def __post_init__(self) -> None:
+        self._texts("name")
+        for what in ("gap", "restitution"):
+            object.__setattr__(self, what, finite(self, what, getattr(self, what)))
+        if not 0.0 <= self.restitution <= 1.0:
+            raise self._fault(
+                f"restitution is {self.restitution!r}", "give a number from 0 (no rebound) to 1 (no loss)"
+            )
+        pairs, count = weights(self, self.direction)
+        object.__setattr__(self, "direction", pairs)
+        object.__setattr__(self, "weights", count)

@@ -1,0 +1,145 @@
+"""A mechanical system as arrays for time stepping: the matrix of a step, factored once, and what impulses do in it.
+
+For a step h of the theta scheme A = M + h theta C + h^2 theta^2 K takes forces to changes of the velocities. A is close
+to M, so that the entries of W A^-1 W^T fall by some (h omega)^2 from neighbour to neighbour: those below rounding of
+rounding are dropped, and a sweep over all contacts costs a few products each.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from hybridsim.errors import UsageError
+from hybridsim.expr.evaluate import evaluate
+from hybridsim.mechanics.plant import (
+    Laws,
+    bases,
+    forcing,
+    integers,
+    law_tapes,
+    parts,
+    rates_of,
+    sides,
+    stick_limits,
+)
+from hybridsim.mechanics.system import MechanicalSystem
+
+_DROPPED = 1e-18  # relative to what the impulses do to their own contacts
+_CHUNK = 256  # right sides that are solved for at a time
+
+
+class Stepped(NamedTuple):
+    """What does not change in a run; sparse matrices are (ptr, col, val) by rows, in the order of declaration.
+
+    k, c: K and C. w: directions of the contacts, then of the impacts. g: W A^-1 W^T. l, u: factors of A by columns,
+    rows of u up to its diagonal, which comes last; l without its diagonal of ones. row, column: where the permutations
+    of the factors take each coordinate. still, h, rates, base, base_rate: as of `Plant`, but forces. limits, onset
+    (m, 2): most force in stick, and of slip at v = 0, forward and backward. tape (m, 2), par: as of `Plant`. gap,
+    restitution: of the impacts.
+    """
+
+    k_ptr: np.ndarray
+    k_col: np.ndarray
+    k_val: np.ndarray
+    c_ptr: np.ndarray
+    c_col: np.ndarray
+    c_val: np.ndarray
+    w_ptr: np.ndarray
+    w_col: np.ndarray
+    w_val: np.ndarray
+    g_ptr: np.ndarray
+    g_col: np.ndarray
+    g_val: np.ndarray
+    l_ptr: np.ndarray
+    l_row: np.ndarray
+    l_val: np.ndarray
+    u_ptr: np.ndarray
+    u_row: np.ndarray
+    u_val: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    still: np.ndarray
+    h_ptr: np.ndarray
+    h_rate: np.ndarray
+    h_val: np.ndarray
+    rates: np.ndarray
+    base: np.ndarray
+    base_rate: np.ndarray
+    limits: np.ndarray
+    onset: np.ndarray
+    tape: np.ndarray
+    par: np.ndarray
+    gap: np.ndarray
+    restitution: np.ndarray
+
+
+def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[Stepped, Laws]:
+    """Arrange a system for steps of one length.
+
+    Errors
+    ------
+    UsageError where the matrix of the step is not regular.
+    """
+    n, contacts = system.n, list(system.contacts)
+    A = sparse.csc_array(system.M + step * theta * system.C + (step * theta) ** 2 * system.K)
+    try:
+        factors = splu(A)
+    except RuntimeError:
+        raise UsageError(
+            f"{system.name}: M + h theta C + (h theta)^2 K is singular", remedy="give every coordinate a mass"
+        ) from None
+    W = directions(system)
+    lower = sparse.csc_array(sparse.tril(factors.L, -1))
+    upper = sparse.csc_array(factors.U)
+    upper.sort_indices()
+    rates = rates_of(system)
+    still, harmonics = forcing(system, sparse.eye_array(n, format="csr"), np.arange(n), rates)
+    laws, tape, par, _ = law_tapes(contacts)
+    plant = Stepped(
+        *parts(system.K), *parts(system.C), *parts(W), *parts(_delassus(W, factors)), *parts(lower.T), *parts(upper.T),
+        integers(factors.perm_r), integers(factors.perm_c), still, *harmonics, np.array(rates, dtype=float),
+        *bases(contacts, rates), stick_limits(contacts)[0], _onsets(contacts), tape, par,
+        np.array([i.gap for i in system.impacts], dtype=float),
+        np.array([i.restitution for i in system.impacts], dtype=float),
+    )  # fmt: skip
+    return plant, laws
+
+
+def directions(system: MechanicalSystem) -> Any:
+    """Weights of the contacts, then of the impacts (m, n), sparse."""
+    every = [c.direction for c in system.all_contacts]
+    rows = np.repeat(np.arange(len(every)), [len(d) for d in every]).astype(np.int64)
+    cols = np.array([i for d in every for i, _ in d], dtype=np.int64)
+    return sparse.csr_array(
+        (np.array([w for d in every for _, w in d]), (rows, cols)), shape=(len(every), system.n)
+    )
+
+
+def _delassus(W: Any, factors: Any) -> Any:
+    """W A^-1 W^T without what is nothing beside the diagonal."""
+    m = W.shape[0]
+    columns, diagonal = [], np.zeros(m)
+    for first in range(0, m, _CHUNK):
+        last = min(first + _CHUNK, m)
+        block = W @ factors.solve(W[first:last].toarray().T)
+        diagonal[first:last] = block[np.arange(first, last), np.arange(last - first)]
+        block[np.abs(block) < _DROPPED * np.abs(diagonal[first:last])] = 0.0
+        columns.append(sparse.csc_array(block))
+    if not columns:
+        return sparse.csr_array((0, 0))
+    G = sparse.coo_array(sparse.hstack(columns))
+    size = np.sqrt(np.abs(diagonal))
+    kept = np.abs(G.data) >= _DROPPED * size[G.row] * size[G.col]
+    return sparse.csr_array((G.data[kept], (G.row[kept], G.col[kept])), shape=(m, m))
+
+
+def _onsets(contacts: list[Any]) -> np.ndarray:
+    found = np.zeros((len(contacts), 2))
+    for i, contact in enumerate(contacts):
+        given = {"N": contact.normal, **contact.values(), "v": 0.0}
+        found[i] = [evaluate(slip, given) for slip, _ in sides(contact.law)]
+    return found

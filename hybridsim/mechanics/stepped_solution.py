@@ -1,0 +1,268 @@
+"""What a run of a mechanical system by time stepping gives back."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.stepped_kernels import BOUNCES, STEPS, SWEEPS, UNSETTLED
+from hybridsim.mechanics.stepped_plant import directions
+from hybridsim.solution import Event, ModeInterval
+
+if TYPE_CHECKING:
+    from hybridsim.mechanics.stepped_run import SteppedRun
+
+_CONTACT, _IMPACT = {0: "stick", 1: "slip+", -1: "slip-"}, {0: "closed", 1: "open"}
+_WORKS = ("forcing", "damping", "friction", "bases", "impacts")
+
+
+class SteppedSolution:
+    """The result of simulating a `MechanicalSystem` by ``moreau``; ``sol(t)`` is linear in the velocities of a step.
+
+    Attributes
+    ----------
+    t, y : times (k,) and states (2n, k): the positions in the order of declaration, then the velocities.
+    events, modes : changes of mode, at the beginning of the step that has the new one; bounces are none.
+    work : energy that the system gets from ``forcing``, from ``damping``, ``friction`` and ``impacts`` (not positive,
+        but for what a step rounds), and from the moving ``bases`` of its contacts, over the run. With theta = 1/2 they
+        add up to what kinetic and elastic energy gain.
+    stats, status, success, message, warnings : as of a `Solution`.
+    """
+
+    integrator = "moreau"
+
+    def __init__(
+        self, run: SteppedRun, grid: np.ndarray | None, save: str, wall_time: float, compile_time: float
+    ) -> None:
+        self.model, self._run, self._grid, self._save = run.system, run, grid, save
+        self._cost = (wall_time, compile_time)
+        self._event = np.concatenate([*run.events, np.zeros((0, 4), dtype=np.int64)])
+        self._parts = run.system.all_contacts
+
+    # -- trajectory -----------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, in the order of the rows of y."""
+        return (*self.model.names, *self.model.velocities)
+
+    @property
+    def t_start(self) -> float:
+        """First time of the run."""
+        return self._run.span[0]
+
+    @property
+    def t_end(self) -> float:
+        """Last time that the run reached."""
+        return self._run.time
+
+    @cached_property
+    def _steps(self) -> np.ndarray:
+        return self._instants(np.arange(self._run.done + 1))
+
+    def _instants(self, steps: np.ndarray) -> np.ndarray:
+        return np.minimum(self._run.span[0] + steps * self._run.step, self.t_end)
+
+    @cached_property
+    def _states(self) -> np.ndarray:
+        if self._save != "all":
+            raise UsageError(
+                f"the run was made with save={self._save!r}, which keeps no states between the ends",
+                remedy="run it with save='all'",
+            )
+        return np.concatenate(self._run.states)
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times (k,): the requested grid as far as the run went, else where steps begin and end."""
+        if self._grid is not None:
+            return self._grid[(self._grid >= self.t_start) & (self._grid <= self.t_end)]
+        return self._steps
+
+    @cached_property
+    def y(self) -> np.ndarray:
+        """States (2n, k) at the times t."""
+        return self._states.T if self._grid is None else self(self.t)
+
+    def __call__(self, t: Any) -> np.ndarray:
+        """States at time t: (2n,) for a number, (2n, k) for k times."""
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        inside = (times >= self.t_start) & (times <= self.t_end)
+        if not inside.all():
+            raise UsageError(
+                f"t = {times[~inside][0]!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
+            )
+        n, first = self.model.n, self._step_of(times)
+        after = np.minimum(first + 1, self._run.done)
+        d = (times - self._steps[first])[:, None]
+        x, x_after = self._states[first], self._states[after]
+        change = (x_after[:, n:] - x[:, n:]) / self._run.step
+        out = np.concatenate(
+            [x[:, :n] + d * (x[:, n:] + self._run.theta * d * change), x[:, n:] + d * change], axis=1
+        )
+        return out[0] if np.ndim(t) == 0 else out.T
+
+    def _step_of(self, times: np.ndarray) -> np.ndarray:
+        found = np.searchsorted(self._steps, times, side="right") - 1
+        return np.clip(found, 0, max(self._run.done - 1, 0))
+
+    def output(self, name: str, t: Any = None) -> np.ndarray:
+        """A quantity over time, by name.
+
+        A state; the force of a contact or an impact, in the mean of its step; ``v_rel(f)`` of a contact; ``gap(p)`` of
+        an impact.
+
+        Parameters
+        ----------
+        t : a number or an array of times; without it ``sol.t``.
+        """
+        given = self.t if t is None else t
+        times = np.atleast_1d(np.asarray(given, dtype=float))
+        nc, names = len(self.model.contacts), [part.name for part in self._parts]
+        speeds = {f"v_rel({c.name})": k for k, c in enumerate(self.model.contacts)}
+        gaps = {f"gap({i.name})": nc + k for k, i in enumerate(self.model.impacts)}
+        if name in self.names:
+            values = self(times)[self.names.index(name)]
+        elif name in names:
+            k = names.index(name)
+            self(times)
+            mean = np.concatenate([*self._run.forces, np.zeros((0, len(names)))])[self._step_of(times), k]
+            values = mean if k >= nc else -mean
+        elif name in speeds or name in gaps:
+            k, n = speeds.get(name, gaps.get(name, 0)), self.model.n
+            x = self(times)
+            values = (directions(self.model)[[k]] @ (x[n:] if name in speeds else x[:n])).ravel()
+            values = values - self._base(k, times) if name in speeds else values + self._run.plant.gap[k - nc]
+        else:
+            known = [*self.names, *names, *speeds, *gaps]
+            raise UsageError(
+                f"{self.model.name} has no quantity {name!r}", remedy=nearest(name, known, kind="quantities")
+            )
+        return values[0] if np.ndim(given) == 0 else values
+
+    def _base(self, c: int, times: np.ndarray) -> np.ndarray:
+        plant = self._run.plant
+        constant, sine, cosine = plant.base[c]
+        angle = plant.rates[plant.base_rate[c]] * times if plant.base_rate[c] >= 0 else np.zeros(len(times))
+        return constant + sine * np.sin(angle) + cosine * np.cos(angle)
+
+    # -- events and modes -----------------------------------------------------------------------------------
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All changes of mode in order of time."""
+        self._require_events()
+        nothing = np.full(2 * self.model.n, np.nan)
+        found = []
+        for (step, k, source, target), t in zip(self._event.tolist(), self._when.tolist(), strict=True):
+            names = self._mode_names(k)
+            x = self._states[step] if self._save == "all" else nothing
+            found.append(
+                Event(t, "transition", self._parts[k].name, "", names[source], names[target], -1, x, x)
+            )
+        return tuple(found)
+
+    @cached_property
+    def _when(self) -> np.ndarray:
+        return self._instants(self._event[:, 0])
+
+    def _mode_names(self, k: int) -> dict[int, str]:
+        return _CONTACT if k < len(self.model.contacts) else _IMPACT
+
+    def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
+        """Times of the events of one contact or impact."""
+        self._require_events()
+        numbers = [k for k, part in enumerate(self._parts) if part.name == component]
+        return self._when[np.isin(self._event[:, 1], numbers) & (kind in (None, "transition"))]
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
+        """For each contact and impact its modes in order, with the stretch of time of each."""
+        self._require_events()
+        found = {}
+        for k, part in enumerate(self._parts):
+            mine = self._event[:, 1] == k
+            times = [self.t_start, *self._when[mine].tolist(), self.t_end]
+            numbers = [int(self._run.first_modes[k]), *self._event[mine, 3].tolist()]
+            found[part.name] = tuple(
+                ModeInterval(self._mode_names(k)[z], a, b)
+                for z, a, b in zip(numbers, times[:-1], times[1:], strict=True)
+                if b > a or len(numbers) == 1
+            )
+        return found
+
+    def _require_events(self) -> None:
+        if self._save == "nothing":
+            raise UsageError(
+                "the run was made with save='nothing', which keeps no events", remedy="save='events'"
+            )
+
+    # -- how it went ----------------------------------------------------------------------------------------
+
+    @property
+    def x_end(self) -> np.ndarray:
+        """States (2n,) where the run ended, whatever was kept of it."""
+        return np.concatenate([self._run.state.q, self._run.state.v])
+
+    @property
+    def work(self) -> dict[str, float]:
+        """Energy that the system gets, by where from; see the class."""
+        return dict(zip(_WORKS, self._run.state.work.tolist(), strict=True))
+
+    @property
+    def status(self) -> str:
+        """How the run ended: "finished" at t1, else the reason it stopped."""
+        return self._run.status
+
+    @property
+    def success(self) -> bool:
+        """Whether the run did what was asked."""
+        return self.status == "finished"
+
+    @property
+    def message(self) -> str:
+        """One sentence about how the run ended."""
+        if self.success:
+            return f"reached t = {self.t_end!r} with moreau, step {self._run.step:g}"
+        if self._run.overlaps:
+            names = ", ".join(self._run.overlaps[:8])
+            return f"stopped at t = {self.t_end!r}: the gap of {names} is below zero"
+        return f"stopped at t = {self.t_end!r}: the state is not a number after the next step"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know: steps whose impulses did not settle."""
+        failed = int(self._run.state.counts[UNSETTLED])
+        _, _, tolerance, iterations = self._run.settings
+        text = (
+            f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: take smaller ones"
+        )
+        return (text,) if failed else ()
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """Cost: steps, sweeps over the contacts, bounces, events, seconds; residual: largest that a step was left with.
+
+        A residual is the last change of an impulse over the largest impulse of its step.
+        """
+        counts = self._run.state.counts.tolist()
+        return {
+            "steps": counts[STEPS], "sweeps": counts[SWEEPS], "bounces": counts[BOUNCES], "events": len(self._event),
+            "residual": float(self._run.state.residual[0]), "kernel_time": self._run.kernel_time,
+            "wall_time": self._cost[0], "compile_time": self._cost[1],
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        stats = self.stats
+        return "\n".join(
+            [
+                f"Solution of {self.model.name} by moreau: {self.status}",
+                f"  {self.message}",
+                f"  events: {stats['events']}, bounces: {stats['bounces']}",
+                f"  cost: {stats['steps']} steps, {stats['sweeps']} sweeps, {stats['wall_time']:.3g} s",
+                *(f"  warning: {w}" for w in self.warnings),
+            ]
+        )
