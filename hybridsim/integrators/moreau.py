@@ -37,7 +37,7 @@ class Moreau(Integrator):
 
     and friction that it loads has limits that grow with it. A gap is `closed`, it and its rate exactly zero, where it
     is pushed and does not rebound; bounces end there once one is over within a step. Until then a gap may be negative
-    by up to half a step's way, and bounces, which leave the mode as it is, are no events.
+    by up to a step's way, and bounces, which leave the mode as it is, are no events.
 
     Parameters
     ----------

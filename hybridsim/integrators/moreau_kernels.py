@@ -362,6 +362,8 @@ def moreau_steps(
     counts: rates, guards, steps that did not converge. out (n,): room.
     """
     n, s, planned, row = x.shape[0], 0.0, step, 0
+    for k in range(table.shape[0]):  # a run that goes on from here has no others to begin with
+        room.force[k], room.meaning[k] = 0.0, _HOLD
     while True:
         times[row] = s
         put(x, states[row])

@@ -162,8 +162,8 @@ def test_a_thousand_blocks_that_collide() -> None:
     assert works["friction"] < 0 and works["impacts"] < 0
     gaps = np.diff(sol.y[:1000], axis=0) + 0.1
     closing = -np.diff(sol.y[1000:], axis=0)
-    # a gap takes part from half a step on: it cannot close by more than that, at its rate
-    assert gaps.min() > -0.51 * 4e-3 * closing.max()
+    # g > h u/2 where a step begins that the gap takes part in, or it would have before; then g grows by h (u + e |u|)/2
+    assert gaps.min() > -0.75 * 4e-3 * closing.max()
 
 
 def test_what_is_kept_and_asked_for() -> None:
