@@ -26,6 +26,8 @@ autodoc_typehints = "none"
 numpydoc_show_class_members = False
 
 html_theme = "pydata_sphinx_theme"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = "hybridsim"
 html_theme_options = {
     "navigation_with_keys": False,
