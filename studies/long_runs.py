@@ -1,6 +1,7 @@
-"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, stick over 10^5, no stop over 10^6.
+"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, stick over 10^5, orbits over 10^6.
 
     python studies/long_runs.py [periods] [integrator]     (10^6 with dop853 by default; 10^4 take a minute)
+    python studies/long_runs.py orbits [periods]           (the orbits by `exact` alone: half a minute)
 
 Errors are over the last hundred periods before each checkpoint, relative to the amplitude, against closed forms in 40
 digits (tests/reference). A run of a million periods is cut into runs of a thousand, each of which starts at a time
@@ -18,6 +19,7 @@ import mpmath
 import numpy as np
 
 import hybridsim as hs
+from hybridsim.engine.limits import resident_megabytes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from mechanics.stuck_systems import FORCING, stuck_system, ulps_off
@@ -140,6 +142,65 @@ def stick(last: int) -> None:
             )
 
 
+def orbits(last: int) -> None:
+    """An orbit with two stops a period and one without, each in one run by `exact`: events, places, memory.
+
+    How many events there should be says the closed form: those of the first SETTLED periods from rest, then as many
+    a period as its last ten have.
+    """
+    for name, force, ratio in (("two stops", 30, 0.6), ("no stop", 60, 1.4)):
+        model = hs.load("dfcs").with_(F0=force, omega=f"{ratio}*sqrt(k/m)")
+        p = model.parameter_values()
+        period, limit = 2 * math.pi / p["omega"], p["mu"] * p["N"]
+        oscillator = Oscillator(p["m"], p["c"], p["k"], limit, limit, force, p["omega"])
+        settled, more = (oscillator.run(0, n * period, 0).changes for n in (SETTLED, SETTLED + 10))
+        each = (len(more) - len(settled)) / 10
+        expected = len(settled) + round(each * (last - SETTLED))
+        first = window(model, SETTLED + CHUNK, period)
+        began, memory = time.perf_counter(), [resident_megabytes()]
+        whole = hs.simulate(
+            model, (0, last * period), integrator="exact", save=CHUNK * period,
+            progress=lambda fraction, m=memory: m.append(resident_megabytes()),
+        )  # fmt: skip
+        took = time.perf_counter() - began
+        assert whole.success, whole.message
+        middle = memory[len(memory) // 2 :]
+        (a0, s0), (a1, s1) = (amplitudes(sol, period) for sol in (first, whole))
+        change = max(abs(a1.max() - a0.max()), abs(a1.min() - a0.min())) / a0.mean()
+        spread0, spread1 = np.ptp(a0) / a0.mean(), np.ptp(a1) / a1.mean()
+        print(
+            f"exact, {name}, {last} periods: {whole.stats['events']} events, {expected} expected; {s1[0]} sticks "
+            f"in the last {CHUNK}, moved by {max(s0[1], s1[1]):g} at most, speed {max(s0[2], s1[2]):g}; amplitude "
+            f"changed by {change:.1e}, spread {spread0:.1e} then, {spread1:.1e} now; memory {memory[0]:.1f} MB "
+            f"at the start, {middle[0]:.1f} half way, {memory[-1]:.1f} at the end  ({took:.0f} s)",
+            flush=True,
+        )
+
+
+def window(model: hs.Model, end: int, period: float) -> hs.Solution:
+    """The last CHUNK periods of a run from rest."""
+    sol = hs.simulate(model, (0, end * period), integrator="exact", save=CHUNK * period)
+    assert sol.success, sol.message
+    return sol
+
+
+def amplitudes(sol: hs.Solution, period: float) -> tuple[np.ndarray, tuple[int, float, float]]:
+    """Amplitude of each period of the window; how many sticks it has, their largest drift and their largest speed."""
+    t = np.array([e.t for e in sol.events])
+    x = np.array([e.x_plus[0] for e in sol.events])
+    numbers = ((t - sol.t_start) / period).astype(int)
+    inside = (numbers > 0) & (numbers < numbers.max())
+    first = np.flatnonzero(np.diff(numbers[inside], prepend=-1))
+    each = (np.maximum.reduceat(x[inside], first) - np.minimum.reduceat(x[inside], first)) / 2
+    sticks = [i for i in sol.modes["f"] if i.mode == "stick"][1:-1]
+    drift = speed = 0.0
+    for stick in sticks:
+        held = sol(np.linspace(stick.t0, stick.t1, 9)[:-1])
+        drift = max(drift, float(np.ptp(held[0])))
+        speed = max(speed, float(np.abs(held[1]).max()))
+    return each, (len(sticks), drift, speed)
+
+
 def points(t0: float, t1: float) -> np.ndarray:
     """Times at all phases, none of which is that of a switch: its rounded time stands for the switch itself."""
     return t0 + (t1 - t0) * (np.arange(POINTS) + 1 / math.pi) / POINTS
@@ -152,10 +213,14 @@ def say(what: str, periods: int, error: float, began: float) -> None:
     )
 
 
-if __name__ == "__main__":
+if __name__ == "__main__" and sys.argv[1:2] == ["orbits"]:
+    orbits(int(float(sys.argv[2])) if len(sys.argv) > 2 else 10**6)
+elif __name__ == "__main__":
     longest = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10**6
     method = sys.argv[2] if len(sys.argv) > 2 else "dop853"
     for damping in (0.05, 0.0):
         square(min(longest, 10**4), damping, 1e-12, method)
     stick(min(longest, 10**5))
     no_stop(longest, method)
+    if longest > SETTLED + CHUNK:
+        orbits(longest)

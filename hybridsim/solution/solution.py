@@ -68,9 +68,9 @@ class Solution:
             return self._grid[(self._grid >= low) & (self._grid <= high)]
         index, s, _ = self._knots
         times = self._origins[index, 0] + (s + self._origins[index, 1])
-        times[np.cumsum(np.bincount(index, minlength=len(self._starts))) - 1] = (
-            self._ends
-        )  # s is rounded there
+        counts = np.bincount(index, minlength=len(self._starts))
+        last = np.cumsum(counts) - 1
+        times[last - counts + 1], times[last] = self._starts, self._ends  # s is rounded there
         return times
 
     @cached_property
