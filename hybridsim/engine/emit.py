@@ -9,8 +9,9 @@ from typing import Any
 
 from hybridsim.engine.impulse_rows import impulses, restitutions, speed_name
 from hybridsim.engine.layout import SIGNAL_SLOTS
-from hybridsim.engine.lower import Lowering, Program, user
+from hybridsim.engine.lower import Lowering, Program
 from hybridsim.engine.program import Assign, Item, Switch, needed
+from hybridsim.engine.program_names import user
 from hybridsim.engine.stepped_rows import stepped
 from hybridsim.engine.tape import TapeBuilder
 from hybridsim.expr.symbolic import derivative

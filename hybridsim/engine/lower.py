@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.engine.affine_modes import affine_modes
+from hybridsim.engine.clusters import clusters_of, normal_loads
 from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.program import Assign, Item, Switch, ordered
+from hybridsim.engine.program_names import declared_name, user
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.switching import ATTRACTION
@@ -18,16 +20,6 @@ from hybridsim.model.switching import ATTRACTION
 if TYPE_CHECKING:
     from hybridsim.expr.parse import Expression
     from hybridsim.model.model import Model
-
-
-def user(name: str) -> str:
-    """Name of a declared quantity inside the generated program; no internal name starts so."""
-    return "v_" + name
-
-
-def _name(symbol: Any) -> str:
-    """The declared name of a symbol."""
-    return str(symbol.name).removeprefix("v_")
 
 
 @dataclass
@@ -159,7 +151,7 @@ class Lowering:
         items: list[Item] = [Assign(user("t"), sp.Symbol("origin", real=True) + self.s)]
         items += [Assign(k.name, e) for k, e in (signals | definitions).items()]
         surfaces = {
-            c: self._inline(self.convert(comp.surface.function), definitions | signals)
+            c: self.inline(self.convert(comp.surface.function), definitions | signals)
             for c, comp in enumerate(self.components)
             if comp.surface
         }
@@ -188,7 +180,7 @@ class Lowering:
             self.rates,
             clusters,
             [self._jump(c) for c in surfaces],
-            self._linear(der, definitions, surfaces),
+            affine_modes(self, der, definitions, surfaces),
             conditions,
         )
         return program
@@ -202,8 +194,8 @@ class Lowering:
             if not self.components[c].surface.is_unilateral:
                 continue
             slopes = [(self.sp.diff(s, x), d) for x, d in zip(self.states, der, strict=True)]
-            rate = self._rate_in_time(s) + sum(a * self._inline(d, definitions) for a, d in slopes if a != 0)
-            wrong = sorted(map(_name, self._foreign(rate)))
+            rate = self._rate_in_time(s) + sum(a * self.inline(d, definitions) for a, d in slopes if a != 0)
+            wrong = sorted(map(declared_name, self._foreign(rate)))
             if wrong or rate == 0:
                 fault = f"uses {', '.join(wrong)}, which depends on a mode" if wrong else "is zero"
                 raise ModelError(
@@ -216,13 +208,14 @@ class Lowering:
 
     def inlined(self, expression: Expression) -> Any:
         """A declared expression in SymPy with the definitions put in."""
-        return self._inline(self.convert(expression), self.definitions)
+        return self.inline(self.convert(expression), self.definitions)
 
     def _rate_in_time(self, s: Any) -> Any:
         """The rate of an expression while the states stay."""
         return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
 
-    def _inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
+    def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
+        """An expression with definitions put in, and those that these use."""
         while e.free_symbols & definitions.keys():
             e = e.subs(definitions)
         return e
@@ -299,18 +292,18 @@ class Lowering:
             if effect[c, c] == 0:
                 if not self.components[c].surface.unique:
                     raise ModelError(
-                        f"{_name(unknown[c])} does not act on its own {self.title(c)} "
+                        f"{declared_name(unknown[c])} does not act on its own {self.title(c)} "
                         f"'{self.written(c)}' ({self.components[c].name}): it can never hold it",
                         place=self.place(c),
-                        remedy=f"use {_name(unknown[c])} in the derivative of the velocity state",
+                        remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
                     )
                 self.never_held.add(c)
         self.open_rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
         switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
         if switching:
             self._refuse_powers(switching, self.open_rates)
-        loads = self._loads(unknown, definitions)
-        clusters = self._clusters(order, effect, loads)
+        loads = normal_loads(self, unknown, definitions)
+        clusters = clusters_of(order, effect, loads)
         items: list[Item] = []
         for cluster in clusters:
             items += self._solve(cluster, unknown, rate, effect, loads)
@@ -326,9 +319,9 @@ class Lowering:
             for x, rate in zip(self.states, rates, strict=True):
                 component = self.components[c]
                 if u in self.sp.simplify(self.sp.diff(rate, u)).free_symbols:
-                    name = _name(u)
+                    name = declared_name(u)
                     raise ModelError(
-                        f"surface {component.name}: {name} enters the rate of {_name(x)} nonlinearly",
+                        f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",
                         place=self.place(c),
                         remedy=f"let {name} enter the rates linearly, or give whole fields as above and below of it",
                     )
@@ -336,14 +329,14 @@ class Lowering:
     def _nonlinear(self, c: int, d: int, others: set[Any]) -> ModelError:
         """The fault of an unknown that acts on a surface together with itself or others."""
         unknown = self.symbols[self.components[d].surface.unknown]
-        name, component = _name(unknown), self.components[c]
+        name, component = declared_name(unknown), self.components[c]
         if not component.surface.unique:
             return ModelError(
                 f"{name} enters the motion of {component.name} nonlinearly: it cannot be solved for",
                 place=self.place(c),
                 remedy="let the force enter the derivative of the velocity linearly",
             )
-        partners = sorted({name, *map(_name, others)})
+        partners = sorted({name, *map(declared_name, others)})
         if len(partners) == 1:
             message = f"{name} enters the rate of the switching function '{self.written(c)}' nonlinearly"
             remedy = (
@@ -367,57 +360,8 @@ class Lowering:
         return found
 
     def _inline_unknown(self, e: Any, definitions: dict[Any, Any], unknown: set[Any]) -> Any:
-        inner = {k: d for k, d in definitions.items() if self._inline(d, definitions).free_symbols & unknown}
-        return self._inline(e, inner)
-
-    def _loads(
-        self, unknown: dict[int, Any], definitions: dict[Any, Any]
-    ) -> dict[tuple[int, int], dict[str, Any]]:
-        """By how much the force of slip of a contact grows with a normal force, by (contact, impact) and mode.
-
-        A normal force that a contact's guards alone use has an entry without modes.
-        """
-        normal = {u: d for d, u in unknown.items() if self.components[d].surface.is_unilateral}
-        found: dict[tuple[int, int], dict[str, Any]] = {}
-        for c, component in enumerate(self.components):
-            if c in normal.values() or not normal:
-                continue
-            for m in component.modes:
-                values = {n: self._inline(self.convert(e), definitions) for n, e in m.set.items()}
-                guards = [self._inline(self.convert(g.expr), definitions) for g in m.guards]
-                used = {u for e in (*values.values(), *guards) for u in e.free_symbols} & normal.keys()
-                for u in used:
-                    slopes = {n: self.sp.simplify(self.sp.diff(e, u)) for n, e in values.items() if e.has(u)}
-                    own = unknown.get(c)
-                    if set(slopes) - {_name(own) if own is not None else None} or any(
-                        e.free_symbols & set(unknown.values()) for e in slopes.values()
-                    ):
-                        raise ModelError(
-                            f"{component.name} uses the normal force {_name(u)} of an impact otherwise than as a "
-                            "load that friction of slip and stick is proportional to",
-                            place=component.place,
-                            remedy="take a law of slip and stick that is linear in its load; write rates with "
-                            f"{_name(u)} in them as the rates of states",
-                        )
-                    if own is not None:
-                        by_mode = found.setdefault((c, normal[u]), {})
-                        if slopes:
-                            by_mode[m.name] = slopes[_name(own)]
-        return found
-
-    def _clusters(
-        self, order: list[int], effect: dict[tuple[int, int], Any], loads: Container[tuple[int, int]]
-    ) -> list[list[int]]:
-        def act(c: int, d: int) -> bool:
-            return effect[c, d] != 0 or (c, d) in loads
-
-        clusters: list[list[int]] = []
-        for c in order:
-            linked = [g for g in clusters if any(act(c, d) or act(d, c) for d in g)]
-            clusters = [g for g in clusters if g not in linked] + [
-                sorted([c, *(d for g in linked for d in g)])
-            ]
-        return clusters
+        inner = {k: d for k, d in definitions.items() if self.inline(d, definitions).free_symbols & unknown}
+        return self.inline(e, inner)
 
     def _solve(
         self,
@@ -475,7 +419,7 @@ class Lowering:
             if m.name != surface.hold:
                 value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise[m.name]
                 if without:
-                    value = self._inline(value, self.definitions).subs(without)
+                    value = self.inline(value, self.definitions).subs(without)
             rows.append((Assign(name, value),))
         return Switch(c, tuple(rows))
 
@@ -544,28 +488,3 @@ class Lowering:
             return sp.factor(sp.simplify(exact))
 
         return c, reduced(surface.jump_above), reduced(surface.jump_below)
-
-    def _linear(
-        self, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
-    ) -> dict[str, tuple[bool, ...]]:
-        """Which modes keep the flow linear in the states (unknowns that are solved for included)."""
-        free = set(self.states) | {self.symbols[n] for c in self.components for m in c.modes for n in m.set}
-        free |= {self.symbols[c.surface.unknown] for c in self.components if c.surface}
-
-        def affine(e: Any) -> bool:
-            inner = sorted(e.free_symbols & free, key=str)
-            return all(not self.sp.diff(e, a).free_symbols & free for a in inner)
-
-        def linear(c: int, m: Any) -> bool:
-            surface = self.components[c].surface
-            if surface and m.name == surface.hold and not affine(surfaces[c]):
-                return False
-            return all(
-                affine(self._inline(self.convert(e), definitions)) for e in [*m.set.values(), *m.der.values()]
-            )
-
-        base = all(affine(self._inline(d, definitions)) for d in der)
-        return {
-            component.name: tuple(base and linear(c, m) for m in component.modes)
-            for c, component in enumerate(self.components)
-        } | {"": (base,)}
