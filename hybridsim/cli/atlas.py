@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas import Atlas
 
 _FOLDER = Path("atlas")
+_DPI = 100.0  # of the small pictures, of which there are many
 
 
 def add_to(commands: Any) -> None:
@@ -68,7 +69,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             workers=args.workers or os.cpu_count() or 1,
             progress=progress,
         )
-    _write(result, folder, session)
+        _write(result, folder, session, progress)
     if args.json:
         print_json(result.to_plain())
     else:
@@ -76,12 +77,35 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     return 0
 
 
-def _write(result: Atlas, folder: Path, session: Session) -> None:
+def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
     from hybridsim.plot import save
     from hybridsim.plot.atlas import matrix
+    from hybridsim.testing.atlas import pages
 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "atlas.json").write_text(result.to_json(), encoding="utf-8")
     session.wrote(folder / "atlas.json")
     save(matrix(result), folder / "matrix.png")
     session.wrote(folder / "matrix.png")
+    drawn = _pictures(result, folder, progress)
+    for name, text in pages(result, drawn).items():
+        (folder / name).write_text(text, encoding="utf-8")
+        session.wrote(folder / name)
+
+
+def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
+    """Draw the scenes, each in the folder of its class; the names of those that have a picture."""
+    from hybridsim.plot import save
+    from hybridsim.plot.atlas import scene as picture
+    from hybridsim.testing.atlas import example
+
+    drawn = set()
+    for number, scene in enumerate(result.scenes):
+        progress(number / len(result.scenes), f"picture of {scene.name}")
+        found = example(result, scene)
+        if found is not None:
+            place = folder / (scene.trouble or "scenes")
+            place.mkdir(exist_ok=True)
+            save(picture(found), place / f"{scene.name}.png", dpi=_DPI)
+            drawn.add(scene.name)
+    return drawn

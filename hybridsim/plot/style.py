@@ -56,20 +56,21 @@ def figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save(picture: Any, path: str | Path) -> Path:
+def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
     """Write a picture to a file.
 
     Parameters
     ----------
     picture : a figure, axes, or several axes of one figure, as the functions of `hybridsim.plot` return them.
     path : ends in .png, .pdf or .svg.
+    dpi : dots to the inch of a .png.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(
             f"{path} is no picture that can be written", remedy=f"end it in {', '.join(SUFFIXES)}"
         )
-    _figure_of(picture).savefig(path, dpi=_DPI)
+    _figure_of(picture).savefig(path, dpi=dpi)
     return path
 
 

@@ -24,11 +24,13 @@ def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...]
                 row = values[names.index(name)]
                 if not (row == value).all():
                     worst = row[np.argmax(np.abs(row - value))]
-                    return [f"in stick from t = {interval.t0!r}, {name} = {worst!r} instead of {value!r}"]
+                    return [
+                        f"in stick from t = {interval.t0!r}, {name} = {float(worst)!r} instead of {value!r}"
+                    ]
             for name in rest:
                 row = values[names.index(name)]
                 if not (row == row[0]).all():
-                    return [f"in stick from t = {interval.t0!r}, {name} moves by {np.ptp(row)!r}"]
+                    return [f"in stick from t = {interval.t0!r}, {name} moves by {float(np.ptp(row))!r}"]
         return []
 
     return check

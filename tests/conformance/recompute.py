@@ -13,9 +13,13 @@ from collections.abc import Callable, Sequence
 from itertools import product
 from typing import Any
 
+from reference.arithmetic import multiprecision
+from reference.dfcs_closed_form import Oscillator
 from reference.hybrid_taylor import Mode, follow
 from reference.series import MP, Series, exp, sin_cos, tanh
 
+from conformance.recompute_table import states
+from hybridsim.testing.catalogue.sensitivity import GRAZING_FORCE, GRAZING_START
 from hybridsim.testing.facts import HERE
 
 NAMES = {1: "slip+", -1: "slip-", 0: "stick"}
@@ -170,6 +174,35 @@ def blocks() -> dict[str, Mode]:
     return {name(sides): mode(sides) for sides in product((1, 0, -1), repeat=3)}
 
 
+def stop() -> dict[str, Mode]:
+    """impact-oscillator with its swing a ten-thousandth beyond the stop; the force as the scene gives it."""
+    zeta2, omega, e = MP.mpf("0.1"), MP.mpf("2.5"), MP.mpf("0.8")
+
+    def hit(t: Any, x: Sequence[Any]) -> tuple[str, Sequence[Any]]:
+        return "free", (1, -e * x[1])
+
+    return {
+        "free": Mode(
+            lambda t, x: (x[1], MP.mpf(GRAZING_FORCE) * sin_cos(t * omega)[1] - zeta2 * x[1] - x[0]),
+            {"mode": (lambda t, x: 1 - x[0], hit)},
+        )
+    }
+
+
+def micro_slip() -> dict[str, Any]:
+    """The closed form of a force a ten-thousandth above the limit, in 30 digits."""
+    motion = Oscillator(1, 0, 1, 1, 1, 1 + 1e-4, 0.5, multiprecision(30)).run(0, 40, 0)
+    events = [[float(change.t), "f", NAMES[change.mode]] for change in motion.changes]
+    times = [2.0, 3.0, 5.0, 9.0, 12.0, 20.0, 30.0, 40.0]
+    return {"events": events, "states": [[t, *(float(v) for v in motion.state(t)[:2])] for t in times]}
+
+
+def vibrating_table() -> dict[str, Any]:
+    """First landings and states of the ball on the vibrating table."""
+    landings, found = states(1.0, [round(0.025 * n, 3) for n in range(1, 41)])
+    return {"events": [[t, "p", "landing"] for t in landings], "states": found}
+
+
 def truth(
     modes: dict[str, Mode], mode: str, start: Sequence[Any], span: tuple[Any, Any], times: Sequence[float]
 ) -> dict[str, Any]:
@@ -197,6 +230,9 @@ def main() -> None:
         "SIC-relayosc": truth(relay(), "plus", (0, 0.6752372371178297, 0), (0, 100), (1, 10, 100)),
         "NOS-blocks0": truth(blocks(), "slip-,slip+,slip+", (-1, 1, -1, -1, 1, 1), (0, 12), (1, 2, 3, 12)),
         "FMI-vdp": truth(smooth, "smooth", (2, 0), (0, 20), (1, 5, 10, 20)),
+        "grazing-stop": truth(stop(), "free", GRAZING_START, (0, 15), (1, 2.5, 4, 6, 9, 12, 15)),
+        "micro-slip": micro_slip(),
+        "vibrating-table": vibrating_table(),
         "TANH-1e-3": truth(creep, "smooth", (MP.mpf("10.5"), 0), (0, 20), (5, 16, 20)),
     }
     (HERE / "truths.json").write_text(json.dumps(truths, indent=1) + "\n")

@@ -2,7 +2,9 @@
 
 from hybridsim.testing.atlas.cell import Cell, Row
 from hybridsim.testing.atlas.configurations import Configuration, configurations
+from hybridsim.testing.atlas.example import Example, example
 from hybridsim.testing.atlas.matrix import Atlas, atlas, scenes_named
+from hybridsim.testing.atlas.pages import pages
 from hybridsim.testing.atlas.verdict import VERDICTS
 
 __all__ = [
@@ -10,8 +12,11 @@ __all__ = [
     "Atlas",
     "Cell",
     "Configuration",
+    "Example",
     "Row",
     "atlas",
     "configurations",
+    "example",
+    "pages",
     "scenes_named",
 ]

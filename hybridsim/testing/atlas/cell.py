@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from hybridsim.testing.atlas.configurations import Configuration
 from hybridsim.testing.atlas.verdict import NOT_RUN, order, verdict
+from hybridsim.testing.judge import Measured
 from hybridsim.testing.scene import Scene, Truth
 from hybridsim.testing.study import Setting, carry_out, compile_for
 
@@ -20,13 +23,20 @@ LONG = 20.0  # units of time from which on only compiled methods run
 
 @dataclass(frozen=True)
 class Row:
-    """One setting of a study: errors relative as in `Scene`, steps and seconds of its run."""
+    """One setting of a study: errors relative as in `Scene` (NaN where no more was compared), steps and seconds."""
 
     setting: str
     time_error: float
     state_error: float
     steps: int
     seconds: float
+
+
+NOTHING_KNOWN: dict[str, Any] = {"time_error": math.nan, "state_error": math.nan, "seconds": math.nan}
+
+
+def _known(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -49,12 +59,20 @@ class Cell:
 
     @property
     def error(self) -> float | None:
-        """The larger of both errors at the last setting that ran."""
-        return max(self.rows[-1].time_error, self.rows[-1].state_error) if self.rows else None
+        """The larger of both errors at the last setting that ran; None where none was measured."""
+        error = max(self.rows[-1].time_error, self.rows[-1].state_error) if self.rows else math.nan
+        return error if math.isfinite(error) else None
 
     def to_plain(self) -> dict[str, Any]:
         """Plain data."""
         return dataclasses.asdict(self) | {"error": self.error}
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> Cell:
+        """What `to_plain` gave; errors that were no numbers are NaN."""
+        known = {name: value for name, value in plain.items() if name not in ("rows", "error")}
+        rows = tuple(Row(**{**NOTHING_KNOWN, **_known(row)}) for row in plain["rows"])
+        return cls(**known, rows=rows)
 
 
 def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) -> Cell:
@@ -82,9 +100,16 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
         **configuration.options,
     )
     found, reason = verdict(study)
-    rows = tuple(Row(s.text, r.time_error, r.state_error, r.steps, r.seconds) for s, r in study.done)
+    rows = tuple(row(setting.text, run) for setting, run in study.done)
     spent = time.perf_counter() - began
     return Cell(scene.name, configuration.name, found, reason, rows, order(study.done), spent)
+
+
+def row(setting: str, run: Measured) -> Row:
+    """A row of a cell; what ended or went otherwise than it should has no errors of numbers."""
+    if run.ending or run.sequence:
+        return Row(setting, math.nan, math.nan, run.steps, run.seconds)
+    return Row(setting, run.time_error, run.state_error, run.steps, run.seconds)
 
 
 def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import multiprocessing
 import os
 import signal
@@ -75,8 +76,25 @@ class Atlas:
         }
 
     def to_json(self) -> str:
-        """The same as text; numbers that JSON does not have become null."""
-        return json.dumps(_finite(self.to_plain()), indent=1) + "\n"
+        """The same as text, a line for each cell; numbers that JSON does not have become null."""
+        plain = _finite(self.to_plain())
+        parts = []
+        for name, part in plain.items():
+            lines = ",\n".join(json.dumps(item) for item in part) if isinstance(part, list) else ""
+            parts.append(f'"{name}": ' + (f"[\n{lines}\n]" if lines else json.dumps(part)))
+        return "{\n" + ",\n".join(parts) + "\n}\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Atlas:
+        """What `to_json` wrote, with the scenes of the package as they are told of now."""
+        plain = json.loads(text)
+        scenes = {scene.name: scene for scene in SCENES}
+        found = [Cell.from_plain(cell) for cell in plain["cells"]]
+        return cls(
+            tuple(scenes[one["name"]] for one in plain["scenes"]),
+            tuple(Configuration(**one) for one in plain["integrators"]),
+            {(cell.scene, cell.configuration): cell for cell in found},
+        )
 
 
 def atlas(
@@ -174,6 +192,6 @@ def _finite(value: Any) -> Any:
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
+    if isinstance(value, float):
+        return float(f"{value:.4g}") if math.isfinite(value) else None
     return value

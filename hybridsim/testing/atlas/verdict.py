@@ -58,8 +58,8 @@ def of_run(run: Measured) -> tuple[str, str]:
 
 
 def one_line(text: str) -> str:
-    """A message without its line breaks."""
-    return re.sub(r"\s+", " ", text).strip()
+    """A message without line breaks, and without the folders of files that it names."""
+    return re.sub(r"\s+", " ", re.sub(r"\S*/([\w.-]+\.toml)", r"\1", text)).strip()
 
 
 def order(done: tuple[tuple[Setting, Measured], ...]) -> float | None:
@@ -67,6 +67,8 @@ def order(done: tuple[tuple[Setting, Measured], ...]) -> float | None:
     if len(done) < 2 or "rtol" in done[-1][0].options:
         return None
     (before, coarse), (setting, fine) = done[-2:]
+    if any(run.ending or run.sequence for run in (coarse, fine)):
+        return None
     lengths = [_steps(one.text) for one in (before, setting)]
     usable = fine.state_error > setting.excused and coarse.state_error > before.excused
     if not usable or not math.isfinite(coarse.state_error + fine.state_error):

@@ -10,13 +10,17 @@ from hybridsim.testing.catalogue import (
     contacts,
     corners,
     events,
+    impacts,
     oscillators,
     sensitivity,
     sliding,
+    stability,
     stiffness,
+    thresholds,
     timed,
 )
 from hybridsim.testing.scene import Scene
+from hybridsim.testing.stories import with_stories
 
 # Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
 NONLINEAR = {
@@ -29,19 +33,24 @@ def _with_linearity(scene: Scene) -> Scene:
     return replace(scene, needs=scene.needs | {"nonlinear"}) if scene.file in NONLINEAR else scene
 
 
-SCENES: tuple[Scene, ...] = tuple(
-    _with_linearity(scene)
-    for part in (
-        oscillators,
-        contacts,
-        accumulation,
-        events,
-        stiffness,
-        timed,
-        coincidences,
-        corners,
-        sliding,
-        sensitivity,
+SCENES: tuple[Scene, ...] = with_stories(
+    tuple(
+        _with_linearity(scene)
+        for part in (
+            events,
+            timed,
+            coincidences,
+            corners,
+            oscillators,
+            contacts,
+            thresholds,
+            sliding,
+            accumulation,
+            impacts,
+            stiffness,
+            stability,
+            sensitivity,
+        )
+        for scene in part.scenes()
     )
-    for scene in part.scenes()
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from hybridsim.testing.checks import equals
 from hybridsim.testing.facts import CASES
@@ -11,7 +12,66 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """All of them."""
-    return _ball()
+    return *_ball(), _twisting(), *_tanks()
+
+
+def _twisting() -> Scene:
+    """x'' = -2 sign(x) - sign(x'): a half turn is a third as wide as the one before, in 1/sqrt(3) of its time."""
+    half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
+    first, second = half, half * (1 + 1 / math.sqrt(3))
+
+    def rests(solution: Any) -> list[str]:
+        if solution.status == "finished":
+            x, v = solution(5.0)
+            return [] if abs(x) + abs(v) < 1e-6 else [f"x = {x!r} and v = {v!r} where all has come to rest"]
+        if abs(solution.t_end - end) < 1e-6:
+            return []  # stopping there by name misleads nobody
+        return [f"ended as {solution.status!r} at t = {solution.t_end!r}, not at {end!r}"]
+
+    states = ((1.0, (0.5, -1.0)), (first, (-1 / 3, 0.0)), (second, (1 / 9, 0.0)))
+    return Scene(
+        "twisting",
+        "twisting",
+        (0.0, 5.0),
+        Truth(None, states, status=None, checks=(("", rests),)),
+        needs("sliding", "accumulation"),
+        tol_x=1e-8,
+    )
+
+
+def _tanks() -> tuple[Scene, ...]:
+    """The hose fills the tank that is low: each visit is half as long as the one before (w = 0.75, leaks of 0.5)."""
+    t, x = 2.0, [0.5, 0.0]  # the second tank is low
+    events, low, left = [(t, "hose:second")], 1, 1e-4
+    states = [(1.0, (0.25, 0.5)), (3.0, (0.0, 0.25))]
+    while True:
+        other = 1 - low
+        lasts = x[other] / 0.5
+        t, x[low], x[other], low = t + lasts, x[low] + 0.25 * lasts, 0.0, other
+        if sum(x) <= left:
+            break
+        events.append((t, "hose:second" if low == 1 else "hose:first"))
+    events.append((t, "hose:off"))
+    common: dict[str, Any] = {"unit": 4.0, "tol_t": 1e-9, "tol_x": 1e-9}
+    return (
+        Scene(
+            "water-tanks",
+            "water-tanks",
+            (0.0, 4.4),
+            Truth(tuple(events), tuple(states)),
+            needs("transitions"),
+            **common,
+        ),
+        Scene(
+            "water-tanks-endless",
+            "water-tanks",
+            (0.0, 4.4),
+            Truth(None, tuple(states), status="accumulation", end=4.0),
+            needs("transitions", "accumulation"),
+            params={"left": 0.0},
+            **common,
+        ),
+    )
 
 
 def _ball() -> tuple[Scene, ...]:

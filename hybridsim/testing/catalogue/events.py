@@ -12,7 +12,29 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """All of them."""
-    return *corridor(), *modes(), *monitored()
+    return *corridor(), *modes(), *monitored(), *grazing()
+
+
+def grazing() -> tuple[Scene, ...]:
+    """sin(t) against 1 +- 1e-6: no event, or a visit of 2.8e-3 at the top of each swing."""
+    gap = 1e-6
+    half = math.acos(1 - gap)
+    tops = [math.pi / 2 + 2 * math.pi * n for n in range(3)]
+    visits = [event for t in tops for event in ((t - half, "mode:above"), (t + half, "mode:below"))]
+    states = tuple((t, (math.sin(t), math.cos(t))) for t in (1.0, 5.0, 9.0, 15.0))
+    common: dict[str, Any] = {"unit": 2 * math.pi, "floor": 1e-9, "tolerances": (1e-8, 1e-10, 1e-12)}
+    return (
+        Scene("graze-miss", "graze", (0.0, 15.0), Truth((), states), needs("transitions"), **common),
+        Scene(
+            "graze-hit",
+            "graze",
+            (0.0, 15.0),
+            Truth(tuple(visits), states),
+            needs("transitions", "multiple-roots"),
+            params={"gap": -gap},
+            **{**common, "tol_t": 1e-6, "floor": 1e-7},  # the level is met at a slope of 1.4e-3
+        ),
+    )
 
 
 def corridor() -> tuple[Scene, ...]:

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from hybridsim.testing.facts import CASES
+from hybridsim.testing.facts import CASES, recomputed
 from hybridsim.testing.scene import Scene, Truth, needs
+
+# impact-oscillator: the force a and the state at t = 0 of the vibration without a stop, whose amplitude is 1.0001 gaps.
+_OMEGA, _DAMPING, _REACH = 2.5, 0.1, 1.0001
+_D = (1 - _OMEGA**2) ** 2 + (_DAMPING * _OMEGA) ** 2
+GRAZING_FORCE = _REACH * math.sqrt(_D)
+GRAZING_START = (GRAZING_FORCE * (1 - _OMEGA**2) / _D, _DAMPING * _OMEGA**2 * GRAZING_FORCE / _D)
 
 
 def scenes() -> tuple[Scene, ...]:
     """All of them."""
-    return (lifting(),)
+    return lifting(), grazing_stop()
+
+
+def grazing_stop() -> Scene:
+    """A swing that passes a rigid stop by a ten-thousandth: the slope of the map is infinite at the touch."""
+    events, states = recomputed("grazing-stop")
+    return Scene(
+        "grazing-stop",
+        "impact-oscillator",
+        (0.0, 15.0),
+        Truth(events, states),
+        needs("transitions", "multiple-roots"),
+        params={"a": GRAZING_FORCE},
+        start=dict(zip("xv", GRAZING_START, strict=True)),
+        unit=2 * math.pi / _OMEGA,
+        speed=2.5,
+        tol_t=1e-5,  # after a touch at 0.035 of 2.5 in speed, errors are seventy times larger
+        tol_x=1e-5,
+        floor=1e-9,
+    )
 
 
 def lifting() -> Scene:

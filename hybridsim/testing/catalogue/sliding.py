@@ -24,6 +24,7 @@ def scenes() -> tuple[Scene, ...]:
         _along_the_circle(),
         _decay(),
         _two_relays(),
+        _chatter(),
         *_refused(),
     )
 
@@ -190,6 +191,25 @@ def _two_relays() -> Scene:
         ),
         NEEDS,
         tol_t=1e-9,
+    )
+
+
+def _chatter() -> Scene:
+    """Up with speed 1, down with 1.5, between +-1e-3: a change every 2e-3 and every 4/3e-3."""
+    band, end = 1e-3, 1.0
+    events, t, up = [], band, True
+    while t < end:
+        events.append((t, "mode:down" if up else "mode:up"))
+        t, up = band + (len(events) // 2) * (10 / 3) * band + (len(events) % 2) * (4 / 3) * band, not up
+    states = ((0.5e-3, (0.5e-3,)), (events[-2][0], (band if len(events) % 2 == 0 else -band,)))
+    return Scene(
+        "relay-chatter",
+        "thermostat-band",
+        (0.0, end),
+        Truth(tuple(events), states),
+        frozenset({"transitions", "adaptive"}),  # a fixed step in units of the run passes several changes
+        tol_t=1e-9,
+        tol_x=1e-9,
     )
 
 

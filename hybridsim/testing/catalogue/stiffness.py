@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hybridsim.testing.facts import CASES, recomputed
 from hybridsim.testing.scene import Scene, Truth, needs
 
@@ -33,4 +35,24 @@ def scenes() -> tuple[Scene, ...]:
             tol_x=1e-7,
             floor=1e-9,
         ),
+        _decades(),
+    )
+
+
+def _decades() -> Scene:
+    """One half-life is ln(2)/1e8, the other ln(2)."""
+    early, late = math.log(2) * 1e-8, math.log(2)
+    states = (
+        (early, (math.exp(-early), 0.5)),
+        (late / 2, (math.sqrt(0.5), 0.5)),
+        (2.0, (math.exp(-2.0), 0.5)),
+    )
+    return Scene(
+        "eight-decades",
+        "decades",
+        (0.0, 2.0),
+        Truth(((early, "a:held"), (late, "b:low")), states),
+        needs("transitions", "adaptive"),  # no fixed step suits both
+        tol_t=1e-9,
+        tol_x=1e-9,
     )

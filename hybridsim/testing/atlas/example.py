@@ -1,0 +1,157 @@
+"""The example of a scene: how a typical method fails in it, beside a run that is right."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybridsim.errors import HybridsimError
+from hybridsim.testing import judge
+from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
+from hybridsim.testing.atlas.configurations import Configuration
+from hybridsim.testing.atlas.matrix import Atlas
+from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG
+from hybridsim.testing.scene import Scene
+from hybridsim.testing.study import Endless, bounded_work
+
+# Who is shown, first of all: what people use and what fails in a way that one can see.
+TYPICAL = (
+    "scipy-rk45 native", "scipy-dop853 native", "rk4-dichotomy", "rk4 tanh", "rk4-sign", "cvode-adams",
+    "scipy-radau native", "scipy-lsoda native", "rk4 karnopp", "moreau",
+)  # fmt: skip
+TRUSTED = ("exact", "taylor", "dop853", "rodas5p", "cvode-bdf")
+WIDTH = 8.0  # units of time that a picture shows
+POINTS = 1500
+
+
+@dataclass(frozen=True)
+class Line:
+    """A run as a picture shows it: times (k,), one state (k,), and the times of its events."""
+
+    name: str
+    t: np.ndarray
+    x: np.ndarray
+    events: np.ndarray
+
+
+@dataclass(frozen=True)
+class Example:
+    """A right run and a failing one over a window of time.
+
+    Parameters
+    ----------
+    state, unit : name and unit of the state that is shown.
+    points : true values in the window, from the truth of the scene.
+    failing : None where no method fails.
+    stopped : whether the failing run ended inside the window.
+    """
+
+    state: str
+    unit: str
+    right: Line
+    failing: Line | None
+    points: tuple[tuple[float, float], ...]
+    stopped: bool = False
+
+
+def example(result: Atlas, scene: Scene) -> Example | None:
+    """The example of a scene; None where no trusted method is in the matrix, or there is nothing to draw."""
+    by_name = {one.name: one for one in result.configurations}
+    trusted = [
+        by_name[name]
+        for name in TRUSTED
+        if name in by_name and result.cells[scene.name, name].verdict == RIGHT
+    ]
+    if not trusted:
+        return None
+    right = solution(scene, trusted[0], result.cells[scene.name, trusted[0].name].rows[-1].setting)
+    if right is None or not right.names or right.t_end == right.t_start:
+        return None
+    cell = typical_failure(result.row(scene))
+    failing = None
+    if cell is not None:
+        failing = solution(scene, by_name[cell.configuration], first_wrong(cell))
+    return _compared(scene, right, failing, cell)
+
+
+def typical_failure(cells: list[Cell]) -> Cell | None:
+    """The cell to show: wrong before hanging, in the order of `TYPICAL`."""
+    for verdicts in (WRONG, (HANG,)):
+        found = [cell for cell in cells if cell.verdict in verdicts]
+        found.sort(
+            key=lambda cell: TYPICAL.index(cell.configuration) if cell.configuration in TYPICAL else 99
+        )
+        if found:
+            return found[0]
+    return None
+
+
+def first_wrong(cell: Cell) -> str:
+    """The setting that the verdict speaks of."""
+    text = cell.reason.partition(": ")[0]
+    return text if text else cell.rows[0].setting
+
+
+def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
+    """The run of one setting again; None where it comes to no solution."""
+    options = next((s.options for s in configuration.settings(scene) if s.text == setting), None)
+    if options is None:
+        options = configuration.settings(scene)[-1].options
+    try:
+        with warnings.catch_warnings(), bounded_work(2 * SECONDS):
+            warnings.simplefilter("ignore")
+            return judge.run(
+                scene,
+                configuration.integrator,
+                form=configuration.form,
+                limits={"seconds": SECONDS, "steps": STEPS},
+                **options,
+                **configuration.options,
+            )
+    except (HybridsimError, Endless, ArithmeticError, ValueError):
+        return None
+
+
+def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Example:
+    first, last = sorted((right.t_start, right.t_end))
+    if failing is not None and (not failing.t.size or failing.t_end == failing.t_start):
+        failing = None
+    shared = last if failing is None else min(last, max(failing.t_start, failing.t_end))
+    start = first if failing is None else max(first, min(failing.t_start, failing.t_end))
+    row, centre = 0, first
+    if failing is not None:
+        t = np.linspace(start, shared, POINTS)
+        a, b = np.atleast_2d(right(t)), np.atleast_2d(failing(t))[: len(right.names)]
+        off = np.abs(a - b) / (np.ptp(a, axis=1, keepdims=True) + 1e-300)
+        off[~np.isfinite(off)] = 0.0
+        row = int(off.max(axis=1).argmax()) if off.max() > 1e-6 else 0
+        seen = off[row] > 0.3 * off[row].max()
+        centre = float(t[seen.argmax()]) if seen.any() and off.max() > 0 else first
+    width = min(WIDTH * scene.unit, last - first)
+    low = min(max(first, centre - 0.4 * width), last - width)
+    window = (low, low + width)
+    state = right.model.states[row]
+    points = tuple(
+        (at, float(values[row] or 0.0))
+        for t, values in scene.truth.states
+        if values[row] is not None and window[0] <= (at := min(t, right.t_end)) <= window[1]
+    )
+    ends = None if failing is None else max(failing.t_start, failing.t_end)
+    return Example(
+        state.name,
+        state.unit,
+        _line("right", right, row, window),
+        None if failing is None or cell is None else _line(cell.configuration, failing, row, window),
+        points,
+        ends is not None and ends < window[1] - 1e-9 * width,
+    )
+
+
+def _line(name: str, run: Any, row: int, window: tuple[float, float]) -> Line:
+    first, last = sorted((run.t_start, run.t_end))
+    t = np.linspace(max(first, window[0]), min(last, window[1]), POINTS)
+    events = np.array([e.t for e in run.events if e.kind != "near-grazing" and window[0] <= e.t <= window[1]])
+    return Line(name, t, np.atleast_2d(run(t))[row], events)

@@ -1,0 +1,92 @@
+"""Scenes of unilateral contacts with restitution: infinitely many bounces, two blows at once, a table that throws."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.testing.checks import equals
+from hybridsim.testing.facts import TRUTHS
+from hybridsim.testing.scene import END, Scene, Truth, needs
+
+G, E, H0 = 10.0, 0.5, 1.25  # of bounce.toml and bar.toml: a fall of half a second, and 5 m/s at its end
+FALL = math.sqrt(2 * H0 / G)
+REST = FALL * (1 + E) / (1 - E)
+
+
+def scenes() -> tuple[Scene, ...]:
+    """All of them."""
+    return _bounce(), _bar(), _table()
+
+
+def _height(t: float) -> tuple[float, float]:
+    """Height and speed of the bouncing ball before it rests."""
+    if t < FALL:
+        return H0 - G * t**2 / 2, -G * t
+    began, speed = FALL, E * G * FALL
+    while began + 2 * speed / G <= t:
+        began, speed = began + 2 * speed / G, E * speed
+    return speed * (t - began) - G * (t - began) ** 2 / 2, speed - G * (t - began)
+
+
+def closes(*names: str) -> Any:
+    """The contacts close once and for good where the bounces accumulate."""
+
+    def check(solution: Any) -> list[str]:
+        wrong = []
+        for name in names:
+            closed = [e.t for e in solution.events if e.component == name and e.target == "closed"]
+            if len(closed) != 1 or abs(closed[0] - REST) > 1e-6:
+                wrong.append(f"{name} closes at {closed}, not once at {REST!r}")
+        return wrong
+
+    return check
+
+
+def _bounce() -> Scene:
+    """Flights of E**n seconds from 0.5 on: rest at 1.5."""
+    states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
+    checks = (("", closes("p")), ("", equals(2.0, h=0.0, w=0.0)))
+    return Scene(
+        "bounce",
+        "bounce",
+        (0.0, 2.0),
+        Truth(None, states, checks=checks),
+        needs("impacts", "accumulation"),
+        speed=5.0,
+        tol_x=1e-9,
+    )
+
+
+def _bar() -> Scene:
+    """Struck at both ends at once the bar keeps level, and bounces as a ball does."""
+    heights = ((t, _height(t)) for t in (0.3, 0.8, 1.1))
+    states = (*((t, (h, h, w, w)) for t, (h, w) in heights), (END, (0.0,) * 4))
+    checks = (("", closes("p", "q")), ("", equals(2.0, a=0.0, b=0.0, va=0.0, vb=0.0)))
+    return Scene(
+        "bar-on-two-supports",
+        "bar",
+        (0.0, 2.0),
+        Truth(None, states, checks=checks),
+        needs("impacts", "accumulation"),
+        speed=5.0,
+        tol_x=1e-9,
+    )
+
+
+def _table() -> Scene:
+    """Thrown, bouncing, at rest, thrown again: the flights after each throw are known, and the first landings."""
+    truth = TRUTHS["vibrating-table"]
+    end = 0.25  # a rest and a throw; later periods are the same
+    states = tuple((float(row[0]), tuple(row[1:])) for row in truth["states"] if row[0] < end)
+    period = math.pi / 20
+    return Scene(
+        "vibrating-table",
+        "vibrating-table",
+        (0.0, end),
+        Truth(None, states),
+        needs("impacts", "accumulation"),
+        unit=period,
+        speed=0.4,
+        tol_x=1e-8,
+    )

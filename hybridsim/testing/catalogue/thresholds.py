@@ -1,0 +1,108 @@
+"""Scenes of stick at its limits: forces that hardly exceed it, loads that fade, speeds that are small, many stops."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from hybridsim.testing.catalogue.oscillators import STUCK, at, closed_form, events, states
+from hybridsim.testing.checks import exact_stick, no_transition
+from hybridsim.testing.facts import recomputed
+from hybridsim.testing.scene import Scene, Truth, needs
+
+STICK = needs("contacts", "exact-stick")
+
+
+def scenes() -> tuple[Scene, ...]:
+    """All of them."""
+    return _micro_slip(), _fading(), _many_stops(), _half(), _small(), _resting()
+
+
+def _swing(name: str, periods: float, **changes: Any) -> Scene:
+    """An oscillator from rest over some periods of its force, from the closed form."""
+    p = {"m": 1.0, "c": 0.0, "k": 1.0, "Fs": 0.3, "Fk": 0.3, "F0": 1.0, "w": 1.0, **changes}
+    unit = 2 * math.pi / p["w"]
+    span = (0.0, periods * unit)
+    motion = closed_form(p).motion(0.0, 0.0, span)
+    samples = states(motion, span, 40)
+    return Scene(
+        name,
+        "oscillator",
+        span,
+        Truth(events(motion), (*samples, (span[1], at(motion, span[1]))), checks=STUCK),
+        STICK,
+        params=p,
+        unit=unit,
+        start_is_event=False,
+        speed=max(abs(row[1] or 0.0) for _, row in samples),
+    )
+
+
+def _micro_slip() -> Scene:
+    """The force exceeds the limit by a ten-thousandth: slips of 1e-7 in a hundredth of a period."""
+    found, samples = recomputed("micro-slip")
+    return Scene(
+        "micro-slip",
+        "oscillator",
+        (0.0, 40.0),
+        Truth(found, samples, checks=STUCK),
+        STICK | {"multiple-roots"},  # between release and the peak of the force there is little time
+        params={"m": 1, "c": 0, "k": 1, "Fs": 1, "Fk": 1, "F0": 1 + 1e-4, "w": 0.5},
+        unit=4 * math.pi,
+        start_is_event=False,
+        speed=1e-6,
+        tol_x=1e-7,
+        floor=1e-8,  # a rounding of the forces is 1e-9 of a slip
+        tolerances=(1e-8, 1e-10, 1e-12),  # a slip is 1e-7 of the force over the stiffness
+    )
+
+
+def _fading() -> Scene:
+    """The limit 2 (1 - t/10) comes down to the push of 1 at t = 5; then v' = (t - 5)/5."""
+    samples = tuple((t, ((t - 5) ** 3 / 30, (t - 5) ** 2 / 10)) for t in (5.5, 7.0, 9.0))
+    checks = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
+    return Scene(
+        "fading-load",
+        "fading-load",
+        (0.0, 9.0),
+        Truth(((5.0, "f:slip+"),), ((3.0, (0.0, 0.0)), *samples), checks=checks),
+        STICK,
+        unit=9.0,
+        start_is_event=False,
+        speed=1.0,
+    )
+
+
+def _many_stops() -> Scene:
+    """Pulled slowly, it moves in jerks: many stops in each period."""
+    return _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
+
+
+def _half() -> Scene:
+    """Driven at half its frequency and undamped."""
+    swing = _swing("half-frequency", 10, w=0.5)
+    return replace(swing, floor=1e-9)  # undamped: the errors of ten periods add up
+
+
+def _small() -> Scene:
+    """All forces are a thousandth: so are the speeds, of the order of the published zero-velocity interval."""
+    return _swing("small-speeds", 10, F0=1e-3, Fs=3e-4, Fk=3e-4, w=0.75, c=0.1)
+
+
+def _resting() -> Scene:
+    """A spring pulls with half of the limit: nothing may move."""
+    samples = tuple((t, (0.5, 0.0)) for t in (1.0, 30.0, 100.0))
+    return Scene(
+        "resting-load",
+        "oscillator",
+        (0.0, 100.0),
+        Truth((), samples, checks=(("", no_transition), *STUCK)),
+        STICK,
+        params={"F0": 0},
+        start={"x": 0.5},
+        unit=2 * math.pi,
+        start_is_event=False,
+        tol_x=1e-12,
+        floor=1e-12,
+    )

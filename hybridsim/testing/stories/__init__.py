@@ -1,0 +1,30 @@
+"""What is told of the package's scenes: title, cause and a paragraph, from one file for each class of trouble."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hybridsim.testing.scene import TROUBLES, Scene
+
+HERE = Path(__file__).parent
+
+
+def read() -> dict[str, dict[str, Any]]:
+    """Scene -> trouble, title, cause, story."""
+    found: dict[str, dict[str, Any]] = {}
+    for trouble in TROUBLES:
+        for name, told in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
+            if name in found:
+                raise ValueError(f"{trouble}.toml tells of {name}, and so does {found[name]['trouble']}.toml")
+            found[name] = {"trouble": trouble, **told}
+    return found
+
+
+def with_stories(scenes: tuple[Scene, ...]) -> tuple[Scene, ...]:
+    """The scenes with what is told of them, in the order of the classes."""
+    told = read()
+    known = [replace(scene, **told[scene.name]) if scene.name in told else scene for scene in scenes]
+    return tuple(sorted(known, key=lambda scene: list(TROUBLES).index(scene.trouble or "events")))
