@@ -23,8 +23,10 @@ The truth of each is a closed form, or 30 digits and more from a computation tha
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
 A method is *right* in a scene when every event is found, in the right mode and order, none is invented, what is held is
-exact, and the errors fall with the tolerance (1e-6, 1e-9, 1e-12) or, for fixed steps, with the step (a 300th, a 1200th
-and a 4800th of the scene's own time). Everything is run, also where an integrator says what it lacks.
+exact at every setting, and the errors come down to the scene's tolerance with rtol (1e-6, 1e-9, 1e-12) or, for fixed
+steps, with the step (a 300th, a 1200th and a 4800th of the scene's own time). Everything is run, also where an
+integrator says what it lacks; what fails there fails for the reason that it gives. The figure behind a name is the
+larger error of event times and states at the last setting, and the order in the step that the last two show.
 """
 
 

@@ -7,7 +7,7 @@ import re
 
 from hybridsim.errors import HybridsimError
 from hybridsim.testing.judge import Measured
-from hybridsim.testing.study import Endless, Setting, Study, judge_errors
+from hybridsim.testing.study import Endless, Setting, Study, judge_errors, within
 
 RIGHT = "right"
 WRONG_ANSWER = "wrong answer"
@@ -16,7 +16,7 @@ HANG = "hang (bounded)"
 REFUSED = "refused"
 NOT_RUN = "not run"
 VERDICTS = {
-    RIGHT: "every event found and none invented, and errors that fall with the tolerance or the step",
+    RIGHT: "every event found and none invented, and at the tightest setting errors within the scene's tolerance",
     WRONG_ANSWER: "the run ends as if all were well, and its numbers are wrong or do not become right",
     WRONG_SEQUENCE: "an event missed, invented or out of order, or a mode that is not the motion's",
     HANG: "no end within the time or the steps that a run may take",
@@ -38,6 +38,8 @@ def verdict(study: Study) -> tuple[str, str]:
             return HANG, f"{text}: {error}"
         name = "" if isinstance(error, HybridsimError) else f"{type(error).__name__}: "
         return REFUSED, f"{text}: {name}{one_line(str(error))}"
+    if within(study.done[-1][1], study.tolerances):
+        return RIGHT, ""
     faults = judge_errors(study.done, study.tolerances)
     return (WRONG_ANSWER, faults[-1]) if faults else (RIGHT, "")
 

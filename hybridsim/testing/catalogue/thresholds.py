@@ -76,7 +76,8 @@ def _fading() -> Scene:
 
 def _many_stops() -> Scene:
     """Pulled slowly, it moves in jerks: many stops in each period."""
-    return _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
+    swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
+    return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short beside the period
 
 
 def _half() -> Scene:
