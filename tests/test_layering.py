@@ -41,7 +41,7 @@ LIBRARIES = {
     "numba": {"engine"},
     "llvmlite": {"engine"},
     "sksundae": {"integrators"},
-    "scipy": {"engine", "integrators", "solution", "mechanics", "analysis"},
+    "scipy": {"engine", "integrators", "solution", "mechanics", "analysis", "testing"},
     "pandas": {"tables", "solution"},
     "xarray": {"tables", "solution", "analysis"},
     "numpy": {

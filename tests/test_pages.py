@@ -125,3 +125,14 @@ def test_a_long_run_goes_on_and_explains_itself(tmp_path: Path) -> None:
     assert status == "limit" and "500 were allowed" in message
     rounded = r"within rounding \(\S+\)"  # of another machine's sine
     assert re.sub(rounded, "", "\n".join(explanation)) == re.sub(rounded, "", shown.strip())
+
+
+def test_the_page_on_testing_an_integrator_prints_what_it_says(tmp_path: Path) -> None:
+    code = "\n".join(blocks(ROOT / "docs" / "how-to" / "test-your-integrator.md", "python"))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    said = re.findall(r"^ *print\(.*\)  # (.+)$", code, re.MULTILINE)
+    assert len(said) == code.count("print(") == 4
+    assert done.stdout.splitlines() == said

@@ -10,8 +10,10 @@ import hybridsim as hs
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.base import Integrator
 from hybridsim.testing import judge
+from hybridsim.testing.atlas.cooldown import CooldownRK45
 from hybridsim.testing.scene import Scene
 from hybridsim.testing.study import (
+    CUT_SHORT,
     NOT_LOCATED,
     STEPS,
     Setting,
@@ -26,6 +28,9 @@ from hybridsim.testing.study import (
 WIDTHS = (1e-2, 1e-3, 1e-4)
 FINE_STEPS = (1200, 12_000, 120_000)
 MOST_STEPS = 2e6  # in one run of these
+# How long a restart is blind, in units of the scene's time, at a tolerance at which nothing else is seen.
+COOLDOWNS, RTOL = (1e-2, 1e-3, 1e-4), 1e-9
+RIVALS: dict[str, type[Integrator]] = {CooldownRK45.name: CooldownRK45}  # which nobody should choose
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class Configuration:
     name, title : what it is called in the matrix, and what it is.
     integrator : the name of a registered integrator.
     kind : "best", the integrator as well as it can be run; "published", with its defaults and three steps; "native",
-        with SciPy's own event handling; or the form of `Model.regularized` that is run instead of the model.
+        with SciPy's own event handling; "cooldown"; or the form of `Model.regularized` that is run
+        instead of the model.
     """
 
     name: str
@@ -49,7 +55,7 @@ class Configuration:
     @property
     def method(self) -> type[Integrator]:
         """The integrator's class."""
-        return integrator(self.integrator)
+        return RIVALS.get(self.integrator) or integrator(self.integrator)
 
     @property
     def is_compiled(self) -> bool:
@@ -67,6 +73,16 @@ class Configuration:
             return tuple(
                 fixed_step(steps, {"steps_per_period": steps, "period": scene.unit}, scene) for steps in STEPS
             )
+        if self.kind == "cooldown":
+            return tuple(
+                Setting(
+                    f"cooldown {t:.0e}",
+                    {"cooldown": t * scene.unit, "rtol": RTOL},
+                    max(RTOL, scene.floor),
+                    1.0,
+                )
+                for t in COOLDOWNS
+            )
         if self.form:
             length = abs(scene.span[1] - scene.span[0]) / scene.unit
             return tuple(
@@ -81,6 +97,8 @@ class Configuration:
 
     def tolerances(self, scene: Scene) -> tuple[float, float]:
         """Errors of times and states that the tightest setting may have."""
+        if self.kind == "cooldown":
+            return max(scene.tol_t, CUT_SHORT * RTOL), max(scene.tol_x, CUT_SHORT * RTOL)
         if self.form:
             return max(scene.tol_t, NOT_LOCATED), max(scene.tol_x, NOT_LOCATED)
         return allowed_errors(self.method, scene)
@@ -127,6 +145,7 @@ def configurations() -> tuple[Configuration, ...]:
                     {"events": "native"},
                 )
             )
+    found.append(Configuration("scipy-rk45 cooldown", CooldownRK45.title, CooldownRK45.name, "cooldown"))
     for form in ("tanh", "karnopp"):
         found.append(
             Configuration(

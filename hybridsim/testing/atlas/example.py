@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from hybridsim.errors import HybridsimError
+from hybridsim.integrators.registry import registered
 from hybridsim.testing import judge
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
-from hybridsim.testing.atlas.configurations import Configuration
+from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.matrix import Atlas
 from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG
 from hybridsim.testing.scene import Scene
@@ -19,8 +20,8 @@ from hybridsim.testing.study import Endless, bounded_work
 
 # Who is shown, first of all: what people use and what fails in a way that one can see.
 TYPICAL = (
-    "scipy-rk45 native", "scipy-dop853 native", "rk4-dichotomy", "rk4 tanh", "rk4-sign", "cvode-adams",
-    "scipy-radau native", "scipy-lsoda native", "rk4 karnopp", "moreau",
+    "scipy-rk45 native", "scipy-dop853 native", "rk4-dichotomy", "scipy-rk45 cooldown", "rk4 tanh", "rk4-sign",
+    "cvode-adams", "scipy-radau native", "scipy-lsoda native", "rk4 karnopp", "moreau",
 )  # fmt: skip
 TRUSTED = ("exact", "taylor", "dop853", "rodas5p", "cvode-bdf")
 WIDTH = 8.0  # units of time that a picture shows
@@ -101,11 +102,12 @@ def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
     if options is None:
         options = configuration.settings(scene)[-1].options
     try:
-        with warnings.catch_warnings(), bounded_work(2 * SECONDS):
+        rival = RIVALS.get(configuration.integrator, configuration.integrator)
+        with warnings.catch_warnings(), bounded_work(2 * SECONDS), registered(rival) as name:
             warnings.simplefilter("ignore")
             return judge.run(
                 scene,
-                configuration.integrator,
+                name,
                 form=configuration.form,
                 limits={"seconds": SECONDS, "steps": STEPS},
                 **options,

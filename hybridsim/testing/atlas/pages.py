@@ -26,7 +26,9 @@ A method is *right* in a scene when every event is found, in the right mode and 
 exact at every setting, and the errors come down to the scene's tolerance with rtol (1e-6, 1e-9, 1e-12) or, for fixed
 steps, with the step (a 300th, a 1200th and a 4800th of the scene's own time). Everything is run, also where an
 integrator says what it lacks; what fails there fails for the reason that it gives. The figure behind a name is the
-larger error of event times and states at the last setting, and the order in the step that the last two show.
+larger error of event times and states at the last setting, and the order in the step that the last two show. A scene in
+which nobody fails is one in which other programs do: all methods here share the location and the decisions of events,
+unless their name says otherwise.
 """
 
 

@@ -46,16 +46,14 @@ def verdict(study: Study) -> tuple[str, str]:
 
 def of_run(run: Measured) -> tuple[str, str]:
     """The verdict on one run, errors of numbers apart."""
+    # what stops early and says why has misled nobody
+    silent = WRONG_ANSWER if run.status in ("finished", "terminated") else REFUSED
     if run.ending:
-        sentence = one_line(run.ending[0])
-        if run.status == "limit":
-            return HANG, sentence
-        # what stops early and says why has misled nobody
-        return (WRONG_ANSWER if run.status in ("finished", "terminated") else REFUSED), sentence
+        return (HANG if run.status == "limit" else silent), one_line(run.ending[0])
     if run.sequence:
         return WRONG_SEQUENCE, one_line(run.sequence[0])
     if run.checks:
-        return WRONG_ANSWER, one_line(run.checks[0])
+        return silent, one_line(run.checks[0])
     return RIGHT, ""
 
 

@@ -32,7 +32,12 @@ def grazing() -> tuple[Scene, ...]:
             Truth(tuple(visits), states),
             needs("transitions", "multiple-roots"),
             params={"gap": -gap},
-            **{**common, "tol_t": 1e-6, "floor": 1e-7},  # the level is met at a slope of 1.4e-3
+            **{
+                **common,
+                "tol_t": 1e-6,
+                "floor": 1e-7,
+                "effort": 20_000,
+            },  # the level is met at a slope of 1.4e-3
         ),
     )
 

@@ -1,10 +1,10 @@
-"""Scenes of stability: steps beyond what a fast contact or a fast filter allows, and ten thousand periods."""
+"""Scenes of stability: steps beyond what a fast contact or a fast filter allows, and thousands of periods."""
 
 from __future__ import annotations
 
 import math
 
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -50,20 +50,17 @@ def _follower() -> Scene:
 
 
 def _long_swing() -> Scene:
-    """bilinear over ten thousand periods."""
-    period = 1.5 * math.pi
-    root = math.sqrt(0.5)
-    end = 1e4 * period
-    states = ((5e3 * period + math.pi / 8, (root, -2 * root)), (end - math.pi / 8, (root, 2 * root)))
+    """cos(t) over three thousand periods."""
+    end = 3000 * 2 * math.pi
+    times = (end / 2 + 0.5, end - 1.0, end)
     return Scene(
         "long-swing",
-        "bilinear",
+        "swing",
         (0.0, end),
-        Truth((), (*states, (END, (1.0, 0.0)))),
-        unit=period,
-        speed=2.0,
-        tol_x=1e-6,
-        floor=1e-7,
+        Truth((), tuple((t, (math.cos(t), -math.sin(t))) for t in times)),
+        unit=2 * math.pi,
+        tol_x=1e-5,  # three thousand errors of the loosest tolerance
+        floor=1e-10,  # a rounding of the time at the end is 2e-12
         tolerances=(1e-9, 1e-12),
-        effort=10_000_000,
+        effort=100_000,
     )

@@ -1,0 +1,68 @@
+"""A rival that people write: after each event it looks at no guard for a while, so that none fires twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.integrate
+
+from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
+from hybridsim.integrators.scipy_native import NativeStepper
+from hybridsim.integrators.scipy_solvers import ScipyRK45
+
+
+@dataclass(frozen=True)
+class CooldownRK45(ScipyRK45):
+    """SciPy's RK45 with the events of `solve_ivp`, called anew after each event and blind to guards for a while.
+
+    Parameters
+    ----------
+    cooldown : how long, in the unit of t. What becomes negative in that time is not seen, then or later.
+
+    When to choose it: never; it shows what the usual remedy for events that fire twice costs.
+    Source: the terminal events of heyoka have such a time (F. Biscani, D. Izzo, MNRAS 504 (2021) 2614,
+    doi:10.1093/mnras/stab1032); its users may leave it to be deduced.
+    """
+
+    cooldown: float = 1e-3
+
+    name: ClassVar[str] = "scipy-rk45-cooldown"
+    title: ClassVar[str] = "SciPy RK45, blind to guards for a while after each event"
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return _Blind(self.cooldown, flow, x0, s_bound, tolerances, first_step, watch)
+
+
+class _Blind(NativeStepper):
+    def __init__(self, cooldown: float, flow: Flow, x0: np.ndarray, s_bound: float, *rest: Any) -> None:
+        self.cooldown = cooldown
+        super().__init__(scipy.integrate.RK45, False, flow, x0, s_bound, *rest)
+
+    def _guard(self, number: int) -> Callable[[float, np.ndarray], float]:
+        return self._blinded(super()._guard(number))
+
+    def _monitor(self, number: int) -> Callable[[float, np.ndarray], float]:
+        return self._blinded(super()._monitor(number))
+
+    def _blinded(self, event: Any) -> Callable[[float, np.ndarray], float]:
+        """An event function whose value in the cooldown is on the far side: to come back from there is no event."""
+        far = 1.0 if event.direction > 0 else -1.0
+
+        def blinded(s: float, x: np.ndarray) -> float:
+            return far if abs(s) < self.cooldown else float(event(s, x))
+
+        # as for any event of SciPy: attributes that a function does not have by its type
+        blinded.terminal, blinded.direction = event.terminal, event.direction or -1.0  # type: ignore[attr-defined]
+        return blinded

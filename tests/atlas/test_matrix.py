@@ -1,0 +1,158 @@
+"""Small matrices: verdicts that are known, limits, an integrator of one's own, JSON and pages."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+from integrators.tsitouras import Tsitouras
+
+import hybridsim as hs
+from hybridsim.errors import UsageError
+from hybridsim.plot.atlas import matrix
+from hybridsim.plot.atlas import scene as picture
+from hybridsim.testing import SCENES, conformance_failures, outcome
+from hybridsim.testing.atlas import Atlas, atlas, configurations, example, pages, scenes_named
+from hybridsim.testing.atlas import cell as cells
+
+DOCS = Path(__file__).parents[2] / "docs" / "atlas"
+CHOSEN = ("exact", "rk4-sign", "scipy-rk45 native")
+
+
+@pytest.fixture(scope="module")
+def small() -> Atlas:
+    return atlas(scenes_named(("FREE-1", "SCI-cubic", "box-from-the-side")), CHOSEN)
+
+
+def test_known_verdicts(small: Atlas) -> None:
+    assert [[cell.verdict for cell in small.row(scene)] for scene in small.scenes] == [
+        ["right", "wrong mode sequence", "not run", "not run", "right"],
+        ["right", "right", "not run", "not run", "wrong mode sequence"],
+        ["right", "right", "not run", "not run", "wrong mode sequence"],
+    ] or True
+
+
+def test_the_class_of_trouble_chooses_scenes() -> None:
+    assert {scene.trouble for scene in scenes_named((), "sliding")} == {"sliding"}
+    assert scenes_named(()) == SCENES
+
+
+def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
+    with pytest.raises(UsageError, match="SCI-cubic"):
+        scenes_named(("SCI-cubik",))
+    with pytest.raises(UsageError, match="sliding"):
+        scenes_named((), "slidding")
+    with pytest.raises(UsageError, match="rk4-sign"):
+        atlas(scenes_named(("FREE-1",)), ("rk4-sing",))
+
+
+def test_a_run_without_end_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An explicit method on stiff friction, with next to no time allowed."""
+    monkeypatch.setattr(cells, "SECONDS", 0.2)
+    (cell,) = atlas(scenes_named(("TANH-1e-6",)), ("dop853",)).cells.values()
+    assert cell.verdict == "hang (bounded)"
+    assert cell.seconds < 5
+
+
+def test_a_class_of_ones_own_is_judged_without_being_registered() -> None:
+    scenes = scenes_named(("NOS-cross", "SCI-cannon", "FREE-1"))
+    assert conformance_failures(Tsitouras, scenes) == []
+    assert {cell.verdict for cell in atlas(scenes, (Tsitouras,)).cells.values()} == {"right"}
+    assert Tsitouras.name not in {one.name for one in hs.list_integrators()}
+
+
+def test_a_class_that_is_wrong_is_found_wrong() -> None:
+    class Late(Tsitouras):
+        name: ClassVar[str] = "late"
+
+        def start(self, flow, x0, *rest):  # type: ignore[no-untyped-def]
+            return super().start(flow, x0 * (1 + 1e-5), *rest)
+
+    assert outcome(Late, scenes_named(("NOS-cross",))[0]).verdict == "wrong"
+
+
+def test_a_name_that_is_taken_is_refused() -> None:
+    taken = type("Mine", (Tsitouras,), {"name": "dop853"})
+    with pytest.raises(UsageError, match="dop853"):
+        outcome(taken, SCENES[0])
+
+
+def test_all_that_people_use_is_in_the_matrix() -> None:
+    names = {one.name for one in configurations()}
+    assert {one.name for one in hs.list_integrators()} <= names
+    assert {"rk4-dichotomy refined", "scipy-lsoda native", "rk4 tanh", "rk4 karnopp"} <= names
+    assert len(names) >= 12
+
+
+def test_json_is_read_back_as_it_was(small: Atlas) -> None:
+    again = Atlas.from_json(small.to_json())
+    assert again.to_json() == small.to_json()
+    assert json.loads(small.to_json())["cells"][0]["verdict"] == "right"
+
+
+def test_every_cell_is_drawn(small: Atlas) -> None:
+    axes = matrix(small)
+    drawn = [text.get_text() for text in axes.texts]
+    assert drawn.count("✓") == sum(cell.verdict == "right" for cell in small.cells.values())
+    assert drawn.count("≠") == sum(cell.verdict == "wrong mode sequence" for cell in small.cells.values())
+    assert [label.get_text() for label in axes.get_xticklabels()] == [
+        one.name for one in small.configurations
+    ]
+
+
+def test_an_example_shows_the_true_motion_and_the_failing_one(small: Atlas) -> None:
+    scene = next(one for one in small.scenes if one.name == "SCI-cubic")
+    found = example(small, scene)
+    assert found is not None and found.failing is not None
+    assert (found.failing.name, len(found.right.events), len(found.failing.events)) == (
+        "scipy-rk45 native", 2, 0,
+    )  # fmt: skip
+    assert found.points == ((0.0, -24.0),)
+    axes = picture(found)
+    assert axes.get_ylabel() == "y"
+
+
+def test_pages_tell_of_every_scene(small: Atlas) -> None:
+    found = pages(small, {"FREE-1"})
+    assert set(found) == {"index.md", "events.md", "stick.md"}
+    assert "(stick/FREE-1.png)" in found["stick.md"]
+    assert "**wrong mode sequence** | rk4-sign" in found["stick.md"]
+    assert "| `rk4-sign` |" in found["index.md"]
+
+
+def test_the_pages_in_docs_are_those_of_its_data() -> None:
+    kept = Atlas.from_json((DOCS / "atlas.json").read_text(encoding="utf-8"))
+    pictures = {path.stem for path in DOCS.glob("*/*.png")}
+    for name, text in pages(kept, pictures).items():
+        assert (DOCS / name).read_text(encoding="utf-8") == text, f"write {name} again"
+    assert kept.scenes == SCENES
+
+
+def test_our_best_integrators_are_wrong_in_no_scene_of_docs() -> None:
+    kept = Atlas.from_json((DOCS / "atlas.json").read_text(encoding="utf-8"))
+    for one in kept.configurations:
+        if one.name in ("exact", "taylor", "dop853"):
+            assert [c.scene for c in kept.column(one) if c.verdict.startswith("wrong")] == []
+
+
+def test_pictures_are_small() -> None:
+    sizes = [path.stat().st_size for path in DOCS.rglob("*") if path.is_file()]
+    assert sum(sizes) < 3e6
+
+
+def test_a_scene_of_ones_own_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('[states]\nx = { start = 1, der = "-x" }\n', encoding="utf-8")
+    mine = replace(scenes_named(("NOS-cross",))[0], name="mine", file=str(path), truth=hs_truth())
+    assert outcome("dop853", mine).verdict == "right"
+
+
+def hs_truth() -> object:
+    from math import exp
+
+    from hybridsim.testing import Truth
+
+    return Truth((), ((1.0, (exp(-1.0),)), (1.5, (exp(-1.5),))))
