@@ -22,9 +22,9 @@ from hybridsim.testing.suite import Outcome, outcome
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conformance.md"
 INTRODUCTION = """# What each integrator gets right
 
-Every integrator runs every scene of `tests/conformance` whose answer is known: a closed form, or 32 digits from a
-Taylor series that shares no code with the package. This page is written by `python -m conformance.table` in
-`tests/`.
+Every integrator runs scenes of `hybridsim.testing` whose answer is known: a closed form, or 30 digits and more from a
+computation that shares no code with the package. [The atlas](../atlas/index.md) tells of each of them. This page is
+written by `python -m conformance.table` in `tests/`.
 
 A scene is *right* when every event is found, in the right mode and order, none is invented, what is held is exact
 bit for bit, and the errors fall with the tolerance (1e-6, 1e-9, 1e-12; a study is cut short where runs get long) or,

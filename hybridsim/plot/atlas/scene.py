@@ -56,12 +56,23 @@ def scene(example: Example) -> Axes:
     axes.set_ylim(low - margin, high + margin)
     axes.set_ylabel(style.literal(f"{example.state} [{example.unit}]" if example.unit else example.state))
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=8, borderaxespad=0.2
+        loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize=8, borderaxespad=0.2
     )
     for line, bottom, colour in ((right, 0.55, _RIGHT), (failing, 0.05, _WRONG)):
         if line is not None and line.events.size:
             times = line.events[:: -(-line.events.size // _MOST)]
             strip.vlines(times, bottom, bottom + 0.4, color=colour, linewidth=1.1)
+        if line is not None:
+            where = strip.get_yaxis_transform()
+            strip.text(
+                1.01,
+                bottom + 0.2,
+                str(line.events.size),
+                color=colour,
+                fontsize=7,
+                va="center",
+                transform=where,
+            )
     strip.set_ylim(0, 1)
     strip.set_yticks([])
     strip.set_ylabel("events", rotation=0, ha="right", va="center", fontsize=8)

@@ -15,7 +15,7 @@ from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.matrix import Atlas
 from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG
-from hybridsim.testing.scene import Scene
+from hybridsim.testing.scene import END, Scene
 from hybridsim.testing.study import Endless, bounded_work
 
 # Who is shown, first of all: what people use and what fails in a way that one can see.
@@ -26,6 +26,7 @@ TYPICAL = (
 TRUSTED = ("exact", "taylor", "dop853", "rodas5p", "cvode-bdf")
 WIDTH = 8.0  # units of time that a picture shows
 POINTS = 1500
+CROWD, SOME = 100, 20  # more events than so many are a crowd, of which some are shown
 
 
 @dataclass(frozen=True)
@@ -132,14 +133,15 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
         row = int(off.max(axis=1).argmax()) if off.max() > 1e-6 else 0
         seen = off[row] > 0.3 * off[row].max()
         centre = float(t[seen.argmax()]) if seen.any() and off.max() > 0 else first
-    width = min(WIDTH * scene.unit, last - first)
-    low = min(max(first, centre - 0.4 * width), last - width)
-    window = (low, low + width)
+    window = _window(first, last, centre, min(WIDTH * scene.unit, last - first))
+    inside = _events(right, window)
+    if len(inside) > CROWD:  # as much as shows single events
+        window = _window(first, last, centre, (window[1] - window[0]) * SOME / len(inside))
     state = right.model.states[row]
     points = tuple(
         (at, float(values[row] or 0.0))
         for t, values in scene.truth.states
-        if values[row] is not None and window[0] <= (at := min(t, right.t_end)) <= window[1]
+        if values[row] is not None and window[0] <= (at := right.t_end if t == END else t) <= window[1]
     )
     ends = None if failing is None else max(failing.t_start, failing.t_end)
     return Example(
@@ -148,12 +150,22 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
         _line("right", right, row, window),
         None if failing is None or cell is None else _line(cell.configuration, failing, row, window),
         points,
-        ends is not None and ends < window[1] - 1e-9 * width,
+        ends is not None and ends < window[1] - 1e-9 * (window[1] - window[0]),
     )
+
+
+def _window(first: float, last: float, centre: float, width: float) -> tuple[float, float]:
+    """A window of this width with the centre in it, inside of the run."""
+    low = min(max(first, centre - 0.4 * width), last - width)
+    return low, low + width
+
+
+def _events(run: Any, window: tuple[float, float]) -> np.ndarray:
+    """Times of the events in a window; what only nearly happened is none."""
+    return np.array([e.t for e in run.events if e.kind != "near-grazing" and window[0] <= e.t <= window[1]])
 
 
 def _line(name: str, run: Any, row: int, window: tuple[float, float]) -> Line:
     first, last = sorted((run.t_start, run.t_end))
     t = np.linspace(max(first, window[0]), min(last, window[1]), POINTS)
-    events = np.array([e.t for e in run.events if e.kind != "near-grazing" and window[0] <= e.t <= window[1]])
-    return Line(name, t, np.atleast_2d(run(t))[row], events)
+    return Line(name, t, np.atleast_2d(run(t))[row], _events(run, window))
