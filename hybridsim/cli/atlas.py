@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas import Atlas
 
 _FOLDER = Path("atlas")
-_DPI = 100.0  # of the small pictures, of which there are many
+_MATRIX_DPI = 130.0  # its letters are small
 
 
 def add_to(commands: Any) -> None:
@@ -78,14 +78,13 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
-    from hybridsim.plot import save
-    from hybridsim.plot.atlas import matrix
+    from hybridsim.plot.atlas import matrix, save_small
     from hybridsim.testing.atlas import pages
 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "atlas.json").write_text(result.to_json(), encoding="utf-8")
     session.wrote(folder / "atlas.json")
-    save(matrix(result), folder / "matrix.png")
+    save_small(matrix(result), folder / "matrix.png", dpi=_MATRIX_DPI)
     session.wrote(folder / "matrix.png")
     drawn = _pictures(result, folder, progress)
     for name, text in pages(result, drawn).items():
@@ -95,7 +94,7 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
 
 def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
     """Draw the scenes, each in the folder of its class; the names of those that have a picture."""
-    from hybridsim.plot import save
+    from hybridsim.plot.atlas import save_small
     from hybridsim.plot.atlas import scene as picture
     from hybridsim.testing.atlas import example
 
@@ -106,6 +105,6 @@ def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
         if found is not None:
             place = folder / (scene.trouble or "scenes")
             place.mkdir(exist_ok=True)
-            save(picture(found), place / f"{scene.name}.png", dpi=_DPI)
+            save_small(picture(found), place / f"{scene.name}.png")
             drawn.add(scene.name)
     return drawn

@@ -42,7 +42,7 @@ def test_a_small_matrix_fills_its_folder(hybridsim: Callable[..., Outcome], tmp_
     cells = {(cell["scene"], cell["configuration"]): cell for cell in json.loads(outcome.out)["cells"]}
     assert cells["FREE-1", "exact"]["verdict"] == "right"
     assert cells["box-from-the-side", "scipy-rk45 native"]["verdict"] == "wrong mode sequence"
-    assert cells["box-from-the-side", "scipy-rk45"]["rows"][0]["steps"] > 0
+    assert cells["box-from-the-side", "scipy-rk45"]["rows"][0][3] > 0
     written = {str(path.relative_to(tmp_path / "atlas")) for path in (tmp_path / "atlas").rglob("*.*")}
     assert written == {
         "atlas.json", "matrix.png", "index.md", "events.md", "stick.md",

@@ -33,13 +33,6 @@ class Row:
     seconds: float
 
 
-NOTHING_KNOWN: dict[str, Any] = {"time_error": math.nan, "state_error": math.nan, "seconds": math.nan}
-
-
-def _known(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in row.items() if value is not None}
-
-
 @dataclass(frozen=True)
 class Cell:
     """The verdict on a configuration in a scene.
@@ -65,14 +58,23 @@ class Cell:
         return error if math.isfinite(error) else None
 
     def to_plain(self) -> dict[str, Any]:
-        """Plain data."""
-        return dataclasses.asdict(self) | {"error": self.error}
+        """Plain data; a row is a list of its values in order."""
+        rows = [dataclasses.astuple(row) for row in self.rows]
+        return dataclasses.asdict(self) | {"rows": rows, "error": self.error}
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Cell:
         """What `to_plain` gave; errors that were no numbers are NaN."""
         known = {name: value for name, value in plain.items() if name not in ("rows", "error")}
-        rows = tuple(Row(**{**NOTHING_KNOWN, **_known(row)}) for row in plain["rows"])
+        rows = tuple(
+            Row(
+                str(setting),
+                *[math.nan if e is None else float(e) for e in errors],
+                int(steps),
+                float(seconds),
+            )
+            for setting, *errors, steps, seconds in plain["rows"]
+        )
         return cls(**known, rows=rows)
 
 
@@ -96,6 +98,8 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
             seen_by(scene, configuration),
             settings,
             tolerances,
+            lacks={"located"}
+            & set(configuration.method.lacks),  # a method of steps is not asked for instants
             seconds=2 * SECONDS,  # for what does not look at its limits
             limits={"seconds": SECONDS, "steps": STEPS},
             form=configuration.form,

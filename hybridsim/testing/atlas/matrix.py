@@ -68,8 +68,7 @@ class Atlas:
         return {
             "limits": {"seconds": SECONDS, "steps": STEPS},
             "scenes": [
-                {"name": s.name, "class": s.trouble, "title": s.title, "cause": s.cause, "story": s.story}
-                for s in self.scenes
+                {"name": s.name, "class": s.trouble, "title": s.title, "cause": s.cause} for s in self.scenes
             ],
             "integrators": [asdict(one) for one in self.configurations],
             "cells": [cell.to_plain() for scene in self.scenes for cell in self.row(scene)],

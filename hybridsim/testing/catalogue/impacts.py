@@ -29,16 +29,31 @@ def _height(t: float) -> tuple[float, float]:
     return speed * (t - began) - G * (t - began) ** 2 / 2, speed - G * (t - began)
 
 
+def closed(name: str, solution: Any) -> list[float]:
+    """When a contact closes."""
+    return [e.t for e in solution.events if e.component == name and e.target == "closed"]
+
+
 def closes(*names: str) -> Any:
-    """The contacts close once and for good where the bounces accumulate."""
+    """The contacts close once, for good."""
 
     def check(solution: Any) -> list[str]:
-        wrong = []
-        for name in names:
-            closed = [e.t for e in solution.events if e.component == name and e.target == "closed"]
-            if len(closed) != 1 or abs(closed[0] - REST) > 1e-6:
-                wrong.append(f"{name} closes at {closed}, not once at {REST!r}")
-        return wrong
+        found = {name: closed(name, solution) for name in names}
+        return [f"{name} closes at {times}, not once" for name, times in found.items() if len(times) != 1]
+
+    return check
+
+
+def rests(*names: str) -> Any:
+    """They close where the series of bounces ends, to the tolerance of the loosest run."""
+
+    def check(solution: Any) -> list[str]:
+        found = {name: closed(name, solution) for name in names}
+        return [
+            f"{name} closes at {times}, not at {REST!r}"
+            for name, times in found.items()
+            if times and abs(times[0] - REST) > 1e-6
+        ]
 
     return check
 
@@ -46,13 +61,13 @@ def closes(*names: str) -> Any:
 def _bounce() -> Scene:
     """Flights of E**n seconds from 0.5 on: rest at 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
-    checks = (("", closes("p")), ("", equals(2.0, h=0.0, w=0.0)))
+    checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
     return Scene(
         "bounce",
         "bounce",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation"),
+        needs("impacts", "accumulation", "located"),  # on a grid, luck decides how late a bounce is
         speed=5.0,
         tol_x=1e-9,
     )
@@ -62,13 +77,17 @@ def _bar() -> Scene:
     """Struck at both ends at once the bar keeps level, and bounces as a ball does."""
     heights = ((t, _height(t)) for t in (0.3, 0.8, 1.1))
     states = (*((t, (h, h, w, w)) for t, (h, w) in heights), (END, (0.0,) * 4))
-    checks = (("", closes("p", "q")), ("", equals(2.0, a=0.0, b=0.0, va=0.0, vb=0.0)))
+    checks = (
+        ("", closes("p", "q")),
+        ("located", rests("p", "q")),
+        ("", equals(2.0, a=0.0, b=0.0, va=0.0, vb=0.0)),
+    )
     return Scene(
         "bar-on-two-supports",
         "bar",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation"),
+        needs("impacts", "accumulation", "located"),  # on a grid, luck decides how late a bounce is
         speed=5.0,
         tol_x=1e-9,
     )

@@ -50,8 +50,8 @@ def _follower() -> Scene:
 
 
 def _long_swing() -> Scene:
-    """cos(t) over three thousand periods."""
-    end = 3000 * 2 * math.pi
+    """cos(t) over two thousand periods."""
+    end = 2000 * 2 * math.pi
     times = (end / 2 + 0.5, end - 1.0, end)
     return Scene(
         "long-swing",
@@ -59,7 +59,7 @@ def _long_swing() -> Scene:
         (0.0, end),
         Truth((), tuple((t, (math.cos(t), -math.sin(t))) for t in times)),
         unit=2 * math.pi,
-        tol_x=1e-5,  # three thousand errors of the loosest tolerance
+        tol_x=1e-5,  # two thousand errors of the loosest tolerance
         floor=1e-10,  # a rounding of the time at the end is 2e-12
         tolerances=(1e-9, 1e-12),
         effort=100_000,
