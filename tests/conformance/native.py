@@ -7,6 +7,7 @@ ENDS = "only step ends"
 BRENT = "Brent's method"
 TWO_VALUES = "two values at a step end"
 NUMBERS = "no number in a trial"
+DENSE = "a zero of the dense output"
 
 MECHANISMS = {
     CLOSED: "the sign test is closed at both ends of a step: what is zero where a run or a restart begins fires at "
@@ -16,6 +17,8 @@ MECHANISMS = {
     BRENT: "its root finder stops with an error after 100 iterations where a zero is of third order",
     TWO_VALUES: "signs are tested on the state at the end of a step and the zero is sought on the dense output, which "
     "differs there by rounding: the root finder stops with an error, finding no change of sign",
+    DENSE: "a zero is found on the dense output, which is less accurate than the steps: errors stay where it leaves "
+    "them",
     NUMBERS: "the step beyond the domain of the model is tried and its Jacobian or its state is no number; the solver "
     "stops or goes astray before the event is looked for",
 }
@@ -33,6 +36,12 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "clock-and-guard-at-once": ("", {"scipy-radau": TWO_VALUES}),
     "sliding-circle": ("", {"scipy-lsoda": CLOSED, "scipy-bdf": CLOSED}),
     "two-relays": (ENDS, {"scipy-rk23": "", "scipy-bdf": ""}),
+    "graze-hit": (ENDS, {"scipy-rk23": ""}),
+    "micro-slip": (ENDS, {}),
+    "many-stops": (ENDS, {}),
+    "grazing-stop": (ENDS, {"scipy-rk23": ""}),
+    "eight-decades": (DENSE, {"scipy-lsoda": ""}),
+    "vibrating-table": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
     "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),
 }
 

@@ -67,13 +67,8 @@ class Cell:
         """What `to_plain` gave; errors that were no numbers are NaN."""
         known = {name: value for name, value in plain.items() if name not in ("rows", "error")}
         rows = tuple(
-            Row(
-                str(setting),
-                *[math.nan if e is None else float(e) for e in errors],
-                int(steps),
-                float(seconds),
-            )
-            for setting, *errors, steps, seconds in plain["rows"]
+            Row(setting, _number(of_times), _number(of_states), steps, seconds)
+            for setting, of_times, of_states, steps, seconds in plain["rows"]
         )
         return cls(**known, rows=rows)
 
@@ -109,6 +104,10 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
     rows = tuple(row(setting.text, run) for setting, run in study.done)
     spent = time.perf_counter() - began
     return Cell(scene.name, configuration.name, found, reason, rows, order(study.done), spent)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def row(setting: str, run: Measured) -> Row:

@@ -67,7 +67,7 @@ def _tanks() -> tuple[Scene, ...]:
             "water-tanks",
             (0.0, 4.4),
             Truth(None, tuple(states), status="accumulation", end=4.0),
-            needs("transitions", "accumulation"),
+            needs("transitions", "accumulation", "adaptive"),  # a fixed step passes the limit
             params={"left": 0.0},
             **common,
         ),

@@ -196,7 +196,7 @@ def _two_relays() -> Scene:
 
 def _chatter() -> Scene:
     """Up with speed 1, down with 1.5, between +-1e-3: a change every 2e-3 and every 4/3e-3."""
-    band, end = 1e-3, 1.0
+    band, end = 1e-3, 0.3
     events, t, up = [], band, True
     while t < end:
         events.append((t, "mode:down" if up else "mode:up"))
@@ -210,7 +210,7 @@ def _chatter() -> Scene:
         frozenset({"transitions", "adaptive"}),  # a fixed step in units of the run passes several changes
         tol_t=1e-9,
         tol_x=1e-9,
-        floor=1e-9,  # the roundings of six hundred events add up
+        floor=1e-9,  # the roundings of all events add up
     )
 
 
