@@ -59,6 +59,8 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
         cells = result.column(one)
         counts = [sum(cell.verdict == verdict for cell in cells) for verdict in (RIGHT, *shown)]
         lines.append(f"| `{one.name}` | {one.title} | {' | '.join(map(str, counts))} |")
+    names = [trouble or "scenes" for trouble in groups]
+    lines += ["", "```{toctree}", ":hidden:", "", *names, "```"]
     return "\n".join(lines) + "\n"
 
 
