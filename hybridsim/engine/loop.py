@@ -11,11 +11,10 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.checkpoint import Checkpoint, stopped_early
-from hybridsim.engine.decide import side_after
 from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import gathered
-from hybridsim.engine.jets import UNIT
 from hybridsim.engine.limits import Gauge, LimitReached
+from hybridsim.engine.located import coincident, situation
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
@@ -272,7 +271,7 @@ class ModeLoop:
         sides = segment.locator.monitor_sides
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
-            outcome = self._settle_located(self._situation(arrival, segment), arrival)
+            outcome = self._settle_located(situation(self.system, arrival, segment), arrival)
             outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
             if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
                 return True
@@ -288,7 +287,7 @@ class ModeLoop:
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
-        fired = self._coincident(at, arrival.fired)
+        fired = coincident(self.system, self.origin, at, arrival.fired)
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
         resets = [("monitor", k) for k in arrival.stopping]
@@ -384,44 +383,6 @@ class ModeLoop:
         self.accumulation.begin_anew()
         self._adopt(self.origin.plus(ahead), found, self.outcome.x, (), ())
         return True
-
-    def _situation(self, arrival: Arrival, segment: SegmentRun) -> Situation:
-        """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
-        system, flow = self.system, segment.flow
-        s_error = 2.0 * math.ulp(arrival.s)
-        zero = np.zeros(system.n)
-        series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-        located = [series.guards[g] for g in arrival.fired] + [series.monitors[k] for k in arrival.stopping]
-        for value, slope, *_ in located:
-            if slope != 0.0 and math.isfinite(value / slope):
-                s_error = max(s_error, abs(value / slope))
-        slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
-        x_error = segment.rounding() + s_error * slopes
-        holding = system.evaluated(flow.z)
-        x_error[holding] = UNIT * np.abs(arrival.x[holding])
-        return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
-
-    def _coincident(self, at: Situation, fired: tuple[int, ...]) -> dict[int, int]:
-        """The located guards and those that are zero with them and leave, with the order of their times."""
-        system = self.system
-        if not fired:
-            return {}
-        series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
-        together: dict[int, float] = {}
-        for g in map(int, np.flatnonzero(system.active(at.z))):
-            value, bound = series.guards[g], series.guard_bounds[g]
-            leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
-            if g in fired or leaves:
-                together[g] = -value[0] / value[1] if value[1] != 0.0 else 0.0
-        # guards within one ulp of the time are at one place of the order
-        ulp = math.ulp(max(abs(float(self.origin.plus(at.s))), math.ulp(1.0)))
-        order: dict[int, int] = {}
-        place, last = -1, -math.inf
-        for g in sorted(together, key=lambda g: together[g]):
-            if together[g] - last > ulp:
-                place, last = place + 1, together[g]
-            order[g] = place
-        return order
 
     def _refuse_backward(self, arrival: Arrival, schedules: tuple[int, ...]) -> str:
         resets = [

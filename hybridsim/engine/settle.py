@@ -23,6 +23,7 @@ from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
 from hybridsim.engine.outcome import Change, Outcome, Situation
+from hybridsim.engine.releases import Releases
 from hybridsim.engine.system import Series, System
 
 # A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
@@ -46,7 +47,6 @@ class Settling:
         # the components that are decided here; a method with rules of its own for surfaces leaves those out
         self.scope = set(range(len(system.automata))) if scope is None else set(scope)
         self.at = at
-        self.before = before  # modes before the event, -1 for what has none yet
         self.forward = forward
         self.fired = np.zeros(system.guard_count, dtype=np.bool_)
         self.on_surface = np.zeros(len(system.automata), dtype=np.bool_)
@@ -55,7 +55,7 @@ class Settling:
         self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
         # guards in the order in which they came to zero
         self.rank: dict[int, int] = {}
-        self.released_by = [-1] * len(system.automata)
+        self.releases = Releases(system, before)
         self.sides = np.ones(system.guard_count, dtype=np.int64)
         self.orders = np.zeros(system.guard_count, dtype=np.int64)
         # the series at hand by modes, and what they are the series at: arrays that are replaced, never written to
@@ -69,7 +69,7 @@ class Settling:
         located = {int(g) for g in fired}
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
         self.fired[list(located)] = True
-        self.released_by = self._release_guards(located)
+        self.releases.locate(located)
         surfaces = self._surface_components()
         open_ = {c for c, _, _ in self._fired_guards()}
         if (self.system.is_corner[list(open_)]).any():
@@ -359,7 +359,7 @@ class Settling:
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
         verdicts = np.array(
-            [self._joint_verdict(c, taking_part, cluster) for c in candidates], dtype=np.int64
+            [self.verdict(self.with_modes(taking_part, c), cluster) for c in candidates], dtype=np.int64
         )
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
@@ -402,9 +402,6 @@ class Settling:
             z[c] = self.system.automata[c].hold
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
-    def _joint_verdict(self, modes: np.ndarray, taking_part: list[int], cluster: tuple[int, ...]) -> int:
-        return self.verdict(self.with_modes(taking_part, modes), cluster)
-
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
         """The modes as they are, but for those of some components."""
         z = self.at.z.copy()
@@ -418,40 +415,14 @@ class Settling:
         return self._judge(z, self.at.x, decreed, components)
 
     def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Whether every change so far leaves all unknowns as they were: releases at the limit without a jump."""
-        if self.jumped:
-            return False
-        is_corner = self.system.is_corner
-        changed = [c for c in components if z[c] != self.before[c] and not is_corner[c]]
-        if not changed:
-            return True
-        jumps = self.system.jumps(self.at.s, self.at.x, self.at.p, z)
-        return all(self._released(c, z) and jumps[c][self._release_side(c, z)] == 0.0 for c in changed)
-
-    def _release_side(self, c: int, z: np.ndarray) -> int:
-        return 0 if z[c] == self.system.automata[c].above else 1
-
-    def _released(self, c: int, z: np.ndarray) -> bool:
-        """Whether c leaves its holding mode through the guard that was located for it."""
-        hold = self.system.automata[c].hold
-        if hold < 0 or self.before[c] != hold or z[c] == hold:
-            return False
-        return self.released_by[c] == self._release_side(c, z)
-
-    def _release_guards(self, located: set[int]) -> list[int]:
-        """For each component held before, the first of its located guards (0 releases above, 1 below), else -1."""
-        result = []
-        for c, automaton in enumerate(self.system.automata):
-            held = automaton.has_surface and self.before[c] == automaton.hold
-            guards = automaton.guards[automaton.hold] if held else ()
-            result.append(next((j for j, g in enumerate(guards) if g in located), -1))
-        return result
+        """Whether every change so far leaves all unknowns as they were."""
+        return not self.jumped and self.releases.leave_unknowns(self.at, z, components)
 
     def _decreed(self, z: np.ndarray, continuous: bool) -> np.ndarray:
         system = self.system
         modes = zip(system.automata, z, strict=True)
         holding = np.array([a.has_surface and m == a.hold for a, m in modes], dtype=np.bool_)
-        released = np.array([self._released(c, z) for c in range(len(z))], dtype=np.bool_)
+        released = np.array([self.releases.has(c, z) for c in range(len(z))], dtype=np.bool_)
         decreed = np.zeros(system.guard_count, dtype=np.int64)
         fired = self.fired & (z == self.at.z)[system.owner]
         decree_orders(
@@ -499,7 +470,7 @@ class Settling:
             np.where(self.orders > 0, series.guard_bounds[:, 0], 0.0),
             np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
             self.changes,
-            not self.jumped and self._continuous(at.z, range(len(self.system.automata))),
+            self._continuous(at.z, range(len(self.system.automata))),
             "",
             "",
             self.warnings,

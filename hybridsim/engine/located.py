@@ -1,0 +1,52 @@
+"""What is known of an event as it was located: the state with bounds of its errors, and the guards zero together."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridsim.engine.decide import side_after
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.outcome import Situation
+from hybridsim.engine.segment import Arrival, SegmentRun
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+
+
+def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situation:
+    """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
+    flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
+    zero = np.zeros(system.n)
+    series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
+    located = [series.guards[g] for g in arrival.fired] + [series.monitors[k] for k in arrival.stopping]
+    for value, slope, *_ in located:
+        if slope != 0.0 and math.isfinite(value / slope):
+            s_error = max(s_error, abs(value / slope))
+    slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
+    x_error = segment.rounding() + s_error * slopes
+    holding = system.evaluated(flow.z)
+    x_error[holding] = UNIT * np.abs(arrival.x[holding])
+    return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
+
+
+def coincident(system: System, origin: Instant, at: Situation, fired: tuple[int, ...]) -> dict[int, int]:
+    """The located guards and those that are zero with them and leave, with the order of their times."""
+    if not fired:
+        return {}
+    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+    together: dict[int, float] = {}
+    for g in map(int, np.flatnonzero(system.active(at.z))):
+        value, bound = series.guards[g], series.guard_bounds[g]
+        leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
+        if g in fired or leaves:
+            together[g] = -value[0] / value[1] if value[1] != 0.0 else 0.0
+    # guards within one ulp of the time are at one place of the order
+    ulp = math.ulp(max(abs(float(origin.plus(at.s))), math.ulp(1.0)))
+    order: dict[int, int] = {}
+    place, last = -1, -math.inf
+    for g in sorted(together, key=lambda g: together[g]):
+        if together[g] - last > ulp:
+            place, last = place + 1, together[g]
+        order[g] = place
+    return order
