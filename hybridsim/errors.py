@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+
+
+# a word of a file, or a path, without an end to it: of more than 400 characters the first and last are shown
+_ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class HybridsimError(Exception):
                 lines.append("    " + " " * column + "^")
         if self.remedy:
             lines.append(self.remedy)
-        return _printable("\n".join(lines))
+        return _printable("\n".join(re.sub(_ENDLESS, r"\1...\2", line) for line in lines))
 
 
 class ModelError(HybridsimError):

@@ -102,6 +102,8 @@ def first_exit_of(
             lead, soonest = i, start[0] / -start[1]
         if last - first > 1:
             horizon = min(horizon, lin.farthest[k, g])
+    if not horizon > 0.0:
+        return _OPEN, 0.0
     while True:
         fired, s = (known, until) if until <= horizon else (_NONE, min(horizon, bound))
         for j in range(first, last):

@@ -70,7 +70,10 @@ class ExactLeaper:
         )
         tapes = self.shelf.tapes
         self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        tables, spare = tables_of(self.system, tapes.modes, p, self.horizon)
+        found = tables_of(self.system, tapes.modes, p, self.horizon)
+        if found is None:
+            return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)))
+        tables, spare = found
         as_packed = packed(state)
         try:
             work, room = spare.pop()

@@ -20,6 +20,7 @@ _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is su
 _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
 _POLISH = 6  # iterations of it from nearby
+_POINTS = 10**6  # from which a guard is followed: a second; a run that is to be stopped must not wait for more
 _SAFE = 0.95  # to end on the safe side
 _HALVINGS = 5
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
@@ -445,7 +446,7 @@ def first_zero(
     for i in range(TERMS):
         terms[i] = start[i]
     s = 0.0
-    while True:
+    for _ in range(_POINTS):
         d = safe_step(terms, order, grown * rest, min(bound - s, farthest), lower)
         if d >= bound - s:
             return NEVER, bound
@@ -462,3 +463,4 @@ def first_zero(
             return (FOUND, s + d) if s + d <= bound else (NEVER, bound)
         if not terms[0] > error:
             return OPEN, s
+    return OPEN, s

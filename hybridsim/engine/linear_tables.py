@@ -16,6 +16,7 @@ from hybridsim.engine.modal import modals
 from hybridsim.engine.packs import packed
 from hybridsim.engine.system import System
 
+_LARGEST = 1e150  # the square of it has a value yet
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 
 
@@ -75,10 +76,15 @@ def no_tables() -> LinearTables:
     return tables
 
 
-def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float) -> LinearTables:
-    """Tables of the vectors of modes met so far (K, components) at the parameters in p; horizon: of a segment."""
+def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float) -> LinearTables | None:
+    """Tables of the vectors of modes met so far (K, components) at the parameters in p; horizon: of a segment.
+
+    None where a rate or guard has a coefficient that is no finite number, or one beyond all that squares.
+    """
     plan, registers = plan_of(system, met, p)
     A, rows = plan.matrices(registers)
+    if not (np.abs(A) < _LARGEST).all() or not (np.abs(rows) < _LARGEST).all():
+        return None
     count, guards, size = rows.shape
     n = system.n
     flows = modals(A, horizon, TERMS)
@@ -126,11 +132,11 @@ def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float
 
 def tables_of(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float
-) -> tuple[LinearTables, deque[Any]]:
+) -> tuple[LinearTables, deque[Any]] | None:
     """Tables of these vectors of modes (K, components), and scratch arrays for them to be handed on.
 
     The tables are made once for each set of parameter values and each order of magnitude of the horizon: how long a
-    segment may be at most. The scratch arrays serve all tables of one form.
+    segment may be at most. The scratch arrays serve all tables of one form. None where there are no tables.
     """
     horizon = 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
     kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
@@ -138,6 +144,8 @@ def tables_of(
     found = kept.get(key)
     if found is None:
         tables = linear_tables(system, modes, p, horizon)
+        if tables is None:
+            return None
         forms = len(tables.kinds), len(tables.factor_start), tables.values.shape
         spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {forms}", deque)
         found = (tables, spare)

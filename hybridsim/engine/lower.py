@@ -169,6 +169,7 @@ class Lowering:
         items += [Assign(f"surface_{c}", s) for c, s in surfaces.items()]
         guard_items, conditions = self._guards()
         items += guard_items
+        self._count_phases()
         program = Program(
             model,
             self.components,
@@ -477,6 +478,16 @@ class Lowering:
                 items.append(Switch(c, tuple(branches)))
         items += [Assign(f"monitor_{k}", self.convert(m.expr)) for k, m in enumerate(self.model.monitors)]
         return items, conditions
+
+    def _count_phases(self) -> None:
+        """Meet the frequencies that resets and outputs alone have: they are written out when phases are counted."""
+        choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
+        for part in (*choices, *self.model.monitors, *self.model.schedules):
+            for e in part.reset.values():
+                self.convert(e)
+        for output in self.model.outputs:
+            for e in (output.expr, *output.modes.values()):
+                self.convert(e)
 
     def _jump(self, c: int) -> tuple[int, Any, Any]:
         """Jumps of the unknown on release, simplified so that equal limits give an exact zero."""

@@ -38,7 +38,8 @@ class Modal:
 
     def power(self, exponent: int) -> np.ndarray:
         """|B**exponent| (J,) of the block of each coordinate."""
-        result, first = self.speeds**exponent, 0
+        with np.errstate(over="ignore"):  # a bound of infinity is one that nothing is decided by
+            result, first = self.speeds**exponent, 0
         while first < len(result):
             end = int(self.ends[first])
             if end > first + 1:

@@ -350,13 +350,13 @@ class System:
     def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[float, float]]:
         """Jump of each unknown on release to above and to below, by component."""
         out = np.zeros(2 * len(self.surface_of))
-        self.code.module.jumps(s, x, p, z, out)
+        self._in_python("jumps", s, x, p, z, out)
         return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
 
     def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
         """Effect of each unknown on the rate of its own surface, by component; negative for one that opposes it."""
         out = np.zeros(len(self.surface_of))
-        self.code.module.effects(s, x, p, z, out)
+        self._in_python("effects", s, x, p, z, out)
         return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
 
     def impulses(
@@ -368,7 +368,7 @@ class System:
         """
         n, m = self.n, len(self.surface_of)
         out = np.zeros(2 * m * (n + m))
-        self.code.module.impulses(s, x, p, z, out)
+        self._in_python("impulses", s, x, p, z, out)
         return (
             out[: m * n].reshape(m, n),
             out[m * n : 2 * m * n].reshape(m, n),
@@ -380,17 +380,14 @@ class System:
     ) -> np.ndarray:
         """Coefficient of restitution (m,) of the surfaces at their speeds of approach (m,); 0 where there is none."""
         out = np.zeros(len(self.surface_of))
-        self.code.module.restitutions(s, np.concatenate([x, speeds]), p, z, out)
+        self._in_python("restitutions", s, np.concatenate([x, speeds]), p, z, out)
         return out
 
     def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
         """Number of the first choice of a guard whose condition holds; -1 if none."""
         out = np.zeros(1)
-        try:
-            self.code.module.choose(s, x, p, np.array([*z, component, mode, guard]), out)
-        except (ValueError, ArithmeticError):  # a condition without a value holds no more than a false one
-            return -1
-        return int(out[0])
+        has_value = self._in_python("choose", s, x, p, np.array([*z, component, mode, guard]), out)
+        return int(out[0]) if has_value else -1  # a condition without a value holds no more than a false one
 
     def apply_reset(
         self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
@@ -399,12 +396,24 @@ class System:
         if key in self.resets:
             at = self.layout.discrete_slice
             out = np.concatenate([x_plus, p_plus[at]])
-            try:
-                self.code.module.reset(s, x, p, np.array([*z, self.resets[key][0]]), out)
-            except (ValueError, ArithmeticError):  # of the standard library's functions beyond their domain
+            if not self._in_python("reset", s, x, p, np.array([*z, self.resets[key][0]]), out):
                 discrete = [d.name for d in self.model.discrete]
                 out[[[*self.names, *discrete].index(name) for name in self.resets[key][1]]] = np.nan
             x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
+
+    def _in_python(self, name: str, s: float, x: Any, p: Any, z: Any, out: np.ndarray) -> bool:
+        """Evaluate a function of the module that is called too seldom to be compiled; whether it has a value.
+
+        Where it has none, as the standard library's functions beyond their domain, out is filled with NaN.
+        """
+        with np.errstate(all="ignore"):  # what is no number is dealt with where it is used
+            try:
+                getattr(self.code.module, name)(s, x, p, z, out)
+            except (ValueError, ArithmeticError):
+                if name != "reset":  # which may set but a few of all
+                    out[:] = np.nan
+                return False
+        return True
 
     # -- series ---------------------------------------------------------------------------------------------
 

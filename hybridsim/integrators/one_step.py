@@ -130,7 +130,8 @@ class OneStepStepper(ABC):
         scale = np.where(scale > 0.0, scale, 1.0)
 
         def size(x: np.ndarray) -> float:
-            return float(np.sqrt(np.mean((x / scale) ** 2)))
+            with np.errstate(over="ignore"):  # infinity makes the smallest step
+                return float(np.sqrt(np.mean((x / scale) ** 2)))
 
         d0, d1 = size(x), size(dx)
         h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1

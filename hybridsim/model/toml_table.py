@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -81,7 +82,7 @@ class Table:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             self.fail(f"'{key}' is {_shown(value)}", "it must be a number.", key)
             return None
-        return float(value)
+        return _real(value)
 
     def reals(self, key: str) -> dict[str, float]:
         """A table of numbers under a key; empty where it is absent."""
@@ -96,7 +97,7 @@ class Table:
         if wrong:
             self.fail(f"'{key}' holds {_shown(wrong[0])}", "it must be a list of numbers.", key)
             return ()
-        return tuple(float(value) for value in found)
+        return tuple(_real(value) for value in found)
 
     def expression(self, key: str, remedy: str | None = None) -> Expression | None:
         """The expression under a key; None where it is absent, which is a fault if a remedy is given."""
@@ -150,6 +151,14 @@ class Table:
             self.fail(f"'{key}' is {_shown(value)}", f"it must be {wanted}.", key)
             return default
         return value
+
+
+def _real(value: float) -> float:
+    """A number as a double; what is beyond all of them is infinite, and refused where a finite one is needed."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def _shown(value: Any) -> str:

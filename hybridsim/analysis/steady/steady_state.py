@@ -245,7 +245,8 @@ class _Search:
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
         first, second = largest_exponents(self.motion, passings.last, base)
         exponent = 0.5 * (first + second)
-        grows = (passings.scale > _GROWS * self.earlier).any() or passings.drifts()
+        grew = len(self.earlier) > 0 and (passings.scale > _GROWS * self.earlier).any()
+        grows = grew or passings.drifts()
         if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not grows:
             kind = CHAOTIC
         elif abs(exponent) * base <= _NEUTRAL and not grows:

@@ -1,0 +1,1 @@
+"""Inputs that are wrong on purpose, and what the program makes of them."""

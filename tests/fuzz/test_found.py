@@ -1,0 +1,91 @@
+"""What mutated files and command lines have found, each by itself."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.cli import main
+
+
+def test_a_frequency_that_a_reset_or_an_output_alone_has() -> None:
+    model = hs.Model.from_toml("""
+[states]
+x = { start = 0, der = "1" }
+[monitors.m]
+expr = "x - 0.5"
+direction = "up"
+action = "reset"
+reset = { x = "0.7 + 0.1*sin(9*t)" }
+[schedules.s]
+times = 0.75
+reset = { x = "cos(5*t)" }
+[outputs]
+y = "sin(7*t)"
+""")
+    for integrator in ("dop853", "exact", "taylor"):
+        sol = hs.simulate(model, (0.0, 1.0), integrator=integrator)
+        assert sol.events[0].x_plus[0] == pytest.approx(0.7 + 0.1 * math.sin(4.5), rel=1e-12)
+        assert sol(1.0)[0] == pytest.approx(math.cos(3.75) + 0.25, rel=1e-12)
+        assert sol.output("y", 0.5) == pytest.approx(math.sin(3.5), rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", ["acos(9*k)", "1e200*x", "x/(k - 3)"])
+def test_a_linear_rate_that_has_no_value_or_too_large_a_one(rate: str) -> None:
+    model = hs.Model.from_toml(f"""
+[parameters]
+k = 3
+[states]
+x = {{ start = 1, der = "{rate}" }}
+v = {{ start = 0, der = "-x" }}
+[modes.a]
+initial = true
+guards.g = {{ expr = "v + 2", then = "b" }}
+[modes.b]
+""")
+    sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"steps": 1000})
+    assert not sol.success and "x" in sol.message
+
+
+def test_a_guard_over_scales_that_no_step_spans_ends_with_its_limit() -> None:
+    model = hs.Model.from_toml("""
+[states]
+y = { start = -120, der = "3*t**2 + 12*t - 1e17" }
+[modes.below]
+initial = true
+guards.zero = { expr = "-y", then = "above" }
+[modes.above]
+guards.zero = { expr = "y", then = "below" }
+""")
+    began = time.perf_counter()
+    sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"seconds": 1})
+    assert sol.status in ("finished", "limit")
+    assert time.perf_counter() - began < 60.0  # with what is to be compiled
+
+
+def test_a_jump_of_friction_that_has_no_value_at_zero_warns_of_nothing() -> None:
+    model = hs.load("static-kinetic").with_()
+    text = model.to_toml().replace('"mu_k"', '"mu_k/t"')
+    hs.simulate(hs.Model.from_toml(text), (0.0, 0.1), limits={"steps": 1000})
+
+
+def test_an_enormous_whole_number() -> None:
+    text = '[states]\nx = {{ start = 0, der = "1", nominal = {} }}\n'
+    with pytest.raises(hs.ModelError, match="nominal"):
+        hs.Model.from_toml(text.format("9" * 400))
+    assert hs.Model.from_toml(text.format("9" * 300)).states[0].nominal == pytest.approx(1e300)
+
+
+def test_a_message_about_a_word_without_end_has_an_end() -> None:
+    with pytest.raises(hs.ModelError) as caught:
+        hs.Model.from_toml('[states]\nv = { start = 0, der = "-f" }\n[contacts.f]\nvelocity = "v"\n'
+                           f'normal = 1\nlaw = {{ name = "{"(" * 20_000}x" }}\n')  # fmt: skip
+    assert len(str(caught.value)) < 2000
+
+
+def test_a_motion_that_is_not_settled_after_the_first_stretch(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["steady", "bouncing-ball", "--max-periods", "4"]) in (0, 1)
+    assert "internal error" not in capsys.readouterr().err
