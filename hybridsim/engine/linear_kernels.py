@@ -17,6 +17,7 @@ from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_guards import FARTHEST, TERMS
 
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
+_PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
 _POLISH = 6  # iterations of it from nearby
@@ -169,7 +170,10 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
 
 @allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
-    """A block of several coordinates: exp(mean d) times the series of the rest, in parts where that is large."""
+    """A block of several coordinates: exp(mean d) times the series of the rest, in parts where that is large.
+
+    NaN where there would be too many parts: their roundings alone would be more than what is asked for.
+    """
     size = end - first
     mean = 0.0 + 0.0j
     for j in range(first, end):
@@ -180,6 +184,10 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
         for i in range(j + 1, end):
             row += abs(lin.upper[k, j, i])
         spread = max(spread, row)
+    if not spread * abs(d) <= _SPREAD * _PARTS:
+        for j in range(first, end):
+            out[j] = complex(math.nan, math.nan)
+        return
     parts = max(1, math.ceil(spread * abs(d) / _SPREAD))
     h = d / parts
     factor = np.exp(mean * h)

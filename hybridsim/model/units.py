@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hybridsim.expr import Expression
     from hybridsim.model.contact import Contact
     from hybridsim.model.model import Model
 
@@ -20,6 +21,21 @@ def units_of(model: Model) -> dict[str, str]:
         rest |= _of_forces(model, missing)
     rest |= {d.name: d.unit for d in model.discrete} | {declared.name: "" for declared in model.inputs}
     return units | {name: unit for name, unit in rest.items() if name not in units}
+
+
+def unit_of(model: Model, expression: Expression) -> str:
+    """The unit of an expression of a model, where it is that of one of its parts; else empty."""
+    units = units_of(model) | {q.name: q.unit for q in model.parameters}
+    return _unit(expression.tree, units, {name: e.tree for name, e in model.definitions})
+
+
+def rate_of(unit: str, time: str, order: int) -> str:
+    """The unit of a derivative with respect to time."""
+    if not unit or not time or order == 0:
+        return unit
+    known = re.fullmatch(rf"(.*)/{re.escape(time)}(?:\^(\d+))?", unit)
+    base, power = (known.group(1), order + int(known.group(2) or 1)) if known else (unit, order)
+    return f"{base}/{time}" if power == 1 else f"{base}/{time}^{power}"
 
 
 def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.errors import UsageError
 from hybridsim.model.switching import ATTRACTION
+from hybridsim.model.units import rate_of, time_unit, unit_of, units_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from hybridsim.solution.event import Event
     from hybridsim.solution.solution import Solution
 
+_LEGEND = """\
+  (a mode lasts while its guards g are >= 0; g', g'' are their rates along the motion in that mode, and the first that
+  is not zero decides; by decree: the event itself makes it zero, so that it is not measured)"""
 _WORDS = {FINE: "admissible", LEAVES: "not admissible"}
 
 
@@ -35,6 +39,7 @@ class GuardView:
     derivatives, bounds : its value and derivatives with respect to time (4,), and bounds of their rounding errors.
     decreed : how many of them, from the first on, are zero by decree and not looked at.
     side : its sign just after, 0 where that is a question of rounding; order : of the derivative that decides.
+    units : of the guard and its derivatives (4,), empty where they are not known.
     """
 
     mode: str
@@ -45,29 +50,33 @@ class GuardView:
     decreed: int
     side: int
     order: int
+    units: tuple[str, ...] = ("", "", "", "")
 
     def __str__(self) -> str:
+        if not any(self.derivatives) and not any(self.bounds):
+            return f"{self.guard} (g = {self.text}) stays >= 0: g = 0 and does not move"
         terms = []
         for k, (value, bound) in enumerate(zip(self.derivatives, self.bounds, strict=True)):
-            name = "g" + "'" * k
+            name, unit = "g" + "'" * k, f" {self.units[k]}" if self.units[k] else ""
             if k < self.decreed:
                 terms.append(f"{name} = 0 by decree")
             elif k == self.order:
-                terms.append(f"{name} = {value:.3g}")
+                terms.append(f"{name} = {value:.3g}{unit}")
                 break
             else:
-                terms.append(f"{name} = 0 within rounding ({bound:.1g})")
+                terms.append(f"{name} = 0 within rounding ({bound:.1g}{unit})")
         sign = {1: "stays >= 0", -1: "goes negative", 0: "is undecided"}[self.side]
         return f"{self.guard} (g = {self.text}) {sign}: {', '.join(terms)}"
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Modes that could hold just after, and what their guards say of it."""
+    """Modes that could hold just after, what their guards say of it, and whether they were taken."""
 
     modes: dict[str, str]
     verdict: str
     guards: tuple[GuardView, ...]
+    taken: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,15 +89,21 @@ class Explanation:
     fired : guards that were located at zero, as they went in the mode before.
     candidates : the combinations of modes that were looked at, in the order of looking.
     reason : why the one that was taken, in a sentence.
+    state : states just before, and what a condition or a contact reads, as text with units.
+    choices : of a guard with an ordered choice, in words: each condition with its values, and what came of it.
     """
 
     event: Event
     fired: tuple[GuardView, ...]
     candidates: tuple[Candidate, ...]
     reason: str
+    state: str = ""
+    choices: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         lines = [repr(self.event)[1:-1]]
+        if self.state:
+            lines.append(f"  just before: {self.state}")
         if self.fired:
             lines.append("  came to zero:")
             lines += [f"    {view.mode}: {view}" for view in self.fired]
@@ -96,9 +111,15 @@ class Explanation:
             lines.append("  modes that could hold just after:")
         for candidate in self.candidates:
             modes = ", ".join(f"{name} {mode}" for name, mode in candidate.modes.items())
-            lines.append(f"    {modes}: {candidate.verdict}")
+            lines.append(f"    {modes}: {candidate.verdict}{', and taken' if candidate.taken else ''}")
             lines += [f"      {view.mode}: {view}" for view in candidate.guards]
-        return "\n".join([*lines, f"  {self.reason}"])
+        if self.choices:
+            lines.append(f"  choices of guard {self.event.guard}, the first that holds is taken:")
+            lines += [f"    {choice}" for choice in self.choices]
+        lines.append(f"  so: {self.reason}")
+        if self.fired or self.candidates:
+            lines.append(_LEGEND)
+        return "\n".join(lines)
 
 
 class _Watched(Settling):
@@ -130,13 +151,9 @@ def explain(solution: Solution, number: int) -> Explanation:
     together = [o for o in happened if o.instant == occurrence.instant]
     segment = _segment_before(solution, occurrence)
     fired = _fired(solution._system, segment, together)
+    state = _state(solution, event)
     if not fired:
-        reason = (
-            "it was decided by a rule of the integrator's own"
-            if not occurrence.guard
-            else "a reset led there"
-        )
-        return Explanation(event, (), (), f"{reason}: no guard was located at zero")
+        return Explanation(event, (), (), _without_guards(event, together), state)
     at = _situation(solution._system, segment, fired)
     views = tuple(
         _views(solution._system, at, segment.z, sorted(fired), np.zeros(solution._system.guard_count, int))
@@ -144,10 +161,59 @@ def explain(solution: Solution, number: int) -> Explanation:
     forward = solution._run.task.forward
     settling = _Watched(solution._system, at, at.z.copy(), forward)
     settling.seen = []
-    x_minus = at.x.copy()
+    x_minus, choices = at.x.copy(), _choices(solution, event, at)
     outcome = settling.run(fired, [])
-    candidates = tuple(_candidate(settling, *one) for one in settling.seen)
-    return Explanation(event, views, candidates, _reason(solution, occurrence, settling, outcome, x_minus))
+    candidates = tuple(_candidate(settling, outcome, *one) for one in settling.seen)
+    reason = _reason(solution, occurrence, settling, outcome, x_minus)
+    return Explanation(event, views, candidates, reason, state, choices)
+
+
+def _without_guards(event: Event, together: list[Occurrence]) -> str:
+    """Why a mode changed where no guard was located at zero."""
+    due = sorted({o.component for o in together if o.kind == "scheduled"})
+    if due:
+        return f"{', '.join(due)} was due at this instant; the modes that hold were found anew just after it"
+    if event.guard:
+        return "a reset at this instant led there: no guard was located at zero"
+    return "it was decided by a rule of the integrator's own: no guard was located at zero"
+
+
+def _state(solution: Solution, event: Event) -> str:
+    """The states just before, with their units."""
+    units = units_of(solution.model)
+    return ", ".join(
+        f"{name} = {_with_unit(value, units.get(name, ''))}"
+        for name, value in zip(solution.names, event.x_minus, strict=True)
+    )
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.6g} {unit}".rstrip()
+
+
+def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
+    """The ordered choice of the guard that fired, if it has more than one: conditions, values, and what was taken."""
+    model, system = solution.model, solution._system
+    component = next((k for k in model.all_components() if k.name == event.component), None)
+    mode = next((m for m in component.modes if m.name == event.source), None) if component else None
+    guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
+    if component is None or mode is None or guard is None or len(guard.then) < 2:
+        return ()
+    numbers = [a.name for a in system.automata].index(event.component)
+    place = component.modes.index(mode)
+    taken = system.choose(numbers, place, mode.guards.index(guard), at.s, at.x, at.p, at.z)
+    known = dict(zip(solution.names, event.x_minus.tolist(), strict=True)) | model.parameter_values()
+    units = units_of(model) | {q.name: q.unit for q in model.parameters}
+    lines = []
+    for k, choice in enumerate(guard.then):
+        said = "in all other cases"
+        if choice.when is not None:
+            read = [n for n in sorted(choice.when.names) if n in known]
+            values = ", ".join(f"{n} = {_with_unit(known[n], units.get(n, ''))}" for n in read)
+            said = f"when {choice.when.text}" + (f" ({values})" if values else "")
+        came = "does not hold" if k < taken else "holds, and is taken" if k == taken else "is not reached"
+        lines.append(f"{said}: {came} -> {choice.to}")
+    return tuple(lines)
 
 
 def _of_another_kind(solution: Solution, event: Event) -> str:
@@ -212,38 +278,50 @@ def _views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
     series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error)
+    time = time_unit(system.model)
     for g in guards:
         c = int(system.owner[g])
         automaton, mode = system.automata[c], int(z[c])
         j = automaton.guards[mode].index(g)
         values, bounds = series.guards[g], series.guard_bounds[g]
         side, order = side_after(values, bounds, int(decreed[g]))
+        declared = system.model.all_components()[c].modes[mode].guards[j].expr
+        unit = "" if declared.text.startswith(ATTRACTION) else unit_of(system.model, declared)
         factorials = [math.factorial(k) for k in range(len(values))]
         yield GuardView(
             f"{automaton.name} {automaton.modes[mode]}",
             automaton.guard_names[mode][j],
-            _in_words(system.model.all_components()[c].modes[mode].guards[j].expr.text),
+            _in_words(declared.text),
             tuple(float(v) * f for v, f in zip(values, factorials, strict=True)),
             tuple(float(b) * f for b, f in zip(bounds, factorials, strict=True)),
             int(decreed[g]),
             int(side),
             int(order),
+            tuple(rate_of(unit, time, k) for k in range(len(values))),
         )
 
 
 def _in_words(text: str) -> str:
     """The expression of a guard; that of a surface's attraction is one of the program's own."""
-    return f"pull of {text.removeprefix(ATTRACTION)}" if text.startswith(ATTRACTION) else text
+    if not text.startswith(ATTRACTION):
+        return text
+    return f"pull of {text.removeprefix(ATTRACTION)}, how fast its two sides drive towards it"
 
 
 def _candidate(
-    settling: _Watched, z: np.ndarray, components: list[int], verdict: int, decreed: np.ndarray
+    settling: _Watched,
+    outcome: Outcome,
+    z: np.ndarray,
+    components: list[int],
+    verdict: int,
+    decreed: np.ndarray,
 ) -> Candidate:
     system = settling.system
     guards = [g for c in components for g in system.automata[c].guards[z[c]]]
     views = tuple(_views(system, settling.at, z, guards, decreed))
     modes = {system.automata[c].name: system.automata[c].modes[z[c]] for c in components}
-    return Candidate(modes, _WORDS.get(verdict, "a question of rounding"), views)
+    taken = not outcome.status and bool((z[components] == outcome.z[components]).all())
+    return Candidate(modes, _WORDS.get(verdict, "a question of rounding"), views, taken)
 
 
 def _reason(
@@ -268,6 +346,10 @@ def _reason(
         return f"the first choice of guard {occurrence.guard} whose condition held leads to {occurrence.target}{reset}"
     admissible = [z for z, members, verdict, _ in settling.seen if c in members and verdict == FINE]
     if len(admissible) == 1:
+        members = next(m for z, m, verdict, _ in settling.seen if c in m and verdict == FINE)
+        if len(members) > 1:
+            all_of_them = ", ".join(f"{names[k]} {system.automata[k].modes[outcome.z[k]]}" for k in members)
+            return f"{all_of_them} together: of all combinations of what acts on each other the only admissible one"
         return f"{after} is the only mode that is admissible just after"
     if any(z[c] == automaton.hold for z in admissible) and outcome.z[c] == automaton.hold:
         return f"{after} and others are admissible; what holds comes before what slips"
