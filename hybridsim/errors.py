@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-
 # a word of a file, or a path, without an end to it: of more than 400 characters the first and last are shown
 _ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
 

@@ -21,7 +21,9 @@ _PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
 _POLISH = 6  # iterations of it from nearby
-_POINTS = 10**6  # from which a guard is followed: a second; a run that is to be stopped must not wait for more
+_POINTS = (
+    10**6
+)  # from which a guard is followed: a second; a run that is to be stopped must not wait for more
 _SAFE = 0.95  # to end on the safe side
 _HALVINGS = 5
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.

@@ -153,7 +153,7 @@ def explain(solution: Solution, number: int) -> Explanation:
     fired = _fired(solution._system, segment, together)
     state = _state(solution, event)
     if not fired:
-        return Explanation(event, (), (), _without_guards(event, together), state)
+        return Explanation(event, (), (), _without_guards(solution, event, together), state)
     at = _situation(solution._system, segment, fired)
     views = tuple(
         _views(solution._system, at, segment.z, sorted(fired), np.zeros(solution._system.guard_count, int))
@@ -168,13 +168,16 @@ def explain(solution: Solution, number: int) -> Explanation:
     return Explanation(event, views, candidates, reason, state, choices)
 
 
-def _without_guards(event: Event, together: list[Occurrence]) -> str:
+def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:
     """Why a mode changed where no guard was located at zero."""
     due = sorted({o.component for o in together if o.kind == "scheduled"})
     if due:
         return f"{', '.join(due)} was due at this instant; the modes that hold were found anew just after it"
     if event.guard:
         return "a reset at this instant led there: no guard was located at zero"
+    if solution.model.inputs and solution._run.method.leaps:
+        names = ", ".join(declared.name for declared in solution.model.inputs)
+        return f"no guard came to zero by itself: an input has a knot here (of {names}), and the modes were found anew"
     return "it was decided by a rule of the integrator's own: no guard was located at zero"
 
 

@@ -16,10 +16,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import hybridsim as hs
 from fuzz import mutated_files, mutated_lines
 from fuzz.watch import watching
-
-import hybridsim as hs
 from hybridsim.cli import main
 from hybridsim.engine.cache import cache_root
 from hybridsim.model.hygiene import warnings_of
@@ -31,7 +30,16 @@ TEXTS = [
     for path in sorted([*MODELS.glob("*.toml"), *MODELS.glob("laws/*.toml")])
     + sorted((ROOT / "hybridsim" / "testing" / "scenes").glob("*.toml"))
 ]
-INTEGRATORS = ("auto",) * 6 + ("dop853", "taylor", "tsit5", "rodas5p", "exact", "moreau", "rk4-dichotomy", "scipy-rk45")
+INTEGRATORS = ("auto",) * 6 + (
+    "dop853",
+    "taylor",
+    "tsit5",
+    "rodas5p",
+    "exact",
+    "moreau",
+    "rk4-dichotomy",
+    "scipy-rk45",
+)
 STATUSES = {
     "finished", "limit", "failed", "nonunique", "inconsistent", "accumulated", "terminated", "interrupted",
 }  # fmt: skip

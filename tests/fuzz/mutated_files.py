@@ -93,7 +93,9 @@ def scaled(pick: random.Random, text: str, other: str) -> str:
 
 def kind_of_value(pick: random.Random, text: str, other: str) -> str:
     value = re.compile(NUMBER.pattern + "|" + TEXT.pattern)
-    return at(pick, text, value, lambda old: pick.choice((*TYPES, f'"{old}"', f"[{old}]", f"{{ value = {old} }}")))
+    return at(
+        pick, text, value, lambda old: pick.choice((*TYPES, f'"{old}"', f"[{old}]", f"{{ value = {old} }}"))
+    )
 
 
 def quoted(text: str) -> str:
@@ -131,7 +133,24 @@ def name_everywhere(pick: random.Random, text: str, other: str) -> str:
     names = names_in(text)
     if not names:
         return text
-    reserved = ("t", "pi", "e", "E", "I", "S", "N", "sin", "x", "lambda", "None", "nan", "__x", "_", "class", "numba")
+    reserved = (
+        "t",
+        "pi",
+        "e",
+        "E",
+        "I",
+        "S",
+        "N",
+        "sin",
+        "x",
+        "lambda",
+        "None",
+        "nan",
+        "__x",
+        "_",
+        "class",
+        "numba",
+    )
     new = pick.choice((*names, *reserved, *UNICODE))
     return re.sub(rf"(?<!\w){re.escape(pick.choice(names))}(?!\w)", lambda _: new, text)
 
@@ -160,7 +179,7 @@ def ends_of_lines(pick: random.Random, text: str, other: str) -> str:
 
 
 CHANGES = (
-    line_deleted, line_repeated, lines_swapped, line_of_another, part_of_another, cut, character, number, number, scaled,
-    scaled, scaled, kind_of_value, expression, expression, inside_expression, inside_expression, name_changed,
+    line_deleted, line_repeated, lines_swapped, line_of_another, part_of_another, cut, character, number, number,
+    scaled, scaled, scaled, kind_of_value, expression, expression, inside_expression, inside_expression, name_changed,
     name_by_another, name_everywhere, operator, operator, path, nested, ends_of_lines,
 )  # fmt: skip

@@ -50,7 +50,14 @@ LINES = [
         "sweep --help",
     )
 ]
-PATHS = ("--csv", "--npz", "--save", "--out", "--plot", "--images")  # options that name where something is written
+PATHS = (
+    "--csv",
+    "--npz",
+    "--save",
+    "--out",
+    "--plot",
+    "--images",
+)  # options that name where something is written
 WORDS = sorted({word for line in LINES for word in line} | {"--plot", "--images", "--uncertain", "-h", "--"})
 
 

@@ -8,6 +8,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.cli import main
+from hybridsim.model.units import rate_of
 
 
 def verdicts(explanation: hs.Explanation) -> dict[tuple[str, ...], str]:
@@ -105,3 +106,50 @@ def test_the_command_line_explains(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     assert text.count("modes that could hold just after") == 2 and "is the only mode" in text
     assert main(["run", "dfcs", "--t-end", "0.01", "--explain", "99"]) == 2
+
+
+def test_numbers_have_their_units_and_the_mode_that_was_taken_is_marked() -> None:
+    text = str(hs.simulate("dfcs", (0.0, 0.02)).explain(1))
+    assert "just before: x = 0.000146575 m, v = " in text and " m/s\n" in text
+    assert "f slip-: not admissible" in text and "f stick: admissible, and taken" in text
+    assert "g' = -83.6 m/s^2" in text and "g = 16.7 N" in text
+    assert "so: stick is the only mode" in text and "a mode lasts while its guards g are >= 0" in text
+
+
+@pytest.mark.parametrize(
+    ("unit", "time", "order", "rate"),
+    [
+        ("m", "s", 0, "m"),
+        ("m", "s", 1, "m/s"),
+        ("m/s", "s", 1, "m/s^2"),
+        ("m/s^2", "s", 2, "m/s^4"),
+        ("N", "s", 2, "N/s^2"),
+        ("N/m", "s", 1, "N/m/s"),
+        ("", "s", 1, ""),
+        ("K", "", 1, "K"),
+    ],
+)
+def test_units_of_rates(unit: str, time: str, order: int, rate: str) -> None:
+    assert rate_of(unit, time, order) == rate
+
+
+def test_a_choice_shows_its_conditions_with_what_they_read() -> None:
+    sol = hs.simulate("bouncing-ball", (0.0, 5.0))
+    up, down = sol.explain(0), sol.explain(len(sol.events) - 1)
+    v = math.sqrt(2 * 9.81)
+    (first, second) = up.choices
+    assert (
+        first
+        == f"when -e*w >= v_rest (e = 0.7, v_rest = 0.1 m/s, w = {-v:.6g} m/s): holds, and is taken -> flight"
+    )
+    assert second == "in all other cases: is not reached -> rest"
+    assert "does not hold -> flight" in down.choices[0] and "and is taken -> rest" in down.choices[1]
+
+
+def test_joint_decisions_and_schedules_are_named() -> None:
+    sol = hs.simulate("clutches", (0.0, 10.0))
+    texts = [str(sol.explain(k)) for k, event in enumerate(sol.events) if event.kind == "transition"]
+    assert any("so: c1 stick, c2 stick, c3 slip+ together" in text for text in texts)
+    assert not any("is undecided" in text for text in texts)  # the load of a clutch that is not engaged is 0
+    assert not any("rule of the integrator's own" in text for text in texts)
+    assert "how fast its two sides drive towards it" in str(hs.simulate("relay-pair", (0.0, 1.0)).explain(0))
