@@ -2,9 +2,10 @@
 
     python studies/fuzz.py [files] [lines] [--count N] [--seed S] [--only K]
 
-Without a kind both, 10^4 of each unless told otherwise; half an hour on one core. Findings are printed. Cases are run in a child process, which is ended where one of them takes longer than a minute, and begun
-again behind it. `--only K` runs the K-th case alone and shows what becomes of it. Thousands of models are compiled:
-give it a cache folder of its own in HYBRIDSIM_CACHE.
+Without a kind both, 10^4 of each unless told otherwise; half an hour on one core. Findings are printed. Cases are run
+in a child process, which is ended where one of them takes longer than a minute, and begun again behind it. `--only K`
+runs the K-th case alone and shows what becomes of it. Thousands of models are compiled: give it a cache folder of its
+own in HYBRIDSIM_CACHE.
 """
 
 from __future__ import annotations
