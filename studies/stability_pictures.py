@@ -1,0 +1,163 @@
+"""Pictures of the study of stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from stability_runs import (
+    MAPPED,
+    PAPER_EPS,
+    PAPER_STEPS,
+    TANH,
+    TOLERATED,
+    Case,
+    Method,
+)
+
+from hybridsim.plot import style
+
+Map = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # steps, zones, errors, stops in excess
+LOW, HIGH = 1e-6, 1.0  # errors that colours tell apart
+
+
+def theory(panel: Axes, case: Case, method: Method, steps: np.ndarray) -> None:
+    """What theory says of the boundary, as lines."""
+    dashed = {"color": style.PALETTE[1], "lw": 1.8, "ls": "--"}
+    dotted = {"color": "white", "lw": 1.8, "ls": ":"}
+    if method is TANH:
+        panel.plot(steps, case.stable(steps), **dotted, label="RK4 stable above")
+        return
+    if method.name == "kept" and not case.belt_speed:
+        panel.axhline(case.creep(), **dashed, label="creep is 1 % of x below")
+    elif method.name == "zeroed" or not case.belt_speed:
+        panel.axhline(case.early_stop(), **dashed, label="early stops are 1 % of x below")
+    if method.law:
+        return
+    panel.plot(steps, case.too_fast_for_16(steps), **dotted, label="16 halvings reach it above")
+    if not case.belt_speed:
+        panel.axvline(case.late_release(), color=style.PALETTE[1], lw=1.4, ls="-.", label="late release: 1 %")
+
+
+def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path) -> None:
+    """A panel for each method: error over (steps per period, width of the zone), its 1 % line, theory, the paper."""
+    figure = style.figure(12.0, 9.2)
+    panels = figure.subplots(2, 2)
+    mesh = None
+    for panel, method in zip(panels.ravel(), MAPPED):
+        steps, zones, errors, excess = found[method.name]
+        size = np.where(np.isfinite(errors), np.clip(np.abs(errors), LOW, HIGH), HIGH)
+        mesh = panel.pcolormesh(
+            steps, zones, size, norm=LogNorm(LOW, HIGH), cmap="cividis", shading="nearest"
+        )
+        boundary(panel, steps, zones, size, "white", "black", 2.4)
+        rows, columns = np.nonzero(~np.isfinite(excess) | (np.abs(excess) > (0.11 if case.belt_speed else 0)))
+        panel.plot(
+            steps[columns], zones[rows], "x", color="#b00000", ms=4, mew=1.2, label="wrong number of stops"
+        )
+        panel.plot([], [], "-", color="black", lw=2.4, label="error 1 %")
+        panel.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(zones[0], zones[-1]))
+        theory(panel, case, method, np.geomspace(steps[0], steps[-1], 50))
+        panel.plot(PAPER_STEPS, star[0], "*", color="white", mec="black", ms=15, ls="", label=star[1])
+        panel.set_title(method.title, fontsize=10, loc="left")
+        panel.set(xlabel="steps per period, T/h", ylabel=f"{method.letter} / largest |v| (relative)")
+        panel.tick_params(labelsize=9)
+        legend = panel.legend(
+            fontsize=8,
+            loc="lower left" if method is TANH else "lower right",
+            facecolor="#b8b8b8",
+            framealpha=0.9,
+        )
+        legend.set_zorder(5)
+    figure.colorbar(mesh, ax=panels, label="largest relative error of the amplitude of x", extend="both")
+    style.save(figure, path)
+
+
+def boundary(
+    panel: Axes, steps: np.ndarray, zones: np.ndarray, size: np.ndarray, halo: str, colour: str, width: float
+) -> None:
+    """The line at which the error is what is tolerated."""
+    for line, wide in ((halo, width + 1.6), (colour, width)):
+        panel.contour(
+            steps,
+            zones,
+            np.log10(size),
+            [np.log10(TOLERATED)],
+            colors=[line],
+            linewidths=[wide],
+            linestyles="-",
+        )
+
+
+def moves(
+    groups: dict[str, list[tuple[Case, dict[str, Map]]]], methods: tuple[Method, ...], path: Path
+) -> None:
+    """The 1 % lines of several cases, a row for what varies, a column for each method; right is below and right."""
+    figure = style.figure(13.0, 8.2)
+    panels = figure.subplots(len(groups), len(methods), sharex=True, sharey=True)
+    for row, (says, cases) in zip(panels, groups.items()):
+        for panel, method in zip(row, methods):
+            for k, (case, found) in enumerate(cases):
+                steps, zones, errors, _ = found[method.name]
+                size = np.where(np.isfinite(errors), np.clip(np.abs(errors), LOW, HIGH), HIGH)
+                colour = style.PALETTE[k]
+                stick = "no stop" if not case.stops else f"{case.stops} stops"
+                panel.contour(
+                    steps,
+                    zones,
+                    np.log10(size),
+                    [np.log10(TOLERATED)],
+                    colors=[colour],
+                    linewidths=[1.8],
+                    linestyles=[("-", "--", "-.", ":")[k]],
+                )
+                panel.plot(
+                    [], [], ("-", "--", "-.", ":")[k], color=colour, lw=1.8, label=f"{case.name}: {stick}"
+                )
+                panel.plot(
+                    PAPER_STEPS * 1.06**k,
+                    PAPER_EPS / case.fastest,
+                    "*",
+                    color=colour,
+                    mec="black",
+                    mew=0.6,
+                    ms=11,
+                )
+            panel.set(xscale="log", yscale="log")
+            panel.set_title(method.title, fontsize=10, loc="left")
+            style.dress(panel)
+        row[0].set(ylabel=f"{says} varied\nwidth of the zone / largest |v|")
+        row[-1].legend(
+            fontsize=8, loc="lower left", title="star: T/1200 and 8e-4 m/s there", title_fontsize=8
+        )
+    for panel in panels[-1]:
+        panel.set(xlabel="steps per period, T/h")
+    style.save(figure, path)
+
+
+def chatter(found: dict[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
+    """Error of rk4-sign over the step, the worst of its last fifty periods."""
+    figure = style.figure(8.0, 5.0)
+    panel = figure.subplots()
+    for k, (name, (steps, errors)) in enumerate(found.items()):
+        size = np.where(np.isfinite(errors), np.abs(errors), np.nan)
+        panel.loglog(
+            steps,
+            size,
+            style.MARKERS[k] + "-",
+            color=style.INK if name == "belt" else (*style.PALETTE, style.FAINT)[k],
+            ms=4,
+            lw=1.2,
+            label=name,
+        )
+    panel.axhline(TOLERATED, color="black", lw=1.6, label="1 %")
+    panel.axvline(PAPER_STEPS, color=style.FAINT, lw=1.6, ls=":", label="T/1200")
+    steps = np.array([300.0, 6000.0])
+    panel.plot(steps, 40.0 / steps, "--", color=style.INK, lw=1.0, label="first order in the step")
+    panel.set(xlabel="steps per period, T/h", ylabel="relative error of the amplitude, worst of 50 periods")
+    panel.set_title("rk4-sign", fontsize=10, loc="left")
+    style.dress(panel)
+    panel.legend(fontsize=8, ncols=2)
+    style.save(figure, path)
