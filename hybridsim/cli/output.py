@@ -66,8 +66,11 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
 def require_folder(path: Path, option: str) -> None:
     """Refuse a folder for results that does not exist and cannot be made."""
     nearest = path
-    while not nearest.exists() and nearest != nearest.parent:
-        nearest = nearest.parent
+    try:
+        while not nearest.exists() and nearest != nearest.parent:
+            nearest = nearest.parent
+    except OSError as fault:  # a name that no file can have
+        raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="name a folder") from None
     if not nearest.is_dir():
         raise UsageError(f"{option}: {nearest} is a file", remedy="name a folder")
     if not os.access(nearest, os.W_OK):

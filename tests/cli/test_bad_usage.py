@@ -70,6 +70,7 @@ BAD = {
     "empty name among integrators": (["compare", "dfcs", "--integrators", "cvode-bdf,"], ["cvode-bdf,"]),
     "no number among tolerances": (["compare", "dfcs", "--rtol", "1e-4,fine"], ["fine"]),
     "no repetition": (["compare", "dfcs", "--repeat", "0"], ["--repeat", "0"]),
+    "folder whose name is too long": (["compare", "dfcs", "--out", "x" * 300], ["--out", "too long"]),
     "unknown action on the cache": (["cache", "empty"], ["empty", "clear"]),
 }
 
