@@ -17,10 +17,20 @@ class Place:
 
     Parameters
     ----------
-    file : path as the user gave it, or None for what was built in Python.
-    line : line of the file, counted from 1.
-    column : offset into ``text``, counted from 0, under which the caret is drawn.
-    text : the offending piece of source text, one line.
+    file : str, optional
+        Path as the user gave it, or None for what was built in Python.
+    line : int, optional
+        Line of the file, counted from 1.
+    column : int, optional
+        Offset into ``text``, counted from 0, under which the caret is drawn.
+    text : str, optional
+        The offending piece of source text, one line.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Place(file="block.toml", line=7).prefix
+    'block.toml:7: '
     """
 
     file: str | None = None
@@ -34,7 +44,7 @@ class Place:
 
     @property
     def prefix(self) -> str:
-        """The head of a message: ``file:line: ``, or nothing where neither is known."""
+        """The head of a message, ``file:line:`` and a blank, or nothing where neither is known."""
         parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
         if not parts and self.line is not None:
             parts = [f"line {self.line}"]
@@ -46,9 +56,21 @@ class HybridsimError(Exception):
 
     Parameters
     ----------
-    message : what is wrong, naming the object and the value.
-    place : where it is written, if it is written anywhere.
-    remedy : what the user can do about it.
+    message : str
+        What is wrong, naming the object and the value.
+    place : Place, optional
+        Where it is written, if it is written anywhere.
+    remedy : str, optional
+        What the user can do about it.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> try:
+    ...     hs.load("dfsc")
+    ... except hs.HybridsimError as error:
+    ...     print(error.message)
+    there is no model 'dfsc'
     """
 
     exit_code = 1
@@ -73,7 +95,28 @@ class HybridsimError(Exception):
 
 
 class ModelError(HybridsimError):
-    """A model that cannot be; ``errors`` holds every fault found, each with its own place and remedy."""
+    """A model that cannot be; ``errors`` holds every fault found, each with its own place and remedy.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, naming the object and the value.
+    place : Place, optional
+        Where it is written, if it is written anywhere.
+    remedy : str, optional
+        What the user can do about it.
+    errors : iterable of ModelError, optional
+        The single faults, where there are several.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> try:
+    ...     hs.Model("m", states=[hs.State("x", 1, "-y"), hs.State("v", 0, "z")]).validate()
+    ... except hs.ModelError as error:
+    ...     print([single.place.text for single in error.errors])
+    ['-y', 'z']
+    """
 
     exit_code = 3
 
@@ -104,17 +147,81 @@ class ModelError(HybridsimError):
 
 
 class ExpressionError(ModelError):
-    """A text that is no expression, or an expression that has no value."""
+    """A text that is no expression, or an expression that has no value.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, naming the object and the value.
+    place : Place, optional
+        Where it is written, if it is written anywhere.
+    remedy : str, optional
+        What the user can do about it.
+    errors : iterable of ModelError, optional
+        The single faults, where there are several.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> try:
+    ...     hs.Model("m", states=[hs.State("x", 1, "-x*(")]).validate()
+    ... except hs.ExpressionError as error:
+    ...     print(error.message)
+    not an expression: '(' was never closed
+    """
 
 
 class UsageError(HybridsimError, ValueError):
-    """A call or a command line that asks for something that does not exist."""
+    """A call or a command line that asks for something that does not exist.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, naming the object and the value.
+    place : Place, optional
+        Where it is written, if it is written anywhere.
+    remedy : str, optional
+        What the user can do about it.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> try:
+    ...     hs.simulate("dfcs", (0, 1), params={"massa": 2})
+    ... except hs.UsageError as error:
+    ...     print(error.message)
+    the model 'dfcs' has no parameter 'massa'
+    """
 
     exit_code = 2
 
 
 class SimulationError(HybridsimError):
-    """A run that could not be carried out."""
+    """A run that could not be carried out.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, naming the object and the value.
+    place : Place, optional
+        Where it is written, if it is written anywhere.
+    remedy : str, optional
+        What the user can do about it.
+
+    Notes
+    -----
+    A run that stops early raises nothing: the status and the message of its `Solution` say why.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> growth = hs.Model("growth", states=[hs.State("x", 1, "1 + x**2")])
+    >>> try:
+    ...     hs.linearize(growth)
+    ... except hs.SimulationError as error:
+    ...     print("no equilibrium" in error.message)
+    True
+    """
 
 
 def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:

@@ -37,17 +37,28 @@ def to_ivp(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
-    z : mode of each component by name; left out, a component is in its declared initial mode. A contact has none:
-        its mode must be given.
-    params : parameter values that replace the declared ones.
+    model : str, path or Model
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    z : mapping of str to str, optional
+        Mode of each component by name; left out, a component is in its declared initial mode. A contact has
+        none: its mode must be given.
+    params : mapping of str to str or float, optional
+        Parameter values that replace the declared ones.
 
-    When to use it: to bring a solver of your own. What follows an event is then yours to decide; `simulate` does
-    both, and takes a solver of your own as an integrator (`hybridsim.integrators.base.Integrator`).
+    Returns
+    -------
+    Ivp
+        The named tuple (fun, events, jac).
 
-    Errors
+    Raises
     ------
-    UsageError for a component or a mode that the model does not have, or a contact without one.
+    UsageError
+        For a component or a mode that the model does not have, or a contact without one.
+
+    Notes
+    -----
+    To bring a solver of your own. What follows an event is then yours to decide; `simulate` does both, and
+    takes a solver of your own as an integrator (`hybridsim.integrators.base.Integrator`).
 
     Examples
     --------

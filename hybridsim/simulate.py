@@ -69,37 +69,57 @@ def simulate(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which
+    model : str, path, Model or MechanicalSystem
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which
         runs by Taylor series of its own, or by ``moreau``.
-    t_span : (t0, t1); t1 < t0 runs backward in time.
-    params : parameter values that replace the declared ones: numbers, or expressions of other parameters.
-    x0 : initial values that replace the declared ones, by name (states and discrete states) or as a whole sequence.
-    z0 : initial modes by component; where a surface decides, the engine finds the mode from x0.
-    integrator : a name from `list_integrators`; "auto" takes ``exact`` where all modes are linear in the
-        states, ``rodas5p`` where they are stiff at the start, else ``taylor`` below rtol = 1e-10 and ``dop853``;
+    t_span : tuple of float
+        (t0, t1); t1 < t0 runs backward in time.
+    params : mapping of str to str or float, optional
+        Parameter values that replace the declared ones: numbers, or expressions of other parameters.
+    x0 : mapping of str to float or sequence of float, optional
+        Initial values that replace the declared ones, by name (states and discrete states) or as a whole
+        sequence.
+    z0 : mapping of str to str, optional
+        Initial modes by component; where a surface decides, the engine finds the mode from x0.
+    integrator : str, optional
+        A name from `list_integrators`; "auto" takes ``exact`` where all modes are linear in the states,
+        ``rodas5p`` where they are stiff at the start, else ``taylor`` below rtol = 1e-10 and ``dop853``;
         ``sol.message`` says which and why.
-    rtol, atol : error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its default
-        is rtol * 1e-3 * nominal, with the nominal size from the declaration, else |x0|, else 1. An integrator with a
-        fixed step refuses both.
-    max_step, first_step : bounds of the step, in the unit of t.
-    t_eval : times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
+    rtol, atol : float, mapping of str to float or sequence of float, optional
+        Error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its
+        default is rtol * 1e-3 * nominal, with the nominal size from the declaration, else ``|x0|``, else 1. An
+        integrator with a fixed step refuses both.
+    max_step, first_step : float, optional
+        Bounds of the step, in the unit of t.
+    t_eval : sequence of float, optional
+        Times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
         changes the run.
-    save : what is kept of the run, which it never changes. "all"; "events": no states between them; "last-period": the
-        last period of the forcing, states and events; a number: the last so much time, in the unit of t; "nothing":
-        the state at the end, status and cost. With the last three a run of any length takes the same memory.
-    limits : what the run may cost, by name: "events", "steps", "seconds" by the clock, "megabytes" by which the process
-        grows. A run that has had its share stops soon after, with status "limit" and what it computed;
-        ``sol.resume()`` goes on from there, to the same digits as if it had never stopped.
-    progress : called with the finished fraction of the span, from time to time.
-    options : options of the integrator.
+    save : str or float, optional
+        What is kept of the run, which it never changes. "all"; "events": no states between them;
+        "last-period": the last period of the forcing, states and events; a number: the last so much time, in
+        the unit of t; "nothing": the state at the end, status and cost. With the last three a run of any
+        length takes the same memory.
+    limits : mapping of str to float, optional
+        What the run may cost, by name: "events", "steps", "seconds" by the clock, "megabytes" by which the
+        process grows. A run that has had its share stops soon after, with status "limit" and what it
+        computed; ``sol.resume()`` goes on from there, to the same digits as if it had never stopped.
+    progress : callable, optional
+        Called with the finished fraction of the span, from time to time.
+    **options : Any
+        Options of the integrator.
 
     Returns
     -------
-    Solution, also where the run stopped early: ``sol.status`` and ``sol.message`` say why.
+    Solution
+        Also where the run stopped early: ``sol.status`` and ``sol.message`` say why. Of a `MechanicalSystem`
+        a `MechanicalSolution`, or a `SteppedSolution` by ``moreau``.
 
-    Errors
+    Raises
     ------
-    UsageError for anything that does not fit the model or the integrator; ModelError for a faulty model.
+    UsageError
+        For anything that does not fit the model or the integrator.
+    ModelError
+        For a faulty model.
 
     Examples
     --------

@@ -47,26 +47,43 @@ def compare(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
-    t_span : (t0, t1), t1 > t0. If not given, from 0 over the model's own duration, else 20 T, else 10 where it has no
-        forcing period T.
-    integrators : names, (name, options) or `Series`; all registered ones if not given.
-    rtols : tolerances of the integrators that adapt their step.
-    steps : steps a period of those that do not; without a period, a tenth of the run counts as one.
-    params, x0 : parameter values and initial values by name, in place of the declared ones.
-    repeat : timed repetitions of each run, in turns over all of them, after one that warms up; runs of seconds
-        are repeated less often.
-    reference : what the errors are relative to: None for a closed form where one is known, else two accurate
-        runs of different kind; "closed form", "multiple precision" or "runs" to insist; a Solution; or a function
-        t -> states.
-    regularized : kinds of `Model.regularized`: runs these forms beside the set-valued law, over several v0 each, by
-        `cvode-bdf` and `dop853` at rtol 1e-9 if nothing else is given. Their errors are those of the form: against
-        the set-valued reference.
-    v0 : widths of these forms, in the unit of the relative velocity; from 1e-1 to 1e-4 of its nominal size if not
-        given.
-    budget : seconds that all of it may take. What does not fit is not run, and its row says so: first the
+    model : str, path or Model
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    t_span : tuple of float, optional
+        (t0, t1), t1 > t0. If not given, from 0 over the model's own duration, else 20 T, else 10 where it has
+        no forcing period T.
+    integrators : sequence of str, tuple or Series, optional
+        Names, (name, options) or `Series`; all registered ones if not given.
+    rtols : sequence of float, optional
+        Tolerances of the integrators that adapt their step.
+    steps : sequence of int, optional
+        Steps a period of those that do not; without a period, a tenth of the run counts as one.
+    params, x0 : mapping of str to float, optional
+        Parameter values and initial values by name, in place of the declared ones.
+    repeat : int, optional
+        Timed repetitions of each run, in turns over all of them, after one that warms up; runs of seconds are
+        repeated less often.
+    reference : str, Solution or callable, optional
+        What the errors are relative to: None for a closed form where one is known, else two accurate runs of
+        different kind; "closed form", "multiple precision" or "runs" to insist; a Solution; or a function t
+        -> states.
+    regularized : str or sequence of str, optional
+        Kinds of `Model.regularized`: runs these forms beside the set-valued law, over several v0 each, by
+        `cvode-bdf` and `dop853` at rtol 1e-9 if nothing else is given. Their errors are those of the form:
+        against the set-valued reference.
+    v0 : sequence of float, optional
+        Widths of these forms, in the unit of the relative velocity; from 1e-1 to 1e-4 of its nominal size if
+        not given.
+    budget : float, optional
+        Seconds that all of it may take. What does not fit is not run, and its row says so: first the
         repetitions go, then the settings that take longest.
-    progress : called as progress(done, total, what is next).
+    progress : callable, optional
+        Called as progress(done, total, what is next).
+
+    Returns
+    -------
+    Comparison
+        A row for each run, with its errors and costs.
 
     Examples
     --------

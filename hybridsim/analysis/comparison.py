@@ -20,16 +20,33 @@ class Comparison:
 
     Parameters
     ----------
-    title : of the model.
-    t_span, period : what was run; the period of the forcing or None.
-    reference : what the errors are relative to, in words.
-    uncertainty : how far the reference is from a second of another kind; None where there is none.
-    rows : in the order of the request.
-    repeat : timed repetitions.
-    provenance : versions, machine, hash of the model.
-    warnings : what a reader must know before he trusts the numbers.
-    second_reference : another reference, of another kind, that the first was held against; "" where there is none.
-    difference : how far it is from the first.
+    title : str
+        Of the model.
+    t_span, period : tuple of float, float or None
+        What was run; the period of the forcing or None.
+    reference : str
+        What the errors are relative to, in words.
+    uncertainty : Errors or None
+        How far the reference is from a second of another kind; None where there is none.
+    rows : tuple of Row
+        In the order of the request.
+    repeat : int
+        Timed repetitions.
+    provenance : mapping of str to object, optional
+        Versions, machine, hash of the model.
+    warnings : tuple of str, optional
+        What a reader must know before he trusts the numbers.
+    second_reference : str, optional
+        Another reference, of another kind, that the first was held against; "" where there is none.
+    difference : Errors, optional
+        How far it is from the first.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.compare("dfcs", t_span=(0, 0.03), integrators=["exact"], rtols=[1e-9], repeat=1)
+    >>> found.labels
+    ('exact',)
     """
 
     title: str

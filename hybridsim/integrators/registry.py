@@ -59,7 +59,19 @@ def _registered() -> dict[str, type[Integrator]]:
 
 
 def list_integrators() -> tuple[type[Integrator], ...]:
-    """All integrators that can be named, ours first."""
+    """List all integrators that can be named, ours first.
+
+    Returns
+    -------
+    tuple of type
+        Of each its ``name`` and what it says of itself.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> [integrator.name for integrator in hs.list_integrators()][:5]
+    ['dop853', 'tsit5', 'rodas5p', 'exact', 'taylor']
+    """
     return tuple(_registered().values())
 
 

@@ -13,24 +13,34 @@ from hybridsim.model.declared import Declared
 class MechanicalImpact(Declared):
     """A unilateral contact of a `MechanicalSystem`: a stop, a clearance, two neighbours that collide.
 
+    ::
+
         g = gap + direction . q >= 0,   its force p >= 0 acts as + direction p,
         0 <= P,   u+ >= e max(-u-, 0),  one of the two with equality, u = direction . q'  (`hybridsim.Impact`)
 
     Parameters
     ----------
-    name : of the normal force.
-    direction : the weights (n,), or a mapping from numbers of coordinates to weights: +1 for the body that the force
+    name : str
+        Of the normal force.
+    direction : array or mapping of int to float
+        The weights (n,), or a mapping from numbers of coordinates to weights: +1 for the body that the force
         pushes along its coordinate, -1 for the one behind it.
-    gap : how wide it is at q = 0.
-    restitution : e, from 0 (no rebound) to 1 (no loss).
+    gap : float
+        How wide it is at q = 0.
+    restitution : float
+        E, from 0 (no rebound) to 1 (no loss).
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
-    Errors
+    Raises
     ------
-    UsageError for what is no finite number, a direction of zeros, a restitution outside of [0, 1].
+    UsageError
+        For what is no finite number, a direction of zeros, a restitution outside of [0, 1].
 
-    When to use
-    -----------
-    Many contacts that close, by time stepping: ``hs.simulate(system, t_span, integrator="moreau", step=...)``.
+    Notes
+    -----
+    For many contacts that close, by time stepping: ``hs.simulate(system, t_span, integrator="moreau",
+    step=...)``.
 
     Examples
     --------

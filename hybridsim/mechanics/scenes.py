@@ -25,30 +25,49 @@ def chain_on_belt(
     gap: float | None = None,
     restitution: float = 0.5,
 ) -> MechanicalSystem:
-    """A chain of n blocks on a moving belt, each held by a leaf spring: the model of Burridge and Knopoff.
+    """Build a chain of n blocks on a moving belt, each held by a leaf spring: the model of Burridge and Knopoff.
+
+    ::
 
         x_i'' + leaf x_i + coupling (2 x_i - x_{i-1} - x_{i+1}) = - f_i,   |f_i| = 1/(1 + delta |x_i' - belt|)
 
     Parameters
     ----------
-    n : number of blocks, of mass 1; the ends are free.
-    coupling, leaf : stiffness between neighbours, and of each block to the frame.
-    delta, belt : how fast friction falls with speed, and the belt's speed.
-    spread, seed : the blocks start at rest, at random within +-spread.
-    gap, restitution : given, neighbours collide where they come closer by so much than they are with all springs slack.
+    n : int
+        Number of blocks, of mass 1; the ends are free.
+    coupling, leaf : float, optional
+        Stiffness between neighbours, and of each block to the frame.
+    delta, belt : float, optional
+        How fast friction falls with speed, and the belt's speed.
+    spread, seed : float, int, optional
+        The blocks start at rest, at random within +-spread.
+    gap, restitution : float, optional
+        Given, neighbours collide where they come closer by so much than they are with all springs slack.
 
-    Errors
-    ------
-    UsageError for a gap that the start may overlap: spread has to be below gap/2.
-
-    Look at
+    Returns
     -------
+    MechanicalSystem
+        The chain, without units.
+
+    Raises
+    ------
+    UsageError
+        For a gap that the start may overlap: spread has to be below gap/2.
+
+    Notes
+    -----
     Events that run along the chain; with one block it is the model ``belt``.
 
-    Source
-    ------
+    References
+    ----------
     R. Burridge, L. Knopoff, Bull. Seismol. Soc. Am. 57 (1967) 341; velocity weakening as J. M. Carlson, J. S. Langer,
     Phys. Rev. A 40 (1989) 6470, doi:10.1103/PhysRevA.40.6470.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.chain_on_belt(100).n
+    100
     """
     from scipy import sparse
 
@@ -84,20 +103,35 @@ def chain_on_belt(
 def two_blocks_on_belt(
     *, coupling: float = 1.2, second: float = 1.3, delta: float = 3.0, belt: float = 0.3
 ) -> MechanicalSystem:
-    """Two blocks on a moving belt, joined by a spring; the second has the larger friction.
+    """Build two blocks on a moving belt, joined by a spring; the second has the larger friction.
 
     Parameters
     ----------
-    coupling : stiffness between the blocks; each has a spring of stiffness 1 to the frame, and mass 1.
-    second : load of the second block, that of the first is 1.
+    coupling : float, optional
+        Stiffness between the blocks; each has a spring of stiffness 1 to the frame, and mass 1.
+    second : float, optional
+        Load of the second block, that of the first is 1.
+    delta, belt : float, optional
+        How fast friction falls with speed, and the belt's speed.
 
-    Look at
+    Returns
     -------
+    MechanicalSystem
+        Two coordinates and two contacts, without units.
+
+    Notes
+    -----
     Both stick together, the first is pulled off, and what it does then decides when the second follows.
 
-    Source
-    ------
+    References
+    ----------
     After U. Galvanetto, S. R. Bishop, L. Briseghella, Int. J. Bifurcation and Chaos 5 (1995) 637.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> len(hs.two_blocks_on_belt().contacts)
+    2
     """
     law: Any = {"mu": 1.0, "delta": delta}
     loads = (1.0, second)
@@ -116,21 +150,35 @@ def two_blocks_on_belt(
 def three_coupled_blocks(
     *, mu: tuple[float, float, float] = (0.15, 0.3, 0.2), amplitude: float = 12.0, omega: float = 1.5
 ) -> MechanicalSystem:
-    """Three blocks on top of each other, the lowest on the ground, the middle one shaken: contacts share coordinates.
+    """Build three blocks on top of each other, the lowest on the ground, the middle one shaken.
 
     Parameters
     ----------
-    mu : of the contacts from below; the blocks have mass 1 each and g = 10, so that the loads are 30, 20 and 10.
-    amplitude, omega : of the force on the middle block.
+    mu : tuple of float, optional
+        Of the contacts from below; the blocks have mass 1 each and g = 10, so that the loads are 30, 20 and
+        10.
+    amplitude, omega : float, optional
+        Of the force on the middle block.
 
-    Look at
+    Returns
     -------
+    MechanicalSystem
+        Three coordinates and three contacts that share them, without units.
+
+    Notes
+    -----
     Which of the three contacts slip is one question, since each force acts on two blocks; where two of them stick the
     blocks have one velocity.
 
-    Source
-    ------
+    References
+    ----------
     In the manner of the problems of D. E. Stewart, Numer. Math. 58 (1990) 299, doi:10.1007/BF01385627.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> [contact.normal for contact in hs.three_coupled_blocks().contacts]
+    [30.0, 20.0, 10.0]
     """
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [

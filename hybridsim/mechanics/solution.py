@@ -28,9 +28,23 @@ class MechanicalSolution:
 
     Attributes
     ----------
-    t, y : times (k,) and states (2n, k): the positions in the order of declaration, then the velocities; an event time
-        stands twice, with x- and x+.
-    events, modes, stats, status, success, message, warnings : as of a `Solution`.
+    t, y : array
+        Times (k,) and states (2n, k): the positions in the order of declaration, then the velocities; an
+        event time stands twice, with x- and x+.
+    events, modes, stats, status, success, message, warnings : object
+        As of a `Solution`.
+
+    Other Parameters
+    ----------------
+    model, run, grid, save, wall_time, compile_time : object
+        What `simulate` passes on; not made by hand.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sol = hs.simulate(hs.two_blocks_on_belt(), (0, 1))
+    >>> sol.status, sol(1.0).shape
+    ('finished', (4,))
     """
 
     integrator = "taylor"

@@ -24,12 +24,28 @@ class SteppedSolution:
 
     Attributes
     ----------
-    t, y : times (k,) and states (2n, k): the positions in the order of declaration, then the velocities.
-    events, modes : changes of mode, at the beginning of the step that has the new one; bounces are none.
-    work : energy that the system gets from ``forcing``, from ``damping``, ``friction`` and ``impacts`` (not positive,
-        but for what a step rounds), and from the moving ``bases`` of its contacts, over the run. With theta = 1/2 they
-        add up to what kinetic and elastic energy gain.
-    stats, status, success, message, warnings : as of a `Solution`.
+    t, y : array
+        Times (k,) and states (2n, k): the positions in the order of declaration, then the velocities.
+    events, modes : object
+        Changes of mode, at the beginning of the step that has the new one; bounces are none.
+    work : dict of str to float
+        Energy that the system gets from ``forcing``, from ``damping``, ``friction`` and ``impacts`` (not
+        positive, but for what a step rounds), and from the moving ``bases`` of its contacts, over the run.
+        With theta = 1/2 they add up to what kinetic and elastic energy gain.
+    stats, status, success, message, warnings : object
+        As of a `Solution`.
+
+    Other Parameters
+    ----------------
+    run, grid, save, wall_time, compile_time : object
+        What `simulate` passes on; not made by hand.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sol = hs.simulate(hs.two_blocks_on_belt(), (0, 1), integrator="moreau", step=0.01)
+    >>> sol.status, sol(1.0).shape
+    ('finished', (4,))
     """
 
     integrator = "moreau"

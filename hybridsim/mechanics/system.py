@@ -24,12 +24,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """sin*sin(omega t) + cos*cos(omega t): a force, or the speed of a base; its phase loses no digits over any time.
+    """A force, or speed of a base, sin*sin(omega t) + cos*cos(omega t); its phase loses no digits over any time.
 
     Parameters
     ----------
-    omega : angular frequency, rad per unit of t.
-    sin, cos : amplitudes of the two parts.
+    omega : float
+        Angular frequency, rad per unit of t.
+    sin, cos : float, optional
+        Amplitudes of the two parts.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Harmonic(2.0, sin=0.5)
+    Harmonic(omega=2.0, sin=0.5, cos=0.0)
     """
 
     omega: float
@@ -41,16 +49,26 @@ class Harmonic:
 class MechanicalContact(Declared):
     """A dry contact of a `MechanicalSystem`: its force f acts as - direction f and opposes the relative velocity.
 
+    ::
+
         v_rel = direction . q' - base
 
     Parameters
     ----------
-    name : of the friction force.
-    direction : the weights w (n,), or a mapping from numbers of coordinates to weights.
-    normal : normal load, >= 0.
-    law : a set-valued `FrictionLaw` (``slip`` and ``stick``) without tables, or the name of one of the package.
-    arguments : the law's parameters, numbers.
-    base : speed of what the system slides on: a number, or a `Harmonic`.
+    name : str
+        Of the friction force.
+    direction : array or mapping of int to float
+        The weights w (n,), or a mapping from numbers of coordinates to weights.
+    normal : float
+        Normal load, >= 0.
+    law : FrictionLaw or str
+        A set-valued `FrictionLaw` (``slip`` and ``stick``) without tables, or the name of one of the package.
+    arguments : mapping of str to float, optional
+        The law's parameters, numbers.
+    base : float or Harmonic, optional
+        Speed of what the system slides on: a number, or a `Harmonic`.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
     Examples
     --------
@@ -92,9 +110,10 @@ class MechanicalContact(Declared):
     def values(self) -> dict[str, float]:
         """The law's parameters in numbers, defaults included.
 
-        Errors
+        Raises
         ------
-        ModelError for a parameter that the law does not have, or one without a value.
+        ModelError
+            For a parameter that the law does not have, or one without a value.
         """
         from hybridsim.model.contact import Contact
 
@@ -106,6 +125,8 @@ class MechanicalContact(Declared):
 class MechanicalSystem:
     """A linear structure with dry contacts, as data for compiled kernels.
 
+    ::
+
         M q'' + C q' + K q = forcing(t) - sum_i w_i f_i + sum_j d_j p_j,      f_i = law_i(w_i . q' - base_i)
 
     Which contacts stick after an event is decided for all contacts that act on each other at once, as one
@@ -113,23 +134,32 @@ class MechanicalSystem:
 
     Parameters
     ----------
-    M, C, K : arrays (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K
-    may be None.
-    forcing : None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from coordinates.
-    contacts : `MechanicalContact` objects.
-    impacts : `MechanicalImpact` objects, of directions d_j; with them a system is run by ``moreau``.
-    q0, v0 : initial positions and velocities (n,), zero if not given.
-    names : of the coordinates, q1, q2, ... if not given; their velocities are v1, v2, ... or ``v_`` and the name.
-    name, title, source : as of a `Model`.
+    M, C, K : array, sparse array or None
+        Shape (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K may be
+        None.
+    forcing : sequence or mapping of int to float, Harmonic or tuple of these, optional
+        None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from
+        coordinates.
+    contacts : iterable of MechanicalContact, optional
+        `MechanicalContact` objects.
+    impacts : iterable of MechanicalImpact, optional
+        Of directions d_j; with them a system is run by ``moreau``.
+    q0, v0 : array, optional
+        Initial positions and velocities (n,), zero if not given.
+    names : sequence of str, optional
+        Of the coordinates, q1, q2, ... if not given; their velocities are v1, v2, ... or ``v_`` and the name.
+    name, title, source : str, optional
+        As of a `Model`.
 
-    When to use
-    -----------
+    Raises
+    ------
+    UsageError
+        For shapes that do not fit, a mass matrix that is not positive definite, names that are not unique.
+
+    Notes
+    -----
     From a few contacts to thousands. The ordinary `Model` knows more laws, states and inputs, and is decided by trying
     all combinations of modes; `to_model` makes one of a small system.
-
-    Errors
-    ------
-    UsageError for shapes that do not fit, a mass matrix that is not positive definite, names that are not unique.
 
     Examples
     --------

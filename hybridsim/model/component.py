@@ -13,7 +13,25 @@ from hybridsim.model.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Choice(Declared):
-    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both taken at x-."""
+    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both taken at x-.
+
+    Parameters
+    ----------
+    to : str
+        Name of the mode that follows.
+    when : str or float, optional
+        Condition, an expression; None always holds.
+    reset : mapping of str to str or float, optional
+        State or discrete state to the expression that gives its new value.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Choice("fall", reset={"v": "-e*v"}).reset
+    {'v': Expression(text='-e*v')}
+    """
 
     to: str
     when: Expression | None = None
@@ -31,11 +49,24 @@ class Guard(Declared):
 
     Parameters
     ----------
-    expr : the scalar, smooth in its mode.
-    then : choices in order, the first whose condition holds is taken; a text is the mode to go to. Empty
-        where a surface decides.
-    fatal : a message instead of choices: the run ends with status ``inconsistent`` where the guard would go
+    name : str
+        What the guard is called in events.
+    expr : str or float
+        The scalar, smooth in its mode.
+    then : str, Choice or sequence of these, optional
+        Choices in order, the first whose condition holds is taken; a text is the mode to go to. Empty where a
+        surface decides.
+    fatal : str, optional
+        A message instead of choices: the run ends with status ``inconsistent`` where the guard would go
         negative.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Guard("warm", "high - T", "off").then[0].to
+    'off'
     """
 
     name: str
@@ -59,7 +90,26 @@ class Guard(Declared):
 class Mode(Declared):
     """A flow and its domain: ``der`` replaces rates of states, ``set`` gives the component's variables.
 
-    ``flow`` replaces all rates in a model whose rates are a Python function (see `Model`).
+    Parameters
+    ----------
+    name : str
+        What the mode is called in its component.
+    guards : sequence of Guard, optional
+        What must stay >= 0 while it lasts.
+    der : mapping of str to str or float, optional
+        State to the rate that replaces its own.
+    set : mapping of str to str or float, optional
+        Variable to its expression in this mode.
+    flow : callable, optional
+        Function (t, x, p) that replaces all rates in a model whose rates are a Python function (see `Model`).
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Mode("on", guards=[hs.Guard("warm", "high - T", "off")], set={"heat": "P"}).set
+    {'heat': Expression(text='P')}
     """
 
     name: str
@@ -81,15 +131,30 @@ class Surface(Declared):
 
     Parameters
     ----------
-    function : s.
-    unknown : the variable that holds it, solved for from ds/dt = 0, in which it must be linear.
-    above, below, hold : mode for s > 0, for s < 0, and on s = 0. Without one below, s cannot become negative: where it
-        comes to zero there is an impact, and ``hold`` keeps s and ds/dt at zero, solved for from d2s/dt2 = 0.
-    jump_above, jump_below : value of ``unknown`` at the limit of holding minus its value in ``above`` at s =
-        0+ (in ``below`` at s = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
-    unique : the motion must be the only admissible one. Otherwise what holds comes first, as static friction does,
+    function : str or float
+        S.
+    unknown : str
+        The variable that holds it, solved for from ds/dt = 0, in which it must be linear.
+    above, below, hold : str
+        Mode for s > 0, for s < 0, and on s = 0. Without one below, s cannot become negative: where it comes
+        to zero there is an impact, and ``hold`` keeps s and ds/dt at zero, solved for from d2s/dt2 = 0.
+    jump_above, jump_below : str or float
+        Value of ``unknown`` at the limit of holding minus its value in ``above`` at s = 0+ (in ``below`` at s
+        = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
+    unique : bool, optional
+        The motion must be the only admissible one. Otherwise what holds comes first, as static friction does,
         and the unknown has to oppose s; without a mode below it has to push s up.
-    restitution : of impacts, where there is no mode below; over the model's names and ``speed``, that of approach.
+    restitution : str or float, optional
+        Of impacts, where there is no mode below; over the model's names and ``speed``, that of approach.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> friction = hs.Contact("f", "v", "N", "coulomb", {"mu": 0.5}).component().surface
+    >>> friction.unknown, friction.above, friction.below, friction.hold
+    ('f', 'slip+', 'slip-', 'stick')
     """
 
     function: Expression
@@ -130,8 +195,24 @@ class Component(Declared):
 
     Parameters
     ----------
-    initial : mode at t0; None where a surface decides it from x0. With a single mode it is that one.
-    surface : given, the guards have no choices: the decisions go by admissibility.
+    name : str
+        What the component is called; its modes are named ``name.mode``.
+    modes : sequence of Mode
+        The modes, of which there is at least one.
+    initial : str, optional
+        Mode at t0; None where a surface decides it from x0. With a single mode it is that one.
+    surface : Surface, optional
+        Given, the guards have no choices: the decisions go by admissibility.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> off = hs.Mode("off", guards=[hs.Guard("cold", "T - low", "on")], set={"heat": 0})
+    >>> on = hs.Mode("on", guards=[hs.Guard("warm", "high - T", "off")], set={"heat": "P"})
+    >>> hs.Component("thermostat", [off, on], initial="on").variables
+    ('heat',)
     """
 
     name: str

@@ -28,14 +28,24 @@ class Contact(Declared):
 
     Parameters
     ----------
-    velocity : relative velocity, an expression of states, inputs, parameters and t.
-    normal : normal load, >= 0. Where it can vary, a guard ends the run should it become negative.
-    law : a `FrictionLaw`, or the name of one that comes with the package.
-    arguments : law parameter to number or expression over the model's names; what is not given has the law's
-        default.
-    opens : the contact lifts off where the load would become negative: there is no force until it is back. An automaton
-        of the modes ``closed`` and ``open``, named ``f_N`` in a contact f, as is the load that it leaves.
-    start, nominal : of states of the law, by their names there, instead of what the law says.
+    name : str
+        Of the friction force, which other expressions use by it.
+    velocity : str or float
+        Relative velocity, an expression of states, inputs, parameters and t.
+    normal : str or float
+        Normal load, >= 0. Where it can vary, a guard ends the run should it become negative.
+    law : FrictionLaw or str
+        A `FrictionLaw`, or the name of one that comes with the package.
+    arguments : mapping of str to str or float, optional
+        Law parameter to number or expression over the model's names; what is not given has the law's default.
+    opens : bool, optional
+        The contact lifts off where the load would become negative: there is no force until it is back. An
+        automaton of the modes ``closed`` and ``open``, named ``f_N`` in a contact f, as is the load that it
+        leaves.
+    start, nominal : mapping of str to float, optional
+        Of states of the law, by their names there, instead of what the law says.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
     Examples
     --------
@@ -70,18 +80,22 @@ class Contact(Declared):
     def component(self, constants: Collection[str] = ()) -> Component:
         """The automaton of the contact's own name; with a set-valued law three modes on the surface velocity = 0.
 
+        ::
+
             slip+ : velocity >= 0,  f = +slip(v = velocity)
             slip- : velocity <= 0,  f = -slip_backward(v = -velocity)
             stick : velocity = 0,   -stick_backward <= f <= stick,  f solved for
 
         Parameters
         ----------
-        constants : names known to be constant (the model's parameters); a normal load that uses any other
-            name gets a guard in every mode.
+        constants : collection of str, optional
+            Names known to be constant (the model's parameters); a normal load that uses any other name gets a
+            guard in every mode.
 
-        Errors
+        Raises
         ------
-        ModelError for an argument that the law does not have, or one that is missing.
+        ModelError
+            For an argument that the law does not have, or one that is missing.
         """
         return next(part for part in self.components(constants) if part.name == self.name)
 

@@ -17,6 +17,8 @@ SPEED = "speed"  # what a restitution calls the speed of approach
 class Impact(Declared):
     """A unilateral contact; its name p is the normal force, which pushes the bodies apart and never pulls.
 
+    ::
+
         open   : gap >= 0,                     p = 0
         closed : gap = 0, d(gap)/dt = 0,       p >= 0, solved for from d2(gap)/dt2 = 0
         impact : gap = 0, d(gap)/dt < 0,       an impulse P >= 0 changes the states by (d(rates)/dp) P
@@ -27,22 +29,32 @@ class Impact(Declared):
 
     Parameters
     ----------
-    gap : g(t, x) >= 0, a smooth expression of positions: p enters its second derivative and not its first. p has to do
-        work along the gap, so that a mass m at height h with gap h has + p/m in its acceleration.
-    restitution : e, from 0 (no rebound) to 1 (no loss); it may use the speed of approach, above zero, by the name
+    name : str
+        Of the normal force p.
+    gap : str or float
+        G(t, x) >= 0, a smooth expression of positions: p enters its second derivative and not its first. p
+        has to do work along the gap, so that a mass m at height h with gap h has + p/m in its acceleration.
+    restitution : str or float
+        E, from 0 (no rebound) to 1 (no loss); it may use the speed of approach, above zero, by the name
         ``speed``.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
-    Errors
+    Raises
     ------
-    ModelError, when the model is checked or compiled, for a gap without a state, one whose first derivative has p, one
-    that is linear in no state, and for a restitution outside of [0, 1] that is a number.
+    ModelError
+        When the model is checked or compiled, for a gap without a state, one whose first derivative has p,
+        one that is linear in no state, and for a restitution outside of [0, 1] that is a number.
 
-    When to use
-    -----------
-    Stops, floors, clearances. A `Component` with a guard and a reset is the general form, for rules that are not
-    Newton's.
+    Notes
+    -----
+    For stops, floors, clearances. A `Component` with a guard and a reset is the general form, for rules that
+    are not Newton's.
 
-    Source: J. J. Moreau, in Nonsmooth Mechanics and Applications (Springer, 1988) 1, doi:10.1007/978-3-7091-2624-0_1;
+    References
+    ----------
+    J. J. Moreau, in Nonsmooth Mechanics and Applications (Springer, 1988) 1, doi:10.1007/978-3-7091-2624-0_1.
+
     C. Glocker, F. Pfeiffer, Nonlinear Dyn. 7 (1995) 471, doi:10.1007/BF00121109.
 
     Examples

@@ -28,18 +28,39 @@ _DEFAULTS: dict[str, dict[str, object]] = {
 class Input(Declared):
     """A function of time under a name.
 
-    table  Values at increasing times, between them linear or (natural) cubic; before the first and after the
-           last the end values hold. Two equal times are a jump (linear only).
-    wave   offset + amplitude*s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
-           square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1
-           at 1/4, -1 at 3/4; sawtooth: from -1 rising to 1, where it jumps back.
-    chirp  amplitude*sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; the
-           frequency goes from f0 to f1, and is f0 before and f1 after. ``phase`` is an angle.
+    table
+        Values at increasing times, between them linear or (natural) cubic; before the first and after the last the end
+        values hold. Two equal times are a jump (linear only).
+    wave
+        offset + amplitude s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
+        square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1 at 1/4, -1 at
+        3/4; sawtooth: from -1 rising to 1, where it jumps back.
+    chirp
+        amplitude sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; the frequency goes from
+        f0 to f1, and is f0 before and f1 after. ``phase`` is an angle in radians.
 
     Parameters
     ----------
-    times, values : numbers of a table.
-    amplitude, period, phase, offset, duty, f0, f1, duration : expressions of parameters.
+    name : str
+        What other expressions call it.
+    kind : str
+        "table", "wave" or "chirp".
+    times, values : sequence of float, optional
+        Numbers (k,) of a table.
+    interpolation : str, optional
+        Of a table: "linear" or "cubic".
+    shape : str, optional
+        Of a wave: "square", "sine", "triangle" or "sawtooth".
+    amplitude, period, phase, offset, duty, f0, f1, duration : str or float, optional
+        Expressions of parameters.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.Input("u", "wave", shape="square", amplitude="A", period=2).expressions["amplitude"]
+    Expression(text='A')
     """
 
     name: str

@@ -23,29 +23,46 @@ FORCE = "force"
 class FrictionLaw(Declared):
     """The friction force as a declaration, in one of two forms.
 
-    Set-valued, with a mode of its own for rest; v >= 0 is the magnitude of the relative velocity:
+    Set-valued, with a mode of its own for rest; v >= 0 is the magnitude of the relative velocity::
 
         slip :  |f| = slip(v, N),   forward and backward alike unless ``slip_backward`` is given
         stick:  -stick_backward(N) <= f <= stick(N)
 
-    Single-valued, with states of its own or none; v is the relative velocity with its sign:
+    Single-valued, with states of its own or none; v is the relative velocity with its sign::
 
         f = force(v, N, z),   z' = der(v, N, z)
 
     Parameters
     ----------
-    slip, stick : expressions of ``v`` (slip alone), ``N`` (normal load) and the law's own parameters.
-    parameters : name to default (a number or an expression of the others); a default of None, or a plain
-        sequence of names, makes them arguments that every contact has to give.
-    slip_backward, stick_backward : where they differ from the forward ones; both are magnitudes.
-    force : expression of ``v``, ``N``, ``dN`` (rate of the load), parameters, states and definitions.
-    states : `State` objects; in a contact f the state z is called ``f_z``.
-    definitions : named parts of the other expressions.
-    modes, initial : an automaton of the law: modes with guards, rates ``der`` of the states and, with ``set``, a
-        ``force`` of their own.
-    copies : parameter that says how many copies of the law act in parallel, each with its own states and modes;
+    name : str
+        What the law is called.
+    slip, stick : str or float, optional
+        Expressions of ``v`` (slip alone), ``N`` (normal load) and the law's own parameters.
+    parameters : mapping of str to str, float or None, or sequence of str, optional
+        Name to default (a number or an expression of the others); a default of None, or a plain sequence of
+        names, makes them arguments that every contact has to give.
+    title, source : str, optional
+        What it is, and where it comes from.
+    slip_backward, stick_backward : str or float, optional
+        Where they differ from the forward ones; both are magnitudes.
+    force : str or float, optional
+        Expression of ``v``, ``N``, ``dN`` (rate of the load), parameters, states and definitions.
+    states : sequence of State, optional
+        `State` objects; in a contact f the state z is called ``f_z``.
+    definitions : mapping of str to str or float, optional
+        Named parts of the other expressions.
+    modes : sequence of Mode, optional
+        With ``initial``, an automaton of the law: modes with guards, rates ``der`` of the states and, with
+        ``set``, a ``force`` of their own.
+    initial : str, optional
+        The mode at t0.
+    copies : str, optional
+        Parameter that says how many copies of the law act in parallel, each with its own states and modes;
         the force is the sum, the index of a copy is ``i`` = 1, 2, ...
-    tables : named functions of one argument, given by points.
+    tables : sequence of LawTable, optional
+        Named functions of one argument, given by points.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
     Examples
     --------

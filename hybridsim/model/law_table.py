@@ -21,9 +21,20 @@ class LawTable(Declared):
 
     Parameters
     ----------
-    over : the argument, an expression of what the law knows; the speed if not given.
+    name : str
+        What the function is called in the law's expressions.
+    at : sequence of float
+        Arguments (k,), increasing.
+    values : sequence of float
+        Values (k,) at these.
+    over : str or float, optional
+        The argument, an expression of what the law knows; the speed if not given.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
-    Source: F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, doi:10.1137/0905021 (the slopes).
+    References
+    ----------
+    F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, doi:10.1137/0905021 (the slopes).
 
     Examples
     --------

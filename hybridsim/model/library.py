@@ -27,12 +27,29 @@ class ModelInfo:
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Model:
-    """A model by the name of one that comes with the package, or by the path of a ``.toml`` file.
+    """Load a model by the name of one that comes with the package, or by the path of a ``.toml`` file.
 
-    Errors
+    Parameters
+    ----------
+    name_or_path : str or path
+        A name of `list_models`, or the path of a file, ending in ``.toml``.
+
+    Returns
+    -------
+    Model
+        The model, validated.
+
+    Raises
     ------
-    ModelError: no such model (the nearest names are listed) or file; the file is empty, too large, no text,
-    no TOML; or all its faults in one.
+    ModelError
+        For no such model (the nearest names are listed) or file; for a file that is empty, too large, no text
+        or no TOML; or for all faults of a model in one.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.load("dfcs").parameter_values()["N"]
+    40.0
     """
     if not isinstance(name_or_path, str | os.PathLike):
         raise UsageError(f"the model is {name_or_path!r}", remedy="give a Model, a name or a path")
@@ -52,7 +69,19 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
 
 
 def list_models() -> tuple[ModelInfo, ...]:
-    """The models that come with the package, by name."""
+    """List the models that come with the package, by name.
+
+    Returns
+    -------
+    tuple of ModelInfo
+        Of each model its ``name``, ``title``, ``source`` and ``path``.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> "dfcs" in [info.name for info in hs.list_models()]
+    True
+    """
     found = []
     for path in _model_files():
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -67,11 +96,30 @@ def list_laws() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def load_law(name: str) -> FrictionLaw:
-    """A friction law of the package by name, ready for a `Contact`.
+    """Load a friction law of the package by name, ready for a `Contact`.
 
-    Errors
+    Parameters
+    ----------
+    name : str
+        Name of the law.
+
+    Returns
+    -------
+    FrictionLaw
+        The law.
+
+    Raises
     ------
-    ModelError with the nearest names.
+    ModelError
+        For an unknown name, with the nearest ones.
+    UsageError
+        For what is no text.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.load_law("coulomb").is_set_valued
+    True
     """
     from hybridsim.model.toml_laws import read_laws
     from hybridsim.model.toml_read import open_text

@@ -42,24 +42,42 @@ class Model(Declared):
 
     Parameters
     ----------
-    states : continuous states with their rates.
-    parameters : `Parameter` objects, or a dict of name to number or expression.
-    discrete : states changed by resets and ticks only.
-    components, contacts : the automata; their modes together are the discrete state z.
-    surfaces : switching surfaces, along which the motion may slide; automata as well.
-    impacts : unilateral contacts, whose gaps cannot become negative; automata as well.
-    inputs, monitors, schedules : known signals, events that change no mode, events at known times.
-    outputs : `Output` objects, or a dict of name to expression.
-    definitions : named intermediate expressions, a dict or pairs; they may use one another and what
-        components set.
-    flow : a Python function (t, x, p) -> the n rates (a tuple or an array), instead of rates by expressions. p has the
-        parameters as ``p.g`` and ``p[0]``. The states are then a dict of name to start value, or have der 0;
-        ``flow`` of a `Mode` replaces it there; guards, monitors, outputs, conditions and resets are functions
-        (t, x, p) -> a number, or a constant. Contacts, inputs, definitions and discrete states need expressions.
-    title, source, description, look : what it is, where it comes from, more, and what to look at.
-    duration : how long a run shows what there is to see, in the unit of t: an expression of parameters, the default of
-        ``hybridsim run`` and of comparisons. None leaves it to them.
-    path : the file it was read from.
+    name : str
+        What the model is called.
+    states : sequence of State, or mapping of str to float
+        Continuous states with their rates.
+    parameters : sequence of Parameter, or mapping of str to str or float, optional
+        `Parameter` objects, or a dict of name to number or expression.
+    discrete : sequence of Discrete, optional
+        States changed by resets and ticks only.
+    components, contacts : sequence of Component, sequence of Contact, optional
+        The automata; their modes together are the discrete state z.
+    inputs, monitors, schedules : sequence, optional
+        Of `Input`, known signals; of `Monitor`, events that change no mode; of `Schedule`, events at known
+        times.
+    outputs : sequence of Output, or mapping of str to str or float, optional
+        `Output` objects, or a dict of name to expression.
+    definitions : mapping of str to str or float, or sequence of pairs, optional
+        Named intermediate expressions, a dict or pairs; they may use one another and what components set.
+    title, source, description, look : str, optional
+        What it is, where it comes from, more, and what to look at.
+    duration : str or float, optional
+        How long a run shows what there is to see, in the unit of t: an expression of parameters, the default
+        of ``hybridsim run`` and of comparisons. None leaves it to them.
+    path : str, optional
+        The file it was read from.
+    flow : callable, optional
+        A Python function (t, x, p) -> the n rates (a tuple or an array), instead of rates by expressions. p
+        has the parameters as ``p.g`` and ``p[0]``. The states are then a dict of name to start value, or have
+        der 0; ``flow`` of a `Mode` replaces it there; guards, monitors, outputs, conditions and resets are
+        functions (t, x, p) -> a number, or a constant. Contacts, inputs, definitions and discrete states need
+        expressions.
+    surfaces : sequence of SwitchingSurface, optional
+        Switching surfaces, along which the motion may slide; automata as well.
+    impacts : sequence of Impact, optional
+        Unilateral contacts, whose gaps cannot become negative; automata as well.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
     Examples
     --------
@@ -161,9 +179,22 @@ class Model(Declared):
     def with_(self, /, **changes: Expression | str | float) -> Model:
         """A copy with parameter values changed: ``model.with_(N=40, omega="0.7*sqrt(k/m)")``.
 
-        Errors
+        Parameters
+        ----------
+        **changes : str or float
+            Parameter to number or expression of other parameters.
+
+        Returns
+        -------
+        Model
+            The copy.
+
+        Raises
         ------
-        UsageError for a name that is no parameter; ExpressionError for a value that is no expression.
+        UsageError
+            For a name that is no parameter.
+        ExpressionError
+            For a value that is no expression.
         """
         names = [parameter.name for parameter in self.parameters]
         _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
@@ -239,6 +270,8 @@ class Model(Declared):
     def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
         """A copy in which every contact has a single-valued force, for a look at what that costs.
 
+        ::
+
             tanh     f = slip(|v|) tanh(v/v0)
             arctan   f = slip(|v|) (2/pi) atan(v/v0)
             karnopp  in the band |v| < v0 the body is stopped and f is what holds it, up to the limit of stick
@@ -250,14 +283,25 @@ class Model(Declared):
 
         Parameters
         ----------
-        v0 : width, a velocity above zero in the unit of the relative velocity; a parameter ``v0`` of the copy.
+        kind : str
+            "tanh", "arctan" or "karnopp".
+        v0 : str or float
+            Width, a velocity above zero in the unit of the relative velocity; a parameter ``v0`` of the copy.
 
-        Errors
+        Returns
+        -------
+        Model
+            The copy.
+
+        Raises
         ------
-        UsageError for a kind that does not exist, a model without contacts, and what a kind cannot stand for:
-        static friction above slip(0) with tanh and arctan, contacts that act on each other with karnopp.
+        UsageError
+            For a kind that does not exist, a model without contacts, and what a kind cannot stand for: static
+            friction above slip(0) with tanh and arctan, contacts that act on each other with karnopp.
 
-        Source: D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698.
+        References
+        ----------
+        D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698.
         """
         from hybridsim.model.regularize import regularized
 
@@ -337,9 +381,15 @@ class Model(Declared):
     def validate(self) -> Model:
         """See to it that the declaration holds together; returns the model itself.
 
-        Errors
+        Returns
+        -------
+        Model
+            The model itself.
+
+        Raises
         ------
-        ModelError with all faults in ``errors``.
+        ModelError
+            With all faults in ``errors``.
         """
         from hybridsim.model.validate import find_errors
 
@@ -351,9 +401,15 @@ class Model(Declared):
     def to_toml(self) -> str:
         """The model as a TOML text that stands on its own: laws and tables are written into it.
 
-        Errors
+        Returns
+        -------
+        str
+            The text.
+
+        Raises
         ------
-        UsageError for a model of Python functions: a text cannot hold them.
+        UsageError
+            For a model of Python functions: a text cannot hold them.
         """
         from hybridsim.model.toml_write import write_model
 

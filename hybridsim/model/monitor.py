@@ -19,8 +19,26 @@ class Monitor(Declared):
 
     Parameters
     ----------
-    direction : "up" (negative to positive), "down" or "both".
-    action : "record", "terminate", or "reset" with ``reset`` evaluated at x-.
+    name : str
+        What its events are called.
+    expr : str or float
+        What is watched.
+    direction : str, optional
+        "up" (negative to positive), "down" or "both".
+    action : str, optional
+        "record", "terminate", or "reset" with ``reset`` evaluated at x-.
+    reset : mapping of str to str or float, optional
+        State or discrete state to the expression that gives its new value.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> stop = hs.Monitor("half", "x - 0.5", direction="down", action="terminate")
+    >>> model = hs.Model("decay", states=[hs.State("x", 1, "-x")], monitors=[stop])
+    >>> f"{hs.simulate(model, (0, 2)).t_end:.9f}"  # log(2)
+    '0.693147181'
     """
 
     name: str

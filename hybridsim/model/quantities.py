@@ -13,7 +13,28 @@ from hybridsim.model.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Parameter(Declared):
-    """A constant of a run: a number, or an expression of other parameters such as ``0.6*sqrt(k/m)``."""
+    """A constant of a run: a number, or an expression of other parameters such as ``0.6*sqrt(k/m)``.
+
+    Parameters
+    ----------
+    name : str
+        What other expressions call it.
+    value : str or float
+        Number, or expression of other parameters.
+    unit : str, optional
+        Unit, for labels.
+    title : str, optional
+        What it is, in words.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> ratio = [hs.Parameter("k", 4, unit="N/m"), hs.Parameter("w", "sqrt(k)", unit="rad/s")]
+    >>> hs.Model("m", states=[hs.State("x", 1, "-w*x")], parameters=ratio).parameter_values()
+    {'k': 4.0, 'w': 2.0}
+    """
 
     name: str
     value: Expression
@@ -31,12 +52,26 @@ class State(Declared):
 
     Parameters
     ----------
-    start : initial value, an expression of parameters.
-    der : its rate over everything the model names; a mode may override it in its own ``der``. 0 where the model's
-        rates are a Python function.
-    unit : for people; never computed with.
-    nominal : typical size in that unit, from which the absolute tolerance follows; None takes it from the
-        run.
+    name : str
+        What other expressions call it.
+    start : str or float
+        Initial value, an expression of parameters.
+    der : str or float
+        Its rate over everything the model names; a mode may override it in its own ``der``. 0 where the
+        model's rates are a Python function.
+    unit : str, optional
+        For people; never computed with.
+    nominal : float, optional
+        Typical size in that unit, from which the absolute tolerance follows; None takes it from the run.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> fall = [hs.State("h", 10, der="v", unit="m"), hs.State("v", 0, der="-9.81", unit="m/s")]
+    >>> hs.Model("fall", states=fall).start_values()
+    {'h': 10.0, 'v': 0.0}
     """
 
     name: str
@@ -55,7 +90,26 @@ class State(Declared):
 
 @dataclass(frozen=True)
 class Discrete(Declared):
-    """A state that only resets and clock ticks change."""
+    """A state that only resets and clock ticks change.
+
+    Parameters
+    ----------
+    name : str
+        Name of the state.
+    start : str or float
+        Initial value, an expression of parameters.
+    unit : str, optional
+        Unit, for labels.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> bounces = hs.Discrete("bounces", 0)
+    >>> hs.Model("m", states=[hs.State("x", 1, "-x")], discrete=[bounces]).discrete_values()
+    {'bounces': 0.0}
+    """
 
     name: str
     start: Expression
@@ -70,8 +124,26 @@ class Discrete(Declared):
 class Output(Declared):
     """A named expression to look at; it changes nothing.
 
-    ``modes`` maps ``"component.mode"`` to the expression that replaces ``expr`` in that mode; where several
-    apply the last one counts.
+    Parameters
+    ----------
+    name : str
+        What `Solution.output` calls it.
+    expr : str or float
+        Over states, inputs, parameters, definitions and t.
+    unit : str, optional
+        Unit, for labels.
+    modes : mapping of str to str or float, optional
+        ``"component.mode"`` to the expression that replaces ``expr`` in that mode; where several apply the
+        last one counts.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> energy = hs.Output("E", "v**2/2", unit="J/kg")
+    >>> energy.expr
+    Expression(text='v**2/2')
     """
 
     name: str

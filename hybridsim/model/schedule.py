@@ -18,11 +18,29 @@ class Schedule(Declared):
 
     Parameters
     ----------
-    times : single times; or instead
-    start, period, count : first tick (0 if only a period is given), time between ticks, number of ticks
-        (None: no end). All times are expressions of parameters.
-    reset : state or discrete state to expression, evaluated at x-.
-    terminate : whether the run ends there.
+    name : str
+        What its events are called.
+    times : sequence of str or float, optional
+        Single times; or instead a clock, by the next three.
+    start, period : str or float, optional
+        First tick (0 if only a period is given), time between ticks. All times are expressions of parameters,
+        in the unit of t.
+    count : int, optional
+        Number of ticks; None: no end.
+    reset : mapping of str to str or float, optional
+        State or discrete state to expression, evaluated at x-.
+    terminate : bool, optional
+        Whether the run ends there.
+    place : Place, optional
+        Where it is written, for the messages of errors.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> dose = hs.Schedule("dose", period=1, count=3, reset={"x": "x + 1"})
+    >>> model = hs.Model("drug", states=[hs.State("x", 0, 0)], schedules=[dose])
+    >>> hs.simulate(model, (0, 5)).y[:, -1].tolist()
+    [3.0]
     """
 
     name: str

@@ -20,6 +20,8 @@ ATTRACTION = "__attraction_"  # before the unknown: how strongly it pulls toward
 class SwitchingSurface(Declared):
     """A surface expr = 0 on which rates jump; its name u is the sign of expr, and the weight of the sides in sliding.
 
+    ::
+
         u = +1            where expr > 0
         u = -1            where expr < 0
         -1 <= u <= +1     while the motion slides along expr = 0, solved for from d(expr)/dt = 0
@@ -32,21 +34,33 @@ class SwitchingSurface(Declared):
 
     Parameters
     ----------
-    expr : the switching function h(t, x), smooth, in any unit.
-    above, below : values of further variables on either side, with the same names in both; in sliding
-        (1 + u)/2 above + (1 - u)/2 below. For whole fields that are not written with a sign.
+    name : str
+        Of the variable u.
+    expr : str or float
+        The switching function h(t, x), smooth, in any unit.
+    above, below : mapping of str to str or float, optional
+        Values of further variables on either side, with the same names in both; in sliding (1 + u)/2 above +
+        (1 - u)/2 below. For whole fields that are not written with a sign.
+    place : Place, optional
+        Where it is written, for the messages of errors.
 
-    Errors
+    Raises
     ------
-    UsageError for names on one side only.
+    UsageError
+        For names on one side only.
 
-    When to use
-    -----------
-    A relay, a controller of variable structure, a field given on each side of a border. For dry friction a `Contact`,
-    which knows static friction; for hysteresis a `Component`; for a corner, at which nothing jumps, `abs` and `max`.
+    Notes
+    -----
+    For a relay, a controller of variable structure, a field given on each side of a border. For dry friction
+    a `Contact`, which knows static friction; for hysteresis a `Component`; for a corner, at which nothing
+    jumps, `abs` and `max`.
 
-    Source: A. F. Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988),
-    doi:10.1007/978-94-015-7793-9; V. I. Utkin, IEEE Trans. Autom. Control 22 (1977) 212, doi:10.1109/TAC.1977.1101446.
+    References
+    ----------
+    A. F. Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988),
+    doi:10.1007/978-94-015-7793-9.
+
+    V. I. Utkin, IEEE Trans. Autom. Control 22 (1977) 212, doi:10.1109/TAC.1977.1101446.
 
     Examples
     --------

@@ -101,11 +101,18 @@ def load_solution(path: str | PathLike[str]) -> Solution:
 
     Parameters
     ----------
-    path : the file.
+    path : str or path
+        The file.
 
-    Errors
+    Returns
+    -------
+    Solution
+        As it was saved.
+
+    Raises
     ------
-    UsageError where it is no such file, damaged, or written by a later version.
+    UsageError
+        Where it is no such file, damaged, or written by a later version.
 
     Examples
     --------

@@ -13,13 +13,26 @@ class Event:
 
     Parameters
     ----------
-    t : time, rounded to a double.
-    kind : "transition", "monitor", "scheduled" or "near-grazing".
-    component : name of the component, monitor or schedule.
-    guard : name of the guard that fired, if one did.
-    source, target : modes before and after; empty where no mode changed.
-    direction : -1 falling, +1 rising, 0 where it has no meaning.
-    x_minus, x_plus : states (n,) just before and just after.
+    t : float
+        Time, rounded to a double, in the model's unit.
+    kind : str
+        "transition", "monitor", "scheduled" or "near-grazing".
+    component : str
+        Name of the component, monitor or schedule.
+    guard : str
+        Name of the guard that fired, if one did.
+    source, target : str
+        Modes before and after; empty where no mode changed.
+    direction : int
+        -1 falling, +1 rising, 0 where it has no meaning.
+    x_minus, x_plus : array
+        States (n,) just before and just after.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.simulate("dfcs", (0, 0.1)).events[0]
+    <transition f stick -> slip+ at t = 0.00171998458>
     """
 
     t: float

@@ -85,12 +85,24 @@ class Explanation:
 
     Parameters
     ----------
-    event : what is explained.
-    fired : guards that were located at zero, as they went in the mode before.
-    candidates : the combinations of modes that were looked at, in the order of looking.
-    reason : why the one that was taken, in a sentence.
-    state : states just before, and what a condition or a contact reads, as text with units.
-    choices : of a guard with an ordered choice, in words: each condition with its values, and what came of it.
+    event : Event
+        What is explained.
+    fired : tuple of GuardView
+        Guards that were located at zero, as they went in the mode before.
+    candidates : tuple of Candidate
+        The combinations of modes that were looked at, in the order of looking.
+    reason : str
+        Why the one that was taken, in a sentence.
+    state : tuple of str, optional
+        States just before, and what a condition or a contact reads, as text with units.
+    choices : tuple of str, optional
+        Of a guard with an ordered choice, in words: each condition with its values, and what came of it.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> hs.simulate("dfcs", (0, 0.1)).explain(0).reason
+    'slip+ is the only mode that is admissible just after'
     """
 
     event: Event

@@ -33,8 +33,22 @@ class Solution:
 
     Attributes
     ----------
-    t, y : times (m,) and states (n, m), as in SciPy; an event time stands twice, with x- and x+.
-    events, modes, stats, status, success, message, warnings : see the properties.
+    t, y : array
+        Times (m,) and states (n, m), as in SciPy; an event time stands twice, with x- and x+.
+    events, modes, stats, status, success, message, warnings : object
+        See the properties.
+
+    Other Parameters
+    ----------------
+    run, trajectory, wall_time, compile_time : object
+        What `simulate` passes on; not made by hand.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sol = hs.simulate("dfcs", (0, 0.1))
+    >>> sol(0.05).shape, len(sol.events)
+    ((2,), 27)
     """
 
     def __init__(
@@ -243,9 +257,10 @@ class Solution:
         ----------
         number : its place in `events`.
 
-        Errors
+        Raises
         ------
-        UsageError where there is no such event, or what is needed was not kept (``save``).
+        UsageError
+            Where there is no such event, or what is needed was not kept (``save``).
 
         Examples
         --------
@@ -346,9 +361,10 @@ class Solution:
         ----------
         path : the file; .hsol is a good ending.
 
-        Errors
+        Raises
         ------
-        UsageError for a model of Python functions, and where the file cannot be written.
+        UsageError
+            For a model of Python functions, and where the file cannot be written.
         """
         from hybridsim.solution.archive import save
 
@@ -372,9 +388,10 @@ class Solution:
         t_end : where to end; without it, where the run should have ended.
         limits, progress : as in `simulate`; limits count from here.
 
-        Errors
+        Raises
         ------
-        UsageError where there is nothing left to do, or no way on (a terminating monitor, an error).
+        UsageError
+            Where there is nothing left to do, or no way on (a terminating monitor, an error).
 
         Examples
         --------

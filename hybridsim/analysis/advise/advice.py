@@ -30,17 +30,35 @@ class Advice:
 
     Parameters
     ----------
-    model, quantity, tol : what was asked.
-    value : of the full model; nan for a region.
-    ladder : a `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and ``seconds``
-        of a step are not numbers, ``error`` is the largest of the region and ``why`` counts points.
-    certificates : what theory says without a run.
-    settings : integrator settings for the full model, tried: the quickest adequate one first.
-    spread : what given ranges of parameters do to the quantity.
-    region : a `Sweep` with, at each point, ``simplest`` (a name), ``error`` of it, ``value`` of the full model and
-        ``errors`` of all rungs (inf where a rung does not apply, or was not tried because a simpler one serves).
-    left_out : what the budget left no time for, in a sentence.
-    seconds : of all of it.
+    model, quantity, tol : object
+        What was asked.
+    value : float
+        Of the full model; nan for a region.
+    ladder : tuple of Step
+        A `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and
+        ``seconds`` of a step are not numbers, ``error`` is the largest of the region and ``why`` counts
+        points.
+    certificates : tuple of str, optional
+        What theory says without a run.
+    settings : tuple of Setting, optional
+        Integrator settings for the full model, tried: the quickest adequate one first.
+    spread : Spread, optional
+        What given ranges of parameters do to the quantity.
+    region : Sweep, optional
+        A `Sweep` with, at each point, ``simplest`` (a name), ``error`` of it, ``value`` of the full model and
+        ``errors`` of all rungs (inf where a rung does not apply, or was not tried because a simpler one
+        serves).
+    left_out : str, optional
+        What the budget left no time for, in a sentence.
+    seconds : float, optional
+        Of all of it.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.advise("dfcs", "amplitude.x", 0.03, params={"F0": 100}, rungs=["no-friction"], integrators=False)
+    >>> [step.name for step in found.ladder]
+    ['no-friction', 'full model']
     """
 
     model: Model

@@ -51,41 +51,59 @@ def advise(
     budget: float | None = None,
     progress: Progress | None = None,
 ) -> Advice:
-    """The simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
+    """Find the simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
 
     Every rung of a ladder of simpler models is run and held against the full model; what theory settles without a run
     is said first. Errors and costs are measured, none is guessed.
 
     Parameters
     ----------
-    model, params, x0 : as in `simulate`.
-    quantity : of the steady motion, or with ``t_span`` of a run: "amplitude.x", "peak.x", "maximum.f", "minimum.f",
-        "mean.x", "energy.x" (the integral of x^2), "harmonic.x.3" (its modulus), "dissipated.f" (work per period),
-        "stick_fraction.f", "period"; of a run alone: "final.x", "event_time.f.2" (the second event of f). Or a function
-        of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
-    tol : largest relative error. Where the full model's value is zero, a rung is adequate if it gives zero too; what is
-        below 1e-6 of tol beside the largest value of the same quantity counts as zero.
-    over, mode : values of parameters as in `sweep`: a map of the simplest adequate rung.
-    uncertain : ranges of parameters, {"mu": (0.28, 0.32)}: is the tolerance finer than what they leave open?
-    t_span : of the run that is asked about; without it the question is about the steady motion.
-    rungs : names of those to try; all unless given: at-rest, no-friction, viscous, no-stop, constant-mu-at-rest,
+    model : str, path or Model
+        As in `simulate`.
+    quantity : str or callable
+        Of the steady motion, or with ``t_span`` of a run: "amplitude.x", "peak.x", "maximum.f", "minimum.f",
+        "mean.x", "energy.x" (the integral of x^2), "harmonic.x.3" (its modulus), "dissipated.f" (work per
+        period), "stick_fraction.f", "period"; of a run alone: "final.x", "event_time.f.2" (the second event
+        of f). Or a function of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
+    tol : float, optional
+        Largest relative error. Where the full model's value is zero, a rung is adequate if it gives zero too;
+        what is below 1e-6 of tol beside the largest value of the same quantity counts as zero.
+    over, mode : mapping of str to sequence, str, optional
+        Values of parameters as in `sweep`: a map of the simplest adequate rung.
+    uncertain : mapping of str to tuple of float, optional
+        Ranges of parameters, {"mu": (0.28, 0.32)}, to be told whether the tolerance is finer than what they leave
+        open.
+    t_span : tuple of float, optional
+        Of the run that is asked about; without it the question is about the steady motion.
+    params, x0 : mapping of str to float, optional
+        As in `simulate`.
+    rungs : sequence of str, optional
+        Names of those to try; all unless given: at-rest, no-friction, viscous, no-stop, constant-mu-at-rest,
         constant-mu-mean, mu_s=mu_k, tanh, arctan, karnopp.
-    v0 : width of the regularised forces; a hundredth of the largest sliding speed unless given.
-    integrators : whether to try integrator settings for the full model; over a region none are.
-    workers : threads of a region.
-    budget : seconds that all of it may take: 120 unless given; over a region as long as it takes. What does not fit is
-        not run, and its row says so. A rung that becomes ten times as dear as the full model is stopped earlier, but
-        not before 5 seconds (over a region, 2 at a point).
-    progress : called as progress(done, total, what is next).
+    v0 : float, optional
+        Width of the regularised forces; a hundredth of the largest sliding speed unless given.
+    integrators : bool, optional
+        Whether to try integrator settings for the full model; over a region none are.
+    workers : int, optional
+        Threads of a region.
+    budget : float, optional
+        Seconds that all of it may take: 120 unless given; over a region as long as it takes. What does not
+        fit is not run, and its row says so. A rung that becomes ten times as dear as the full model is
+        stopped earlier, but not before 5 seconds (over a region, 2 at a point).
+    progress : callable, optional
+        Called as progress(done, total, what is next).
 
     Returns
     -------
-    Advice: ``ladder``, ``simplest``, ``integrator``, ``remarks``, ``table()``, ``plot()``.
+    Advice
+        What was found: ``ladder``, ``simplest``, ``integrator``, ``remarks``, ``table()``, ``plot()``.
 
-    Errors
+    Raises
     ------
-    UsageError for arguments that do not fit; SimulationError where the full model itself has no answer, or none within
-    the budget.
+    UsageError
+        For arguments that do not fit.
+    SimulationError
+        Where the full model itself has no answer, or none within the budget.
 
     Examples
     --------

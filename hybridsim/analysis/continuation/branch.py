@@ -73,10 +73,21 @@ class Branch:
 
     Parameters
     ----------
-    name : of the parameter.
-    points : in order along the branch; the parameter need not be monotone.
-    special : folds, branch points, period doublings, tori, changes of the sequence of modes.
-    message : why it ended, at both ends.
+    name : str
+        Of the parameter.
+    points : tuple of BranchPoint
+        In order along the branch; the parameter need not be monotone.
+    special : tuple of Special
+        Folds, branch points, period doublings, tori, changes of the sequence of modes.
+    message : str
+        Why it ended, at both ends.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> branch = hs.continuation("dfcs", "F0", (29.0, 31.0))
+    >>> len(branch.parameter) == len(branch.points), len(branch.special)
+    (True, 0)
     """
 
     name: str

@@ -69,17 +69,30 @@ def continuation(
 
     Parameters
     ----------
-    model, params, x0 : as in `steady_state`, which finds the first orbit at the model's own value.
-    parameter, bounds : its name; the least and greatest value, between which the model's own value lies.
-    max_points : orbits each way, at most.
+    model : str, path or Model
+        As in `steady_state`, which finds the first orbit at the model's own value.
+    parameter, bounds : str, tuple of float
+        Its name; the least and greatest value, between which the model's own value lies.
+    params, x0 : mapping of str to float, optional
+        As in `steady_state`.
+    max_points : int, optional
+        Orbits each way, at most.
+    integrator, rtol : str, float, optional
+        As in `simulate`, of the runs over which the orbits are followed.
+    progress : callable, optional
+        Called with the finished fraction, from time to time.
+    **options : Any
+        Further options of `steady_state`, for the first orbit.
 
     Returns
     -------
-    Branch, with folds, branch points, period doublings, tori and changes of the sequence of modes marked.
+    Branch
+        With folds, branch points, period doublings, tori and changes of the sequence of modes marked.
 
-    Errors
+    Raises
     ------
-    UsageError for names and bounds that do not fit, or a model that settles on no periodic orbit.
+    UsageError
+        For names and bounds that do not fit, or a model that settles on no periodic orbit.
 
     Examples
     --------

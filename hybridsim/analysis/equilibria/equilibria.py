@@ -30,10 +30,21 @@ class Equilibrium:
 
     Parameters
     ----------
-    modes : of each component.
-    x : (n,) states at the point, or in the middle of the set.
-    low, high : (n,) least and greatest value of each state over the set; infinite where nothing bounds it.
-    growth : largest real part of the eigenvalues of the free states' motion; 0 along a set.
+    modes : dict of str to str
+        Of each component.
+    x : array
+        (n,) states at the point, or in the middle of the set.
+    low, high : array
+        (n,) least and greatest value of each state over the set; infinite where nothing bounds it.
+    growth : float
+        Largest real part of the eigenvalues of the free states' motion; 0 along a set.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> (stuck,) = hs.equilibria("free-decay")
+    >>> stuck.is_point, stuck.low.tolist(), stuck.high.tolist()
+    (False, [-1.0, 0.0], [1.0, 0.0])
     """
 
     modes: dict[str, str]
@@ -51,16 +62,29 @@ class Equilibrium:
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Rest and steady sliding of a model that is not driven in time, one for each vector of modes that lasts there.
+    """Find rest and steady sliding of a model that is not driven in time, in each vector of modes that lasts there.
 
     In each vector of modes Newton's method finds where all rates vanish; points that violate a guard are left out.
     Where contacts stick the points form a set: the least and greatest value of each state over it come from linear
     programs, repeated about their solutions where the model is not linear. There it is what is found from the model's
     start, and there may be others.
 
-    Errors
+    Parameters
+    ----------
+    model : str, path or Model
+        As in `simulate`.
+    params : mapping of str to str or float, optional
+        Parameter values that replace the declared ones.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        One for each vector of modes.
+
+    Raises
     ------
-    UsageError for a model that is driven in time, or has too many combinations of modes.
+    UsageError
+        For a model that is driven in time, or has too many combinations of modes.
 
     Examples
     --------

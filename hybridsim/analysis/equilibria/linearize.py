@@ -24,15 +24,27 @@ _HALVINGS = 20
 
 @dataclass(frozen=True)
 class Linearization:
-    """d' = A d for small changes d of the free states about x, in one vector of modes.
+    """The linear system d' = A d for small changes d of the free states about x, in one vector of modes.
 
     Parameters
     ----------
-    states : names of the m free states; those that the modes hold on a constraint have no motion of their own.
-    A : (m, m), the Jacobian.
-    x : (n,) all states of the model at the point.
-    is_equilibrium : whether nothing moves there.
-    admissible : whether the modes last there: all their guards are >= 0.
+    states : tuple of str
+        Names of the m free states; those that the modes hold on a constraint have no motion of their own.
+    A : array
+        Shape (m, m), the Jacobian.
+    x : array
+        (n,) all states of the model at the point.
+    is_equilibrium : bool
+        Whether nothing moves there.
+    admissible : bool
+        Whether the modes last there: all their guards are >= 0.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sliding = hs.linearize("belt", "slip-")
+    >>> sliding.states, sliding.A.shape, sliding.stable
+    (('x', 'v'), (2, 2), False)
     """
 
     states: tuple[str, ...]
@@ -74,7 +86,7 @@ class Linearization:
 
     @property
     def damping_ratios(self) -> np.ndarray:
-        """-Re/|lambda| of these pairs; below zero they grow."""
+        """Damping ratio ``-Re/|lambda|`` of each of these pairs; below zero they grow."""
         pairs = self.eigenvalues[self.eigenvalues.imag > 0.0]
         return -pairs.real / np.abs(pairs)
 
@@ -87,22 +99,36 @@ def linearize(
     at: Mapping[str, float] | Sequence[float] | None = None,
     t: float = 0.0,
 ) -> Linearization:
-    """One vector of modes as a linear system about a point: its Jacobian and complex eigenvalues.
+    """Linearize one vector of modes about a point: its Jacobian and complex eigenvalues.
 
     The Jacobian is differentiated from the declaration, to rounding. With `hs.sweep` over a parameter it finds the
     onset of a friction-induced instability: where the growth of steady sliding passes zero.
 
     Parameters
     ----------
-    model, params : as in `simulate`.
-    mode : of each component by name, such as {"f": "slip+"}; a text where there is one component.
-    at : the states, as x0 of `simulate`; None takes the equilibrium of the modes that Newton's method finds from the
-        model's start, and the start itself where the model is driven in time.
-    t : the instant at which a driven model is frozen.
+    model : str, path or Model
+        As in `simulate`.
+    mode : mapping of str to str, or str, optional
+        Of each component by name, such as {"f": "slip+"}; a text where there is one component.
+    params : mapping of str to str or float, optional
+        Parameter values that replace the declared ones.
+    at : mapping of str to float or sequence of float, optional
+        The states, as x0 of `simulate`; None takes the equilibrium of the modes that Newton's method finds
+        from the model's start, and the start itself where the model is driven in time.
+    t : float, optional
+        The instant at which a driven model is frozen.
 
-    Errors
+    Returns
+    -------
+    Linearization
+        The linear system.
+
+    Raises
     ------
-    UsageError for modes or states that the model does not have; SimulationError where no equilibrium is found.
+    UsageError
+        For modes or states that the model does not have.
+    SimulationError
+        Where no equilibrium is found.
 
     Examples
     --------

@@ -28,14 +28,33 @@ class SteadyState(Measures):
 
     Attributes
     ----------
-    kind : "periodic", "equilibrium", "quasi-periodic", "chaotic" or "not settled".
-    success : whether it is one of the first two, and so has measures.
-    period, multiple : time after which the motion repeats; how many periods of the forcing (rises through the section,
+    kind : str
+        "periodic", "equilibrium", "quasi-periodic", "chaotic" or "not settled".
+    success : bool
+        Whether it is one of the first two, and so has measures.
+    period, multiple : float, int
+        Time after which the motion repeats; how many periods of the forcing (rises through the section,
         without forcing) that is: n of a period-n motion.
-    residual : largest change of a state over the period, relative to its largest size.
-    newton_steps, periods : what it took: steps of Newton's method, periods that were followed.
-    lyapunov : largest Lyapunov exponent per unit of time, of a motion that does not repeat.
-    message : one sentence about how it was found.
+    residual : float
+        Largest change of a state over the period, relative to its largest size.
+    newton_steps, periods : int
+        What it took: steps of Newton's method, periods that were followed.
+    lyapunov : float
+        Largest Lyapunov exponent per unit of time, of a motion that does not repeat.
+    message : str
+        One sentence about how it was found.
+
+    Other Parameters
+    ----------------
+    motion, kind, orbit, is_free, newton_steps, periods, message : object
+        What `steady_state` passes on; not made by hand.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> steady = hs.steady_state("dfcs")
+    >>> steady.success, steady.multiple, f"{steady.period:.6f}"  # 2*pi/omega
+    (True, 1, '0.014810')
     """
 
     def __init__(

@@ -50,9 +50,18 @@ class SuiteComparison:
 
     Parameters
     ----------
-    results : one for each scene, in order.
-    repeat : timed repetitions that were asked for.
-    budget, seconds : what the suite was allowed to take, and what it took.
+    results : tuple of SceneResult
+        One for each scene, in order.
+    repeat : int
+        Timed repetitions that were asked for.
+    budget, seconds : float
+        What the suite was allowed to take, and what it took.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> suite = hs.compare_suite(scenes=["P1"], budget=60)  # doctest: +SKIP
+    >>> suite.labels  # doctest: +SKIP
     """
 
     results: tuple[SceneResult, ...]

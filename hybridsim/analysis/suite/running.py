@@ -49,11 +49,20 @@ def compare_suite(
 
     Parameters
     ----------
-    scenes : names of the scenes to run; all if not given.
-    integrators, rtols, steps, repeat : as in `compare`; repetitions take turns over all scenes.
-    budget : seconds that all of it may take. Where they do not suffice, the repetitions go first, then the
+    scenes : sequence of str, optional
+        Names of the scenes to run; all if not given.
+    integrators, rtols, steps, repeat : object, optional
+        As in `compare`; repetitions take turns over all scenes.
+    budget : float, optional
+        Seconds that all of it may take. Where they do not suffice, the repetitions go first, then the
         settings that take longest; `SuiteComparison.notes` says what is missing.
-    progress : called as progress(done, total, what is next).
+    progress : callable, optional
+        Called as progress(done, total, what is next).
+
+    Returns
+    -------
+    SuiteComparison
+        A `Comparison` for each scene, verdicts and costs over all.
 
     Examples
     --------

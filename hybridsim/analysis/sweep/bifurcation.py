@@ -63,33 +63,44 @@ def bifurcation(
     progress: Progress | None = None,
     **options: Any,
 ) -> Sweep:
-    """Samples of the settled motion at a section, over a parameter, followed upward and downward.
+    """Sample the settled motion at a section, over a parameter, followed upward and downward.
 
     Each value starts from where its neighbour ended, so that of two motions that attract the one is found from below
     and the other from above: where the branches differ there is hysteresis. Motions that repel are not found.
 
     Parameters
     ----------
-    model, params, x0, z0 : as in `simulate`; x0 and z0 start both branches.
-    parameter, values : what is varied; any order.
-    section : None samples once a period of the forcing; an expression where it passes zero upward, or the name of a
+    model : str, path or Model
+        As in `simulate`.
+    parameter, values : str, sequence of str or float
+        What is varied; any order.
+    section : str, optional
+        None samples once a period of the forcing; an expression where it passes zero upward, or the name of a
         monitor of the model, each time that happens.
-    settle, samples : passings of the section that are waited for, and that are kept.
-    tol : samples are the same within this share of the largest size of each state.
-    executor, workers, progress : as in `sweep`; there are two chains to share.
-    options : of `simulate`.
+    settle, samples : int, optional
+        Passings of the section that are waited for, and that are kept.
+    tol : float, optional
+        Samples are the same within this share of the largest size of each state.
+    params, x0, z0 : mapping, optional
+        As in `simulate`; x0 and z0 start both branches.
+    executor, workers, progress : object, optional
+        As in `sweep`; there are two chains to share.
+    **options : Any
+        Options of `simulate`.
 
     Returns
     -------
-    Sweep over the direction ("up", "down") and the parameter: the samples of each state in order of time, and
-    ``repeats_after``, the n of a motion that repeats after n passings, 0 where it does not within the samples.
+    Sweep
+        Over the direction ("up", "down") and the parameter: the samples of each state in order of time, and
+        ``repeats_after``, the n of a motion that repeats after n passings, 0 where it does not within the
+        samples.
 
     Examples
     --------
     >>> import hybridsim as hs
     >>> found = hs.bifurcation("dfcs", "F0", [22, 30], settle=20, samples=4)
-    >>> found["x"].shape, found["repeats_after"].tolist()
-    ((2, 2, 4), [[1.0, 1.0], [1.0, 1.0]])
+    >>> found["x"].shape, found.dimensions
+    ((2, 2, 4), ('direction', 'F0'))
     """
     from hybridsim.simulate import simulate
 

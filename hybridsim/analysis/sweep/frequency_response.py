@@ -24,18 +24,29 @@ def frequency_response(
     params: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> Sweep:
-    """Steady amplitude, and of each contact its share of stick and its stops, over the frequency of the forcing.
+    """Measure the steady amplitude, and of each contact its share of stick and its stops, over the forcing's frequency.
 
     Parameters
     ----------
-    frequencies : values of the parameter ``frequency``, numbers or expressions.
-    levels : one other parameter and its values, such as ``{"N": [20, 30, 40]}``: a line each.
-    quantity : state or output whose amplitude is taken; the first state if not given.
-    options : of `sweep` and `steady_state`.
+    model : str, path or Model
+        As in `simulate`.
+    frequencies : sequence of str or float
+        Values of the parameter ``frequency``, numbers or expressions.
+    levels : mapping of str to sequence, optional
+        One other parameter and its values, such as ``{"N": [20, 30, 40]}``: a line each.
+    frequency : str, optional
+        The parameter that is the angular frequency of the forcing.
+    quantity : str, optional
+        State or output whose amplitude is taken; the first state if not given.
+    params : mapping of str to str or float, optional
+        Parameter values that are the same at every point.
+    **options : Any
+        Options of `sweep` and `steady_state`.
 
     Returns
     -------
-    Sweep over levels and frequency; ``.plot(over=frequency)`` draws it.
+    Sweep
+        Over levels and frequency; ``.plot(over=frequency)`` draws it.
 
     Examples
     --------

@@ -32,16 +32,32 @@ class Sweep:
 
     Parameters
     ----------
-    model : with all that is the same at every point.
-    mode : "grid" or "list".
-    axes : values (k,) of each parameter in order; texts where an expression depends on another axis.
-    values : readings by name; their shape is that of the grid, or (k,) for a list, and one more dimension where the
-        measure is an array. NaN where there is none.
-    status : of the same shape, "ok" or what went wrong.
-    units : units of axes and readings, as far as they are known.
-    measure : what was measured, in words.
-    interrupted : whether Ctrl-C ended it; the points that were not run say so.
-    wall_time, executor : seconds of all of it, and who did the work.
+    model : Model
+        With all that is the same at every point.
+    mode : str
+        "grid" or "list".
+    axes : mapping of str to array
+        Values (k,) of each parameter in order; texts where an expression depends on another axis.
+    values : mapping of str to array
+        Readings by name; their shape is that of the grid, or (k,) for a list, and one more dimension where
+        the measure is an array. NaN where there is none.
+    status : array
+        Of the same shape, "ok" or what went wrong.
+    units : mapping of str to str, optional
+        Units of axes and readings, as far as they are known.
+    measure : str, optional
+        What was measured, in words.
+    interrupted : bool, optional
+        Whether Ctrl-C ended it; the points that were not run say so.
+    wall_time, executor : float, str, optional
+        Seconds of all of it, and who did the work.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.sweep("dfcs", {"mu": [0.4, 0.5], "N": [30, 40]}, lambda m: m.parameter_values()["N"])
+    >>> found.dimensions, found["value"].tolist()
+    (('mu', 'N'), [[30.0, 40.0], [30.0, 40.0]])
     """
 
     model: Model

@@ -45,43 +45,60 @@ def sweep(
 
     Parameters
     ----------
-    model : a `Model`, the name of a packaged one, or the path of a ``.toml`` file.
-    values : for each parameter, or state (its initial value), a row of numbers or expressions:
-        ``{"F0": [20, 30], "omega": ["0.5*sqrt(k/m)", 400]}``.
-    measure : a function of the model that returns a number, an array in one dimension, or a dict of these by name; or
-        "steady", what `steady_state` gives, "final", the states at the end of a run over ``t_span``; or names of
-        readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3", "kind"]``, ``"final.x"``.
-    mode : "grid", all combinations; "list", the k-th values of all together.
-    params : parameter values that are the same at every point.
-    executor : any `concurrent.futures.Executor`; if not given threads, on which the compiled engine runs in parallel.
-        For dask, ``client.get_executor()``.
-    workers : how many points are worked at at the same time; one for each processor, or as many as the executor has,
-        if not given.
-    warm_start : each point along the first axis (of a list: all of it) gets the result of the one before: a
-        function is called ``measure(model, previous)``, with None at the first point and after one that failed; a
-        ready measure starts from the state of the neighbour. The first axis is then worked through in order; the
-        others are independent.
-    units : units of readings, for labels.
-    journal : a file to which results are written as they come. The same sweep with the same file takes from it what
-        there is: what was killed loses at most the points that were being worked at (with ``warm_start`` the rows), and
-        the result is to the last bit that of a sweep in one.
-    progress : called as progress(done, total, what is next).
-    options : passed on to the measure: to the function, to `steady_state`, or to `simulate`.
+    model : str, path or Model
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    values : mapping of str to sequence
+        For each parameter, or state (its initial value), a row of numbers or expressions: ``{"F0": [20, 30],
+        "omega": ["0.5*sqrt(k/m)", 400]}``.
+    measure : str, sequence of str or callable
+        A function of the model that returns a number, an array in one dimension, or a dict of these by name;
+        or "steady", what `steady_state` gives, "final", the states at the end of a run over ``t_span``; or
+        names of readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3", "kind"]``,
+        ``"final.x"``.
+    mode : str, optional
+        "grid", all combinations; "list", the k-th values of all together.
+    params : mapping of str to str or float, optional
+        Parameter values that are the same at every point.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; if not given threads, on which the compiled engine runs in
+        parallel. For dask, ``client.get_executor()``.
+    workers : int, optional
+        How many points are worked at at the same time; one for each processor, or as many as the executor
+        has, if not given.
+    warm_start : bool, optional
+        Each point along the first axis (of a list: all of it) gets the result of the one before: a function
+        is called ``measure(model, previous)``, with None at the first point and after one that failed; a
+        ready measure starts from the state of the neighbour. The first axis is then worked through in order;
+        the others are independent.
+    units : mapping of str to str, optional
+        Units of readings, for labels.
+    journal : str or path, optional
+        A file to which results are written as they come. The same sweep with the same file takes from it what
+        there is: what was killed loses at most the points that were being worked at (with ``warm_start`` the
+        rows), and the result is to the last bit that of a sweep in one.
+    progress : callable, optional
+        Called as progress(done, total, what is next).
+    **options : Any
+        Passed on to the measure: to the function, to `steady_state`, or to `simulate`.
 
     Returns
     -------
-    Sweep. After Ctrl-C what there is by then: its ``interrupted`` is true, and points that were not run say so.
+    Sweep
+        What was measured. After Ctrl-C what there is by then: its ``interrupted`` is true, and points that
+        were not run say so.
 
-    Errors
+    Raises
     ------
-    UsageError for what cannot be swept over, a measure that does not exist, and work that an executor cannot take;
-    ModelError for a faulty model.
+    UsageError
+        For what cannot be swept over, a measure that does not exist, and work that an executor cannot take.
+    ModelError
+        For a faulty model.
 
     Examples
     --------
     >>> import hybridsim as hs
     >>> found = hs.sweep("dfcs", {"F0": [10, 15, 30]}, lambda m: float(len(hs.simulate(m, (0, 0.05)).events)))
-    >>> found["value"].tolist()[:2], found.failed.any()
+    >>> found["value"].tolist()[:2], bool(found.failed.any())
     ([0.0, 0.0], False)
     """
     model = chosen_model(model, params).validate()

@@ -22,12 +22,24 @@ class Sensitivities:
 
     Parameters
     ----------
-    states, parameters : names: of the n states and d discrete states, of the P chosen parameters.
-    by_start : (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix.
-    by_parameter : (n + d, P), d(state at the end)/d(parameter); starts that are declared over parameters move along,
-        and so do parameters that are declared over others.
-    times : (E,) of the instants inside the run at which modes or states changed; several events may share one.
-    times_by_start, times_by_parameter : (E, n + d), (E, P), derivatives of these times.
+    states, parameters : tuple of str
+        Names: of the n states and d discrete states, of the P chosen parameters.
+    by_start : array
+        (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix.
+    by_parameter : array
+        (n + d, P), d(state at the end)/d(parameter); starts that are declared over parameters move along, and
+        so do parameters that are declared over others.
+    times : array
+        (E,) of the instants inside the run at which modes or states changed; several events may share one.
+    times_by_start, times_by_parameter : array
+        (E, n + d), (E, P), derivatives of these times.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.sensitivities(hs.simulate("free-decay", (0, 1)), ["mu"])
+    >>> found.states, found.by_start.shape, found.by_parameter.shape
+    (('x', 'v'), (2, 2), (2, 1))
     """
 
     states: tuple[str, ...]
@@ -42,7 +54,7 @@ class Sensitivities:
 def sensitivities(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Derivatives of the end and of the event times of a run by its start and by parameters, through all events.
+    """Differentiate the end and the event times of a run by its start and by parameters, through all events.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
     its saltation matrix (`hybridsim.analysis.variations.carried`), a contact's loss of rank in stick included. They are
@@ -52,14 +64,23 @@ def sensitivities(
 
     Parameters
     ----------
-    solution : of `simulate`, forward in time, with save="all"; as accurate as it is are the derivatives.
-    parameters : names; None takes all.
-    starts_follow : whether starts that are declared over parameters change with them, where the run began at them.
+    solution : Solution
+        Of `simulate`, forward in time, with save="all"; as accurate as it is are the derivatives.
+    parameters : sequence of str, optional
+        Names; None takes all.
+    starts_follow : bool, optional
+        Whether starts that are declared over parameters change with them, where the run began at them.
 
-    Errors
+    Returns
+    -------
+    Sensitivities
+        The derivatives.
+
+    Raises
     ------
-    UsageError for a run that is not whole, a model of Python functions, an unknown parameter, and an event whose guard
-    only touches zero.
+    UsageError
+        For a run that is not whole, a model of Python functions, an unknown parameter, and an event whose
+        guard only touches zero.
 
     Examples
     --------
