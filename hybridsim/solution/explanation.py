@@ -93,7 +93,7 @@ class Explanation:
         The combinations of modes that were looked at, in the order of looking.
     reason : str
         Why the one that was taken, in a sentence.
-    state : tuple of str, optional
+    state : str, optional
         States just before, and what a condition or a contact reads, as text with units.
     choices : tuple of str, optional
         Of a guard with an ordered choice, in words: each condition with its values, and what came of it.
