@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from hybridsim.analysis.allowance import Stopwatch
 from hybridsim.analysis.bench import Bench
 from hybridsim.analysis.reference import Reference
 from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
@@ -20,15 +21,15 @@ _PATIENCE = 2
 
 
 class Budget:
-    """Seconds that may be spent, from now on."""
+    """Seconds that may be spent, from now on; what is compiled, once for all, does not count."""
 
     def __init__(self, seconds: float) -> None:
-        self.seconds, self._began = seconds, time.monotonic()
+        self.seconds, self._watch = seconds, Stopwatch()
 
     @property
     def spent(self) -> float:
         """Seconds since the start."""
-        return time.monotonic() - self._began
+        return self._watch.seconds
 
     @property
     def left(self) -> float:

@@ -44,7 +44,10 @@ def add_budget(parser: argparse.ArgumentParser, default: str) -> None:
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
     """Where results go."""
     parser.add_argument(
-        "--out", metavar="FOLDER", type=Path, help=f"folder of the results (default: {default}, here)"
+        "--out",
+        metavar="FOLDER",
+        type=values.folder,
+        help=f"folder of the results (default: {default}, here)",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
@@ -86,7 +87,10 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
         save(time_history(found.solution), args.plot)
         session.wrote(args.plot)
-    return 0 if found.success else SimulationError.exit_code
+    if not found.success:
+        print(f"hybridsim: {found.message}", file=sys.stderr)
+        return SimulationError.exit_code
+    return 0
 
 
 def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:

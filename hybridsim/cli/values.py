@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import ModelError, Place, UsageError
@@ -44,6 +45,13 @@ def positive(text: str) -> float:
 def positives(text: str) -> tuple[float, ...]:
     """Numbers above zero, separated by commas."""
     return tuple(positive(part) for part in text.split(","))
+
+
+def folder(text: str) -> Path:
+    """The name of a folder, which "" is not: it would be the one that one is in."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty: name a folder, '.' for this one")
+    return Path(text)
 
 
 def count(text: str) -> int:

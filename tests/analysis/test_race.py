@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
+import pytest
+
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.mode_sequence import SequenceVerdict
 from hybridsim.analysis.race import Budget, Entry, race
@@ -110,3 +112,12 @@ def test_a_budget_runs_out() -> None:
     assert 0 < budget.left <= 0.02
     time.sleep(0.03)
     assert budget.left == 0.0 and budget.spent >= 0.03
+
+
+def test_compiling_is_not_of_the_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, compiled = [0.0], [0.0]
+    monkeypatch.setattr("hybridsim.analysis.allowance.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("hybridsim.analysis.allowance.seconds_compiling", lambda: compiled[0])
+    budget = Budget(10.0)
+    clock[0], compiled[0] = 7.0, 5.0
+    assert (budget.spent, budget.left) == (2.0, 8.0)

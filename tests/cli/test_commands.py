@@ -272,3 +272,14 @@ def test_steady_calls_the_sliding_of_a_surface_by_its_name(hybridsim: Callable) 
     assert "stick" not in of_surface
     _, of_contact, _ = hybridsim("steady", "dfcs")
     assert "% of the period in stick, 2 stops a period, work 0.0316" in of_contact
+
+
+def test_steady_says_on_stderr_why_it_found_nothing(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("steady", "bouncing-ball", "--max-periods", "4")
+    assert code == 1 and "Steady state" not in err
+    assert err.startswith("hybridsim: ") and err.strip().removeprefix("hybridsim: ") in out
+
+
+def test_a_folder_without_a_name_is_refused(hybridsim: Callable) -> None:
+    code, out, err = hybridsim("compare", "dfcs", "--out", "")
+    assert (code, out) == (2, "") and "the name is empty" in err
