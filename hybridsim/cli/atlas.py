@@ -69,11 +69,17 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             workers=args.workers or os.cpu_count() or 1,
             progress=progress,
         )
-        _write(result, folder, session, progress)
+        fault = None
+        try:
+            _write(result, folder, session, progress)
+        except OSError as failed:  # some places say that they may be written, and are not
+            fault = failed
     if args.json:
         print_json(result.to_plain())
     else:
         print(result.table())
+    if fault is not None:
+        raise UsageError(f"--out: {folder}: {fault.strerror}", remedy="choose a place that you may write to")
     return 0
 
 

@@ -113,22 +113,26 @@ class HeldStates:
         lowering = self.lowering
         components = list(dict.fromkeys(c for c, _ in held))
         titles = dict.fromkeys(lowering.title(c, plural=True) for c in components)
+        remedy = "merge contacts that share one relative velocity, and surfaces that are one"
+        if any(lowering.components[c].surface.is_unilateral for c in components):
+            remedy += "; write gaps that are never zero together as mirror images (x and 1 - x), or as modes"
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
             + " are not independent: holding all of them at zero leaves no state for each",
             place=lowering.place(components[0]),
-            remedy="merge contacts that share one relative velocity, and surfaces that are one",
+            remedy=remedy,
         )
 
     def _circle(self, held: list[Held]) -> ModelError:
         components = list(dict.fromkeys(c for c, _ in held))
         names = ", ".join(self.lowering.components[c].name for c in components)
+        titles = dict.fromkeys(self.lowering.title(c, plural=True) for c in components)
         return ModelError(
-            f"the relative velocities of {names} go round in a circle: there is no order in which each gives one "
+            f"the {' and '.join(titles)} of {names} go round in a circle: there is no order in which each gives one "
             "state from the others",
             place=self.lowering.place(components[0]),
-            remedy="introduce a relative velocity as a state of its own, or run an hs.MechanicalSystem",
+            remedy="introduce one of them as a state of its own, or run an hs.MechanicalSystem",
         )
 
     def _match(
