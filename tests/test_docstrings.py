@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import re
+from pathlib import Path
 
 import pytest
 
@@ -53,3 +55,11 @@ def test_public_members_say_what_they_are() -> None:
         if not (value.__doc__ or "").strip()
     ]
     assert silent == []
+
+
+def test_every_name_is_in_the_reference() -> None:
+    page = Path(__file__).parents[1] / "docs" / "reference" / "api.md"
+    shown = re.findall(
+        r"^\.\. auto(?:class|function):: (\w+)$", page.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(shown) == sorted(NAMES)
