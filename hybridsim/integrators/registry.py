@@ -110,6 +110,15 @@ def option_names(cls: type[Any]) -> tuple[str, ...]:
     return tuple(f.name for f in fields(cls))
 
 
+# What users of SciPy's solve_ivp ask for, and where it is here.
+_OF_SOLVE_IVP = {
+    "method": "name the method by integrator=..., such as 'scipy-rk45'",
+    "events": "declare monitors in the model, hs.Monitor(name, expression); a mode's guards are found anyway",
+    "args": "give values of parameters by params={...}",
+    "dense_output": "leave it out: every solution is a function of time, sol(t)",
+}
+
+
 def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
     """The integrator of a name with its options set."""
     cls = integrator_class(name)
@@ -117,6 +126,7 @@ def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
     for option in options:
         if option not in known:
             remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"
+            remedy = _OF_SOLVE_IVP.get(option, remedy)
             raise UsageError(f"{name} has no option {option!r}", remedy=remedy)
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():

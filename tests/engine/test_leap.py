@@ -18,6 +18,9 @@ from hybridsim.testing.judge import load
 from hybridsim.testing.scene import Scene
 
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
+# How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of v alone,
+# which have no scale. Both are judged by their truths, as all scenes are.
+SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in ("twisting", "long-swing")]
 
 
 def exit_of(a: list[float], error: float = 1e-14, order: int = 0) -> tuple[int, float]:
@@ -99,7 +102,7 @@ def general(monkeypatch: pytest.MonkeyPatch):
     return run
 
 
-@pytest.mark.parametrize("scene", [s for s in SCENES if "stiff" not in s.needs], ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", SAME_TO_ROUNDING, ids=lambda scene: scene.name)
 def test_leaps_and_the_general_way(scene: Scene, general) -> None:
     """The same events to the order, times and states to rounding."""
     settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}

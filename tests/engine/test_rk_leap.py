@@ -22,6 +22,9 @@ from hybridsim.testing.scene import Scene
 
 METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
+# How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of v alone,
+# which have no scale. Both are judged by their truths, as all scenes are.
+SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in ("twisting", "long-swing")]
 WEIGHTS = bernstein_weights(4)
 
 
@@ -114,7 +117,7 @@ def test_steps_that_shrink_are_foreseen() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("scene", [s for s in SCENES if "stiff" not in s.needs], ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", SAME_TO_ROUNDING, ids=lambda scene: scene.name)
 def test_leaps_and_the_general_way(scene: Scene, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same events to the order, times and states to the tolerance."""
     settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}
