@@ -22,8 +22,8 @@ from hybridsim.testing.scene import Scene
 
 METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
-# How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of v alone,
-# which have no scale. Both are judged by their truths, as all scenes are.
+# How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of
+# v alone, which have no scale. Both are judged by their truths, as all scenes are.
 SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in ("twisting", "long-swing")]
 WEIGHTS = bernstein_weights(4)
 
