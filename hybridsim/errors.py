@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 # a word of a file, or a path, without an end to it: of more than 400 characters the first and last are shown
 _ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
+# how NumPy writes its scalars in a repr
+_NUMPY = re.compile(r"\bnp\.(?:\w+\((?P<value>[-+.\w]+|'[^']*')\)|(?P<word>True|False)_)")
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ class HybridsimError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, place: Place | None = None, remedy: str | None = None) -> None:
+        message = plain(message)
         super().__init__(message)
         self.message = message
         self.place = place
@@ -224,13 +227,29 @@ class SimulationError(HybridsimError):
     """
 
 
+def plain(text: str) -> str:
+    """A message that shows what NumPy holds as a number or text shows it as that: 2.0, and not np.float64(2.0)."""
+    return re.sub(_NUMPY, lambda found: found["value"] or found["word"], text)
+
+
+def near(name: str, known: Iterable[str]) -> list[str]:
+    """Up to three names that an unknown one may be meant for: of other case, similar, or with it as a part."""
+    names = sorted(set(known))
+    folded = [other for other in names if other.lower() == name.lower()]
+    similar = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    # a part of two letters is in too many names to mean one of them
+    holding = [
+        other for other in names if len(name) > 2 and name.lower() in re.split(r"[-_ .]", other.lower())
+    ]
+    return list(dict.fromkeys([*folded, *similar, *holding]))[:3]
+
+
 def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
     """The remedy for an unknown name: the near ones, else a list of what there is."""
     names = sorted(set(known))
-    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
-    folded = [other for other in names if other.lower() == name.lower() and other not in close]
-    if folded or close:
-        return "did you mean " + " or ".join(f"'{other}'" for other in (folded + close)[:3]) + "?"
+    close = near(name, names)
+    if close:
+        return "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
     if not names:
         return f"there are no {kind} here."
     shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")

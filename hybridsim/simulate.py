@@ -157,7 +157,7 @@ def simulate(
     if name == "auto":
         start, relative = system.start_state(x0_states), arguments.relative_tolerance(rtol)
         name, reason = choose(system, start, modes, span, relative)
-    method = make_integrator(name, options)
+    method = make_integrator(name, options, KEYWORDS)
     arguments.refuse_unused(method, rtol=rtol, atol=atol)
     if isinstance(system.code, PythonCode):
         _check_functions(method, system, system.code, system.start_state(x0_states), span[0])
@@ -179,6 +179,9 @@ def simulate(
     task = Task(*span, start, modes, tolerances, system.discrete_start, keep, arguments.run_limits(limits))
     refuse_driving(system, span[0], start, task.discrete, modes)
     return Run(model, system, method, task, grid, save, reason).carried_out(callback, compile_time)
+
+
+KEYWORDS = tuple(simulate.__kwdefaults__ or ())
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:

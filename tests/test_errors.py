@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import numpy as np
 import pytest
 
 from hybridsim.errors import (
@@ -13,6 +14,7 @@ from hybridsim.errors import (
     Place,
     SimulationError,
     UsageError,
+    near,
     nearest,
 )
 
@@ -28,6 +30,27 @@ def test_the_parts_of_a_message() -> None:
 )
 def test_what_is_not_known_is_not_shown(place: Place | None, head: str) -> None:
     assert str(HybridsimError("no good", place=place)) == head + "no good"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (np.float64(-2.5e-300), "-2.5e-300"), (np.float32(0.5), "0.5"), (np.int64(-3), "-3"), (np.True_, "True"),
+        (np.float64("nan"), "nan"), (np.str_("a b"), "'a b'"), (np.float64(1), "1.0"), ("np.x", "'np.x'"),
+        ((np.float64(0), np.int8(1)), "(0.0, 1)"),
+    ],
+)  # fmt: skip
+def test_numbers_of_numpy_are_shown_as_numbers(value: object, shown: str) -> None:
+    assert UsageError(f"a is {value!r}", remedy="r").message == f"a is {shown}"
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("rk45", "scipy-rk45"), ("BDF", "cvode-bdf"), ("Taylor", "taylor"), ("rk", ""), ("xyz", "")],
+)
+def test_a_part_of_a_name_may_mean_it(name: str, meant: str) -> None:
+    known = ["scipy-rk45", "cvode-bdf", "taylor", "scipy-rk23"]
+    assert near(name, known) == ([meant] if meant else [])
 
 
 @pytest.mark.parametrize(

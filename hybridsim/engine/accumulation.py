@@ -138,3 +138,14 @@ class Accumulation:
             return None
         # within what was left of the series, but no longer in step with it
         return before[0] if abs(float(instant) - before[0]) <= before[1] else None
+
+
+def accumulated(limit: float, holding: list[str]) -> str:
+    """What a run says that ends where events accumulate; `holding`: the modes that their components could hold in."""
+    if not holding:
+        return f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+    modes = " and ".join(dict.fromkeys(holding))
+    return (
+        f"events accumulate at t = {limit!r}, and {modes} cannot be entered there: take a smaller rtol or another "
+        "integrator, or let a monitor end the run before"
+    )

@@ -38,9 +38,3 @@ class Checkpoint:
     pace: Pace
     segments: int = 0
     occurrences: int = 0
-
-
-def stopped_early(why: str, instant: Instant) -> str:
-    """What a run says that stopped before its end: why, where, and how it goes on."""
-    head = f"{why}; stopped" if why else "interrupted"
-    return f"{head} after t = {float(instant)!r}; what was computed is kept, and sol.resume() goes on"

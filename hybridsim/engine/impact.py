@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.impulse import MOST, Answer, Blow, answers, count
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Change
+from hybridsim.model.impact import ROUNDING
 
 if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
@@ -57,6 +58,12 @@ def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
     free[system.layout.pin_at] = 0.0
     series: Any = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
     return series.surfaces, series.surface_bounds
+
+
+def restitution_in_words(name: str, value: float, speed: float) -> str:
+    """What is said of a restitution beyond [0, 1]."""
+    where = f"at a speed of approach of {speed:.6g}"
+    return f"the restitution of {name} is {value!r} {where}, and should lie between 0 and 1"
 
 
 class _Collision:
@@ -154,10 +161,11 @@ class _Collision:
         speeds = np.zeros(len(system.surface_of))
         speeds[places] = np.maximum(-before[: len(normal)], 0.0)
         restitution = system.restitutions(at.s, at.x, at.p, modes, speeds)[places]
+        for c, value, speed in zip(normal, restitution.tolist(), speeds[places].tolist(), strict=True):
+            if not -ROUNDING <= value <= 1.0 + ROUNDING:
+                return "inconsistent", restitution_in_words(automata[c].name, value, speed)
+        restitution = np.clip(restitution, 0.0, 1.0)
         names = ", ".join(automata[c].name for c in members)
-        if not ((restitution >= 0.0) & (restitution <= 1.0)).all():
-            e = ", ".join(f"{value:.6g}" for value in restitution)
-            return "inconsistent", f"restitution of {names}: {e}, and should lie between 0 and 1"
         blow = Blow(
             slopes[rows] @ changes[rows].T,
             before,

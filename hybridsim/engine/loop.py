@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.accumulation import Accumulation
+from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.backward import cross_backward, entered_here, held
-from hybridsim.engine.checkpoint import Checkpoint, stopped_early
+from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import gathered
 from hybridsim.engine.limits import Gauge, LimitReached
@@ -81,9 +81,9 @@ class ModeLoop:
             self.record.status = "step-failure"
             self.record.message = f"after t = {float(self.origin)!r}: {failure}{self._in_the_way()}"
         except LimitReached as reached:
-            self.record.status, self.record.message = "limit", stopped_early(str(reached), self.origin)
+            self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
-            self.record.status, self.record.message = "interrupted", stopped_early("", self.origin)
+            self.record.stop_early("interrupted", "", self.task.t0)
         if self.adopted == self.origin:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
@@ -370,7 +370,10 @@ class ModeLoop:
         if limit is None or self._gathered(limit):
             return False
         self.record.status = "accumulation"
-        self.record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+        changed = [automata[c.component] for c in self.outcome.changes]
+        self.record.message = accumulated(
+            limit, [f"{a.name}.{a.modes[a.hold]}" for a in changed if a.has_surface]
+        )
         return True
 
     def _gathered(self, limit: float) -> bool:

@@ -19,9 +19,10 @@ _lock = Lock()
 def system_of(model: Model) -> System:
     """The system of a valid model, the same for the same object: models are frozen and systems keep nothing of a run.
 
-    Errors
+    Raises
     ------
-    ModelError with all faults of the model.
+    ModelError
+        With all faults of the model.
     """
     system = _kept.get(
         id(model)

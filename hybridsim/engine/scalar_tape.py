@@ -51,9 +51,10 @@ def scalar_tape(
     moving, constants : names of the arguments that move in time, and of those that do not.
     positive : the moving argument that is never negative.
 
-    Errors
+    Raises
     ------
-    ModelError where the expression has a corner or a jump, or a power that has no Taylor series at zero.
+    ModelError
+        Where the expression has a corner or a jump, or a power that has no Taylor series at zero.
     """
     form = _form(expression, (*moving, *constants), positive)
     _refuse_powers(expression, form, moving)

@@ -41,6 +41,13 @@ class Trajectory:
         self.checkpoint: Checkpoint | None = None  # the last one
         self._mark: tuple[Checkpoint, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
+    def stop_early(self, status: str, why: str, start: float) -> None:
+        """Say of a run that stopped before its end why, where its solution ends (begun at `start`), how it goes on."""
+        head = f"{why}; stopped" if why else "interrupted"
+        reached = float(self.segments[-1].end) if self.segments else start
+        self.status = status
+        self.message = f"{head} at t = {reached!r}; what was computed is kept, and sol.resume() goes on"
+
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
         """Keep the state after an event at the very end of the run, which no segment begins with."""
         if self.segments:

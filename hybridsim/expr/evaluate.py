@@ -13,10 +13,11 @@ from hybridsim.expr.walk import NoValue, value_of
 def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
     """Value of an expression; a condition gives 1.0 or 0.0.
 
-    Errors
+    Raises
     ------
-    ExpressionError naming the expression and the values it was given: an unknown name, division by zero, a
-    function outside its domain, overflow.
+    ExpressionError
+        Naming the expression and the values it was given: an unknown name, division by zero, a
+        function outside its domain, overflow.
     """
     require_names(expr, values)
     try:
@@ -33,9 +34,10 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
 def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
     """Values of expressions that may refer to one another, in the order given.
 
-    Errors
+    Raises
     ------
-    ExpressionError naming the circle (``a -> b -> a``), an unknown name, or a value that is not finite.
+    ExpressionError
+        Naming the circle (``a -> b -> a``), an unknown name, or a value that is not finite.
     """
     order = dependency_order(expressions, "parameters")
     values: dict[str, float] = {}
@@ -53,9 +55,10 @@ def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
 def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[str]:
     """The names in an order where each depends on earlier ones only; names that are no keys are known.
 
-    Errors
+    Raises
     ------
-    ExpressionError naming the circle.
+    ExpressionError
+        Naming the circle.
     """
     order: list[str] = []
     done: set[str] = set()

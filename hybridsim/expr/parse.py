@@ -96,10 +96,11 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
     text : an expression, or a number as TOML and Python give it.
     place : file and line for messages.
 
-    Errors
+    Raises
     ------
-    ExpressionError with a caret: a character, construct, function or number that is not allowed, wrong arity,
-    too long, too deep, a power out of bounds, or a constant part without a finite real value.
+    ExpressionError
+        With a caret: a character, construct, function or number that is not allowed, wrong arity,
+        too long, too deep, a power out of bounds, or a constant part without a finite real value.
     """
     if isinstance(text, Expression):
         return text

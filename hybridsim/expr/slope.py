@@ -10,9 +10,10 @@ from hybridsim.expr.parse import Expression, parse
 def slope(expr: Expression, name: str) -> Expression:
     """d(expr)/d(name) with everything else held.
 
-    Errors
+    Raises
     ------
-    ExpressionError where the derivative cannot be written with the functions that expressions have.
+    ExpressionError
+        Where the derivative cannot be written with the functions that expressions have.
     """
     if name not in expr.names:
         return parse(0, expr.place)

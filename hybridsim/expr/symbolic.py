@@ -56,9 +56,10 @@ def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
     symbols : a SymPy object for every name of the expression, real symbols as a rule (``t`` among them if
         used).
 
-    Errors
+    Raises
     ------
-    ExpressionError for a name without a symbol, or a comparison of what is not real.
+    ExpressionError
+        For a name without a symbol, or a comparison of what is not real.
     """
     require_names(expr, symbols)
     try:

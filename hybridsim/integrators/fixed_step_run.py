@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from hybridsim.engine.accumulation import Accumulation
-from hybridsim.engine.checkpoint import Checkpoint, stopped_early
+from hybridsim.engine.accumulation import Accumulation, accumulated
+from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.limits import Gauge, LimitReached
@@ -61,6 +61,10 @@ class March(Protocol):
         """The state after one step of length tau."""
         ...
 
+    def refused(self) -> str:
+        """What ended the last call with RESTITUTION."""
+        ...
+
     def warnings(self) -> list[str]:
         """What a user should know of the run."""
         ...
@@ -108,9 +112,9 @@ class FixedStepRun:
             self._run()
             record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
         except LimitReached as reached:
-            record.status, record.message = "limit", stopped_early(str(reached), self.origin)
+            record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
-            record.status, record.message = "interrupted", stopped_early("", self.origin)
+            record.stop_early("interrupted", "", self.task.t0)
         record.seal()
         counts = self.march.counts
         record.counters.rhs_evaluations += int(counts[0])
@@ -189,9 +193,7 @@ class FixedStepRun:
             return True
         if why == RESTITUTION:
             self.record.status = "inconsistent"
-            self.record.message = (
-                f"at t = {float(instant)!r}: the restitution of an impact does not lie between 0 and 1"
-            )
+            self.record.message = f"at t = {float(instant)!r}: {self.march.refused()}"
             return True
         if why == FULL:
             self.origin = instant
@@ -369,7 +371,10 @@ class FixedStepRun:
         limit = self.accumulation.limit(instant) if outcome.changes else None
         if limit is not None:
             record.status = "accumulation"
-            record.message = f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+            changed = [system.automata[c.component] for c in outcome.changes]
+            record.message = accumulated(
+                limit, [f"{a.name}.{a.modes[a.hold]}" for a in changed if a.has_surface]
+            )
         return record.status != "finished"
 
     def _crossed_in_jump(

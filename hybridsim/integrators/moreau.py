@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from hybridsim.engine.impact import restitution_in_words
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 from hybridsim.errors import UsageError
@@ -16,6 +17,7 @@ from hybridsim.integrators.fixed_step_length import fixed_step_length, refuse_lo
 from hybridsim.integrators.fixed_step_run import FixedStepRun, surface_table
 from hybridsim.integrators.moreau_impacts import UNILATERAL
 from hybridsim.integrators.moreau_kernels import moreau_step, moreau_steps, room_for
+from hybridsim.model.impact import ROUNDING
 
 _HALVINGS = 16  # of a step in which a declared guard or monitor crosses zero
 
@@ -106,7 +108,7 @@ class MoreauMarch:
     def __init__(
         self, system: System, step: float, settings: tuple[float, float, int], x0: np.ndarray
     ) -> None:
-        self.step = step
+        self.step, self.system = step, system
         self.counts = np.zeros(3, dtype=np.int64)
         table, has_impacts = surface_table(system), bool(system.is_unilateral.any())
         unknowns = {c.name: c.surface.unknown for c in system.model.all_components() if c.surface}
@@ -152,6 +154,16 @@ class MoreauMarch:
             self._functions, self._settings, self._table, s, tau, x, p, z.copy(), out, self._room, self.counts
         )
         return out
+
+    def refused(self) -> str:
+        """The gap of a step whose restitution is beyond [0, 1], with its value."""
+        room, system = self._room, self.system
+        for k in np.flatnonzero(room.active):
+            e = float(room.restitution[k])
+            if not -ROUNDING <= e <= 1.0 + ROUNDING:
+                name = system.automata[self._table[k, 0]].name
+                return restitution_in_words(name, e, float(room.approach[system.n + k]))
+        return ""
 
     def warnings(self) -> list[str]:
         """Steps whose forces or states did not settle."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from hybridsim.engine.event_work import put
 from hybridsim.engine.jit import call, kernel
+from hybridsim.model.impact import ROUNDING
 
 UNILATERAL = 7  # column of the table that says whether a surface is a gap
 UP, DOWN, MOST, LEAST = range(
@@ -73,9 +74,10 @@ def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, 
     for k in range(table.shape[0]):
         room.rebound[k] = 0.0
         if room.active[k] != 0:
-            if not 0.0 <= room.restitution[k] <= 1.0:
+            e = room.restitution[k]
+            if not -ROUNDING <= e <= 1.0 + ROUNDING:
                 return False
-            room.rebound[k] = room.restitution[k] * room.approach[n + k]
+            room.rebound[k] = min(max(e, 0.0), 1.0) * room.approach[n + k]
     return True
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from functools import cache
@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError, near, nearest
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.options import fits, in_words
 
@@ -79,7 +79,11 @@ def integrator_class(name: str) -> type[Integrator]:
     """The integrator of a name."""
     found = _registered()
     if name not in found:
-        raise UsageError(f"there is no integrator {name!r}", remedy=nearest(name, found, kind="integrators"))
+        remedy = nearest(name, found, kind="integrators")
+        raise UsageError(
+            f"there is no integrator {name!r}",
+            remedy=f"{remedy} (`hybridsim integrators` and hs.list_integrators() name them all)",
+        )
     return found[name]
 
 
@@ -119,13 +123,15 @@ _OF_SOLVE_IVP = {
 }
 
 
-def make_integrator(name: str, options: dict[str, Any]) -> Integrator:
-    """The integrator of a name with its options set."""
+def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
+    """The integrator of a name with its options set; keywords: what else the user may have meant by an option."""
     cls = integrator_class(name)
     known = option_names(cls)
     for option in options:
         if option not in known:
             remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"
+            close = near(option, (*known, *keywords))
+            remedy = nearest(option, close) if close else remedy
             remedy = _OF_SOLVE_IVP.get(option, remedy)
             raise UsageError(f"{name} has no option {option!r}", remedy=remedy)
     kinds = get_type_hints(cls) if options else {}

@@ -64,6 +64,10 @@ class Rk4March:
         self.counts[0] += 4
         return out
 
+    def refused(self) -> str:
+        """Nothing: these methods run no impacts."""
+        return ""
+
     def warnings(self) -> list[str]:
         """None: what these methods do wrong shows in their results."""
         return []

@@ -7,6 +7,7 @@ from typing import Any
 
 from hybridsim.mechanics.direction import finite, weights
 from hybridsim.model.declared import Declared
+from hybridsim.model.impact import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,11 @@ class MechanicalImpact(Declared):
         self._texts("name")
         for what in ("gap", "restitution"):
             object.__setattr__(self, what, finite(self, what, getattr(self, what)))
-        if not 0.0 <= self.restitution <= 1.0:
+        if not -ROUNDING <= self.restitution <= 1.0 + ROUNDING:
             raise self._fault(
                 f"restitution is {self.restitution!r}", "give a number from 0 (no rebound) to 1 (no loss)"
             )
+        object.__setattr__(self, "restitution", min(max(self.restitution, 0.0), 1.0))
         pairs, count = weights(self, self.direction)
         object.__setattr__(self, "direction", pairs)
         object.__setattr__(self, "weights", count)

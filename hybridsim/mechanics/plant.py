@@ -100,9 +100,10 @@ class Built:
 def build(system: MechanicalSystem) -> Built:
     """Arrange a system for the kernels.
 
-    Errors
+    Raises
     ------
-    UsageError where the mass matrix is not symmetric and positive definite, or couples too many coordinates.
+    UsageError
+        Where the mass matrix is not symmetric and positive definite, or couples too many coordinates.
     """
     n, m = system.n, len(system.contacts)
     rows = np.repeat(np.arange(m), [len(c.direction) for c in system.contacts]).astype(np.int64)

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.mechanics.system import MechanicalSystem
 
+_OF_MODELS = ("params", "z0", "first_step", "limits")  # of `simulate`, and without a meaning here
+_OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
+
 
 def simulate_mechanical(
     system: MechanicalSystem,
@@ -34,9 +37,10 @@ def simulate_mechanical(
 ) -> MechanicalSolution | SteppedSolution:
     """Run a `MechanicalSystem`; see `hybridsim.simulate.simulate` for the arguments.
 
-    Errors
+    Raises
     ------
-    UsageError for what a mechanical system does not take: other integrators, params, z0, a first step, time backward.
+    UsageError
+        For what a mechanical system does not take: other integrators, params, z0, a first step, time backward.
     """
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
@@ -59,11 +63,18 @@ def simulate_mechanical(
     if name == "moreau":
         from hybridsim.integrators.registry import make_integrator
 
-        known = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
-        method = make_integrator(name, {key: refused.pop(key) for key in known if key in refused})
+        method = make_integrator(name, {key: refused.pop(key) for key in _OF_MOREAU if key in refused})
         arguments.refuse_unused(method, rtol=rtol, atol=atol)
     for argument, value in refused.items():
-        if value:
+        if argument in _OF_MOREAU:
+            raise UsageError(f"{argument} is an option of moreau", remedy='choose integrator="moreau"')
+        if argument not in _OF_MODELS:
+            taken = (*(simulate_mechanical.__kwdefaults__ or ()), *_OF_MOREAU)
+            raise UsageError(
+                f"{argument!r} is no argument for a MechanicalSystem",
+                remedy=nearest(argument, taken, kind="arguments"),
+            )
+        if value is not None:
             raise UsageError(
                 f"{argument} is given for a MechanicalSystem", remedy="give other arrays, or run to_model()"
             )

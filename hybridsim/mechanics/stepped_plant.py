@@ -80,9 +80,10 @@ class Stepped(NamedTuple):
 def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[Stepped, Laws]:
     """Arrange a system for steps of one length.
 
-    Errors
+    Raises
     ------
-    UsageError where the matrix of the step is not regular.
+    UsageError
+        Where the matrix of the step is not regular.
     """
     n, contacts = system.n, list(system.contacts)
     A = sparse.csc_array(system.M + step * theta * system.C + (step * theta) ** 2 * system.K)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hybridsim.expr import evaluate
-from hybridsim.model.impact import SPEED, Impact
+from hybridsim.model.impact import ROUNDING, SPEED, Impact
 from hybridsim.model.nonsmooth import has_word
 from hybridsim.model.scope import Scope
 
@@ -47,6 +47,6 @@ def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float])
     """Report a restitution that is a number and not one of an impact that loses energy."""
     if impact.restitution.names <= values.keys():
         e = evaluate(impact.restitution, values)
-        if not 0.0 <= e <= 1.0:
+        if not -ROUNDING <= e <= 1.0 + ROUNDING:
             message = f"impact {impact.name}: the restitution '{impact.restitution.text}' is {e!r}"
             scope.fail(impact, message, "give a number from 0 (no rebound) to 1 (no loss).")

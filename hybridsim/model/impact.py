@@ -11,6 +11,8 @@ from hybridsim.model.declared import Declared
 
 OPEN, CLOSED = "open", "closed"
 SPEED = "speed"  # what a restitution calls the speed of approach
+# How far from [0, 1] rounding may carry a restitution that is computed: some operations on numbers of size one.
+ROUNDING = 8.0 * 2.0**-52
 
 
 @dataclass(frozen=True)

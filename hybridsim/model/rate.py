@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
     """d(quantity)/dt = partial over t + sum over states of partial over x times x', definitions put in.
 
-    Errors
+    Raises
     ------
-    ModelError where the quantity uses an input or a variable that a component sets: these have no rate here.
+    ModelError
+        Where the quantity uses an input or a variable that a component sets: these have no rate here.
     """
     from hybridsim.expr.slope import slope
 

@@ -183,9 +183,10 @@ def _holding(contact: str) -> str:
 def _holding_force(model: Model, contact: Contact) -> Expression:
     """The force that keeps the relative velocity as it is: -(its rate without f)/(what f adds to it).
 
-    Errors
+    Raises
     ------
-    UsageError where the relative velocity uses an input, or where another contact's force acts on it.
+    UsageError
+        Where the relative velocity uses an input, or where another contact's force acts on it.
     """
     from hybridsim.expr.slope import slope
 

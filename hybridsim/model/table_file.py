@@ -22,9 +22,10 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     ----------
     columns : name, or index from 0, of each column wanted.
 
-    Errors
+    Raises
     ------
-    ModelError with file and line: no such file or column, a cell that is no number.
+    ModelError
+        With file and line: no such file or column, a cell that is no number.
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []

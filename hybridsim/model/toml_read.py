@@ -35,10 +35,10 @@ KEYS = (
 def read_model(text: str, path: str | None = None) -> Model:
     """Read and validate a model.
 
-    Errors
+    Raises
     ------
-    ModelError: not TOML (with line and column), or all faults of form in one, or all faults of content in
-    one.
+    ModelError
+        For what is not TOML (with line and column), or all faults of form in one, or all faults of content in one.
     """
     root = open_text(text, path, "the model")
     model = _model(root, Path(path).parent if path else Path())

@@ -23,9 +23,10 @@ NO_RESULT = "no result"
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
     """Readings that are asked for, or the first that are numbers; arrays only where they can be drawn.
 
-    Errors
+    Raises
     ------
-    UsageError for names that do not exist, and readings that cannot be drawn.
+    UsageError
+        For names that do not exist, and readings that cannot be drawn.
     """
     kept = [name for name in result.values if _drawable(result, name, arrays)]
     for name in names:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.accumulation import Accumulation
+from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.blocks import OccurrenceList, SegmentList
 from hybridsim.engine.chain import Chain
 from hybridsim.engine.crossings import Crossings
@@ -239,3 +239,9 @@ def test_instants_at_once_or_one_by_one(kind: str) -> None:
         assert (one_by_one[0] is not None) == (kind in ("series", "series late", "close"))
         for size in (7, 13, 30, 200):
             assert limits(instants, list(range(size, len(gaps), size)), 1e-6) == one_by_one
+
+
+def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
+    assert accumulated(2.5, []).endswith("t = 2.5: declare the mode that they lead to")
+    held = accumulated(2.5, ["p.closed", "p.closed", "q.closed"])
+    assert "p.closed and q.closed cannot be entered there" in held and "declare" not in held

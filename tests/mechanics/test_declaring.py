@@ -14,6 +14,17 @@ def contact(direction: object, **changes: object) -> hs.MechanicalContact:
     return hs.MechanicalContact("a", direction, **given)  # type: ignore[arg-type]  # on purpose
 
 
+def test_arguments_that_it_does_not_take_are_named() -> None:
+    system = hs.MechanicalSystem([1.0], None, [1.0])
+    with pytest.raises(hs.UsageError, match="'rtoll' is no argument") as caught:
+        hs.simulate(system, (0, 1), rtoll=0)
+    assert caught.match("did you mean 'rtol'")
+    with pytest.raises(hs.UsageError, match="step is an option of moreau"):
+        hs.simulate(system, (0, 1), step=0.1)
+    with pytest.raises(hs.UsageError, match="params is given"):
+        hs.simulate(system, (0, 1), params={})
+
+
 def test_a_direction_has_a_weight_for_each_coordinate() -> None:
     with pytest.raises(hs.UsageError, match="contact a: its direction has 2 weights for 3 coordinates"):
         hs.MechanicalSystem([1, 1, 1], None, [1, 1, 1], contacts=[contact([1, 0])])

@@ -240,6 +240,46 @@ def test_restitution_that_depends_on_the_speed_of_approach():
         assert event.x_plus[1] == pytest.approx(speed, rel=1e-12)
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "exact", "moreau"])
+@pytest.mark.parametrize(("e", "exactly"), [("(a + b)/c", 1.0), ("c - (a + b)", 0.0)])
+def test_a_restitution_that_rounding_carries_beyond_its_bounds_is_on_them(integrator, e, exactly):
+    values = {"g": G, "a": 0.1, "b": 0.2, "c": 0.3}
+    by_hand = (0.1 + 0.2) / 0.3 if exactly else 0.3 - (0.1 + 0.2)
+    assert abs(by_hand - exactly) < 3e-16 and not 0 <= by_hand <= 1
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", 1, der="w", nominal=1), hs.State("w", 0, der="-g + p", nominal=1)],
+        parameters=values,
+        impacts=[hs.Impact("p", gap="h", restitution=e)],
+    )
+    options = {"step": 1e-3} if integrator == "moreau" else {}
+    fall = math.sqrt(2 / G)
+    solution = hs.simulate(ball, (0, 1.5 * fall), integrator=integrator, **options)
+    assert solution.success, solution.message
+    # up again to 3/4 of the height at half of the time, or at rest
+    assert solution.y[0, -1] == pytest.approx(0.75 * exactly, abs=5e-3 if integrator == "moreau" else 1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "moreau"])
+def test_a_restitution_beyond_its_bounds_is_named_with_its_value(integrator):
+    bodies = hs.Model(
+        "two",
+        states=[
+            hs.State("x", 1, der="u", nominal=1), hs.State("u", -1, der="p", nominal=1),
+            hs.State("y", 2, der="v", nominal=1), hs.State("v", -4, der="q", nominal=1),
+        ],
+        impacts=[
+            hs.Impact("p", gap="x", restitution=0.5),
+            hs.Impact("q", gap="y", restitution="0.4 + 0.2*speed"),
+        ],
+    )  # fmt: skip
+    options = {"step": 1e-3} if integrator == "moreau" else {}
+    solution = hs.simulate(bodies, (0, 3), integrator=integrator, **options)
+    assert solution.status == "inconsistent"
+    assert "restitution of q is 1.2" in solution.message and "approach of 4" in solution.message
+    assert solution.t_end == pytest.approx(0.5, abs=2e-3)
+
+
 def test_a_gap_that_no_state_is_linear_in_is_kept_by_projection():
     # a pendulum whose bob comes down on a floor: it rests where l (1 - cos th) = d
     pendulum = hs.Model(

@@ -81,6 +81,16 @@ def test_limits_are_named(limits: dict[str, float], word: str) -> None:
     assert part.t_end < 100.0 and len(part.t)
 
 
+@pytest.mark.parametrize("name", ["dop853", "exact", "scipy-dop853", "rk4-dichotomy", "moreau"])
+def test_a_run_that_is_stopped_says_where_its_solution_ends(name: str) -> None:
+    part = hs.simulate("dfcs", (0.0, 1e4), integrator=name, limits={"seconds": 1e-6})
+    assert part.status == "limit" and f"stopped at t = {part.t_end!r};" in part.message
+    part(part.t_end)
+    steps = hs.simulate("belt", (0.0, 100.0), integrator="scipy-dop853", limits={"steps": 5})
+    assert not any(event.t == steps.t_end for event in steps.events)  # between two events
+    assert f"stopped at t = {steps.t_end!r};" in steps.message
+
+
 def test_memory_is_limited() -> None:
     part = hs.simulate("belt", (0.0, 1e5), integrator="scipy-dop853", limits={"megabytes": 3, "seconds": 60})
     assert part.status == "limit" and "MB" in part.message

@@ -107,9 +107,10 @@ class Question:
     def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
         """The value, from a steady state or a run, with its cost but for compiling; `progress` as in these.
 
-        Errors
+        Raises
         ------
-        NoAnswer with the reason.
+        NoAnswer
+            With the reason.
         """
         watch = Stopwatch()
         try:
@@ -259,9 +260,10 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
 def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float) -> Question:
     """The question, checked against the model.
 
-    Errors
+    Raises
     ------
-    UsageError for words that name nothing, and a run's quantity without t_span.
+    UsageError
+        For words that name nothing, and a run's quantity without t_span.
     """
     if callable(quantity):
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)

@@ -42,11 +42,13 @@ def multiple_precision_trajectory(
     Trajectory. Its ``states`` is a `Motion`, whose method ``state(t)`` gives all digits. It ends early where a monitor
     or a schedule ends the run.
 
-    Errors
+    Raises
     ------
-    UsageError naming what is not supported: flows or guards that jump inside a mode, motion along a surface of a
-    general automaton, more than four coupled contacts at once, events that accumulate, running backward in time.
-    SimulationError where the model has no unique motion, or a fatal guard ends it.
+    UsageError
+        Naming what is not supported: flows or guards that jump inside a mode, motion along a surface of a
+        general automaton, more than four coupled contacts at once, events that accumulate, running backward in time.
+    SimulationError
+        Where the model has no unique motion, or a fatal guard ends it.
 
     When to use
     -----------

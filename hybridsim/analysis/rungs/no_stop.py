@@ -104,9 +104,10 @@ class _Held:
 def held(model: Model) -> _Held:
     """Den Hartog's motion of a model.
 
-    Errors
+    Raises
     ------
-    DoesNotApply where the model is another one, or its motion stops.
+    DoesNotApply
+        Where the model is another one, or its motion stops.
     """
     need_stick(model)
     found = recognise(model)

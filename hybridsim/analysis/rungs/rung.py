@@ -54,9 +54,10 @@ class Rung(ABC):
     def apply(self, scene: Scene) -> Model | Any:
         """The simpler model; of a formula a motion with the measures of a steady state.
 
-        Errors
+        Raises
         ------
-        DoesNotApply with the reason.
+        DoesNotApply
+            With the reason.
         """
 
     def __repr__(self) -> str:

@@ -82,9 +82,10 @@ class Points:
 def points_of(model: Model, values: Any, mode: Any) -> Points:
     """The points that are asked for.
 
-    Errors
+    Raises
     ------
-    UsageError for names that the model does not have, values that are none, and lists of different lengths.
+    UsageError
+        For names that the model does not have, values that are none, and lists of different lengths.
     """
     if mode not in MODES:
         raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")

@@ -16,9 +16,10 @@ _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853",
 def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
     """Check options for calls of which the last passes what it does not know on to an integrator.
 
-    Errors
+    Raises
     ------
-    UsageError for a name that none of them has, and for an integrator that there is not.
+    UsageError
+        For a name that none of them has, and for an integrator that there is not.
     """
     from hybridsim.integrators.registry import integrator_class, option_names
 

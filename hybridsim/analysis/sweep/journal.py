@@ -40,9 +40,10 @@ class Journal:
     ----------
     known : the numbers of points and their outcomes that it held already.
 
-    Errors
+    Raises
     ------
-    UsageError where the file is no journal, or of another sweep, or cannot be written.
+    UsageError
+        Where the file is no journal, or of another sweep, or cannot be written.
     """
 
     def __init__(self, path: str | PathLike[str], sweep: str) -> None:

@@ -18,9 +18,10 @@ VALUE = "value"  # the name of what has none
 def readings(found: Any) -> dict[str, Reading]:
     """Readings by name out of a number, an array (k,), or a mapping of these and texts.
 
-    Errors
+    Raises
     ------
-    UsageError for anything else.
+    UsageError
+        For anything else.
     """
     if type(found) is float:
         return {VALUE: found}

@@ -76,9 +76,10 @@ class Final:
 def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str, Any]) -> Steady | Final:
     """A measure by its name, "steady" or "final", or by the names of its readings.
 
-    Errors
+    Raises
     ------
-    UsageError for names that do not exist, and readings of both together.
+    UsageError
+        For names that do not exist, and readings of both together.
     """
     asked = (words,) if isinstance(words, str) else tuple(words)
     states = [state.name for state in model.states]

@@ -98,9 +98,12 @@ class Section:
 def with_section(model: Model, section: str | None) -> tuple[Model, str]:
     """The model with a monitor at a section, and the monitor's name; "" for the period of the forcing.
 
-    Errors
+    Raises
     ------
-    UsageError for what is no text; ExpressionError for one that is no expression of the model.
+    UsageError
+        For what is no text.
+    ExpressionError
+        For one that is no expression of the model.
     """
     if section is None:
         return model, ""

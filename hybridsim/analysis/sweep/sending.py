@@ -72,9 +72,10 @@ class Sending:
     def run(self, executor: Executor, workers: int) -> bool:
         """Do all of it; False where it was interrupted, with what was done until then.
 
-        Errors
+        Raises
         ------
-        UsageError where the executor cannot take the work.
+        UsageError
+            Where the executor cannot take the work.
         """
         shares = isinstance(executor, ThreadPoolExecutor)
         watch = Watch(self._stop.is_set, self._count) if shares else None

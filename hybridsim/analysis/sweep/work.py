@@ -28,9 +28,10 @@ def work(
 ) -> tuple[Collected, bool, str]:
     """All results, whether they are whole, and who worked.
 
-    Errors
+    Raises
     ------
-    UsageError for what is no executor, and where it cannot take the work.
+    UsageError
+        For what is no executor, and where it cannot take the work.
     """
     if executor is not None and not isinstance(executor, Executor):
         raise UsageError(
