@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.settle import Settling
-from hybridsim.engine.system import System
+from hybridsim.engine.system import Series, System
 
 _REACH = (
     2.0  # a surface this many times as far away as its rate leads in the time that is left is not the limit's
@@ -38,6 +38,33 @@ def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: fl
     ] + found.changes
     found.continuous = False
     return found
+
+
+def hidden_flight(system: System, outcome: Outcome, p: np.ndarray) -> float | None:
+    """How long a contact that has just bounced stays open, if so low that rounding hides its gap; else None.
+
+    Impacts that follow are not to be told from rest: no gap can be found to close that was never seen to open. With
+    little restitution that comes before there are enough of them to be recognised as a series.
+    """
+    automata = system.automata
+    bounced = {
+        c.component
+        for c in outcome.changes
+        if automata[c.component].is_unilateral and c.target != automata[c.component].hold
+    }
+    if not bounced:
+        return None
+    series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
+    assert isinstance(series, Series)  # models with impacts are made from expressions
+    flights = []
+    for k, c in enumerate(system.surface_of):
+        if c in bounced:
+            (_, rate, curve), bound = series.surfaces[k, :3], series.surface_bounds[k, 0]
+            if (
+                curve < 0.0 < rate and rate**2 <= -4.0 * curve * bound
+            ):  # the square is 4 |curve| times the height
+                flights.append(-rate / curve)
+    return max(flights, default=None)
 
 
 def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) -> list[int]:

@@ -12,7 +12,7 @@ from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
-from hybridsim.engine.gathering import gathered
+from hybridsim.engine.gathering import gathered, hidden_flight
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
 from hybridsim.engine.outcome import Outcome, Situation
@@ -365,6 +365,9 @@ class ModeLoop:
             for c in self.outcome.changes
         ):
             self.accumulation.begin_anew()  # a contact that has closed bounces no more
+            return False
+        flight = hidden_flight(self.system, self.outcome, self.p)
+        if flight is not None and self._gathered(float(self.origin.plus(flight))):
             return False
         limit = self.accumulation.limit_of_all(instants)
         if limit is None or self._gathered(limit):

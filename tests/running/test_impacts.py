@@ -62,6 +62,25 @@ def test_a_dead_impact_closes_at_once():
     assert event.x_plus.tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "exact"])
+@pytest.mark.parametrize("e", [0.02, 0.07, 0.13])
+def test_bounces_lower_than_the_rounding_of_the_gap_are_rest(e, integrator):
+    """After a few impacts with little restitution the ball is up by less than an ulp of its height."""
+    model = hs.Model(
+        "shelf",
+        states=[hs.State("h", 1.3, der="w"), hs.State("w", 0, der="-g + p/m + a*sin(t)")],
+        parameters={"g": G, "m": 2, "e": e, "d": 0.3, "a": 1e-3},
+        impacts=[hs.Impact("p", gap="h - d", restitution="e")],
+    )
+    solution = hs.simulate(model, (0, 4), integrator=integrator, limits={"events": 60})
+    assert solution.success
+    bounces = of(solution, "p")
+    limit = math.sqrt(2 / G) * (1 + e) / (1 - e)  # without the small force, which is 1e-4 of the weight
+    assert bounces[-1].target == "closed"
+    assert bounces[-1].t == pytest.approx(limit, rel=2e-4)
+    assert solution.y[:, -1].tolist() == [0.3, 0.0]
+
+
 def test_what_starts_on_the_ground_rests_rises_or_hits_it():
     assert not hs.simulate(ball(), (0, 1), x0={"h": 0, "w": 0}).events
     rises = hs.simulate(ball(), (0, 0.1), x0={"h": 0, "w": 1})

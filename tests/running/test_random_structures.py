@@ -1,0 +1,31 @@
+"""A few random structures with events against time stepping; `studies/random_structures.py` runs hundreds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.random_structures import END, structure
+from reference.structure_judge import all_draws, judged
+
+import hybridsim as hs
+
+SEED = 1
+
+
+@pytest.mark.parametrize("number", [0, 2, 4, 9, 11, 14])
+def test_runs_end_as_they_should_and_agree_with_time_stepping(number: int) -> None:
+    refused, verdicts = all_draws(structure(number, SEED), 3, SEED)
+    assert not refused
+    assert [v for v in verdicts if v.kind not in ("agrees", "sensitive")] == []
+
+
+def test_the_judge_sees_a_run_of_other_numbers() -> None:
+    s = structure(4, SEED)
+    draw = s.draw(np.random.default_rng([SEED, 4, 0]))
+    model = hs.Model.from_toml(s.toml)
+    right = hs.simulate(model, (0.0, END), params=draw.params, x0=draw.start, integrator="dop853")
+    assert judged(s, draw, right)[0] == "agrees"
+    name = next(name for name in draw.params if name.endswith("_mk"))
+    other = {**draw.params, name: 0.9 * draw.params[name]}
+    wrong = hs.simulate(model, (0.0, END), params=other, x0=draw.start, integrator="dop853")
+    assert judged(s, draw, wrong)[0] == "disagrees"
