@@ -1,10 +1,13 @@
-"""Accumulation: events that follow each other ever faster, like the terms of a geometric series."""
+"""Accumulation: events that follow each other ever faster, like the terms of a geometric series.
+
+The events of one turn may be several, at distances of their own: a motion between two relays passes one, then the
+other. So each interval is held against the one a few before it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +18,8 @@ from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
 _TERMS = 10
-_FEW = 4  # intervals after which one may be on its way
+_MOST = 4  # events of one turn: two relays on either of their sides
+_FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
 _SAME_FACTOR = 1e-3
 # A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
@@ -27,23 +31,46 @@ _END = 1024.0
 
 
 @kernel
-def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: float) -> int:
-    """How many times in a row an interval is shorter than the one before it, or next to nothing.
+def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: float, work: Any) -> int:
+    """How many times in a row an interval is shorter than the one a turn before it, or next to nothing.
 
-    gaps (k,): intervals up to the instant (high, low), after which the instants (E, 2) follow.
+    gaps (k,): intervals up to the instant (high, low), after which the instants (E, 2) follow. work (2, events of a
+    turn at most) is written to.
     """
-    longest, falls, before = 0, 0, math.inf
-    known = gaps.shape[0]
+    longest, known = 0.0, gaps.shape[0]
+    before, falls = work[0], work[1]  # the last intervals; falls in a row, for turns of 1, 2, ... events
+    before[:], falls[:] = math.inf, 0.0
     for i in range(known + instants.shape[0]):
         if i < known:
             gap = gaps[i]
         else:
             gap = abs((instants[i - known, 0] - high) + (instants[i - known, 1] - low))
             high, low = instants[i - known, 0], instants[i - known, 1]
-        falls = falls + 1 if gap < before or gap <= max(shortest, _ULPS * 2.0**-52 * abs(high)) else 0
-        longest = max(longest, falls)
-        before = gap
-    return longest
+        is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(high))
+        for turn in range(min(i + 1, _MOST)):
+            is_shorter = gap < (1.0 - 0.5 * _SAME_FACTOR) * before[(i - turn - 1) % _MOST]
+            falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
+            longest = max(longest, falls[turn])
+        before[i % _MOST] = gap
+    return int(longest)
+
+
+def turn_of(gaps: list[float], count: int, same: float) -> tuple[int, float]:
+    """Events of a turn, and the factor by which the last `count` intervals and a turn's shrink; (0, 1) if they do not.
+
+    same : how well the factor must repeat.
+    """
+    for turn in range(1, _MOST + 1):
+        terms = count + turn - 1  # of every event of the turn
+        if len(gaps) < terms + turn:
+            break
+        if not gaps[-1] < gaps[-1 - turn] * (1.0 - _SAME_FACTOR):
+            continue
+        factor = gaps[-1] / gaps[-1 - turn]
+        pairs = zip(gaps[-terms:], gaps[-terms - turn : -turn], strict=True)
+        if all(abs(b - factor * a) <= same * factor * a for b, a in pairs):
+            return turn, factor
+    return 0, 1.0
 
 
 class Accumulation:
@@ -54,7 +81,7 @@ class Accumulation:
         self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.last: Instant | None = None
-        self.intervals: deque[float] = deque(maxlen=_TERMS + 1)
+        self.intervals: deque[float] = deque(maxlen=_TERMS + 2 * _MOST)
         self.longest = 0.0  # interval since which they shrink
         self.forecast: tuple[float, float] | None = (
             None  # limit of the series so far, and how far ahead it was
@@ -62,14 +89,7 @@ class Accumulation:
 
     def is_under_way(self) -> bool:
         """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
-        gaps = list(self.intervals)[-_FEW:]
-        if len(gaps) < _FEW or min(gaps) <= 0.0:
-            return False
-        factors = [b / a for a, b in pairwise(gaps)]
-        factor = factors[-1]
-        return factor < 1.0 - _SAME_FACTOR and all(
-            abs(f - factor) <= 2.0 * _SAME_FACTOR * factor for f in factors
-        )
+        return turn_of(list(self.intervals), _FEW + 1, 2.0 * _SAME_FACTOR)[0] > 0
 
     def last_intervals(self, count: int) -> float:
         """What the last intervals add up to."""
@@ -92,14 +112,14 @@ class Accumulation:
 
     def limit_of_all(self, instants: np.ndarray) -> float | None:
         """Note events (E, 2) in a row; the limit time as soon as there is one, else None."""
-        if len(instants) <= _TERMS + 2:
+        if len(instants) <= _TERMS + 2 * _MOST + 1:
             return self._one_by_one(instants)
         if self.last is None:
             self.last, instants = Instant(*instants[0].tolist()), instants[1:]
-        gaps = np.array(self.intervals)
-        if longest_fall(gaps, self.last.high, self.last.low, instants, self.shortest) >= _TERMS:
+        gaps, work = np.array(self.intervals), np.empty((2, _MOST))
+        if longest_fall(gaps, self.last.high, self.last.low, instants, self.shortest, work) >= _TERMS:
             return self._one_by_one(instants)  # worth a closer look
-        tail = instants[-_TERMS - 2 :]
+        tail = instants[-_TERMS - 2 * _MOST - 1 :]
         steps = tail[1:] - tail[:-1]
         self.intervals.extend(np.abs(steps[:, 0] + steps[:, 1]).tolist())
         self.last = Instant(*instants[-1].tolist())
@@ -120,24 +140,30 @@ class Accumulation:
         gaps = list(self.intervals)
         if len(gaps) <= _TERMS:
             return None
-        if max(gaps) <= max(self.shortest, _ULPS * math.ulp(float(instant))):
+        if max(gaps[-_TERMS - 1 :]) <= max(self.shortest, _ULPS * math.ulp(float(instant))):
             return float(instant)
         if min(gaps) <= 0.0:
             return None
-        factors = [b / a for a, b in pairwise(gaps)]
-        factor = factors[-1]
-        self.longest = max(gaps) if factor >= 1.0 else max(self.longest, *gaps)
-        if factor < 1.0 and self.is_under_way():
-            rest = gaps[-1] * factor / (1.0 - factor)
+        turn, factor = turn_of(gaps, _FEW + 1, 2.0 * _SAME_FACTOR)
+        if turn:
+            self.longest = max(self.longest, *gaps)
+            rest = sum(gaps[-turn:]) * factor / (1.0 - factor)
             self.forecast = (float(float(instant) + rest), rest)
-            steady = all(abs(f - factor) <= _SAME_FACTOR * factor for f in factors)
+            is_steady = turn_of(gaps, _TERMS, _SAME_FACTOR)[0] > 0
             end = max(self.resolution, _END * math.ulp(float(instant)))
-            return self.forecast[0] if steady and rest <= end else None
-        before, self.forecast = self.forecast, None
-        if before is None or before[1] > _FAR_DOWN * self.longest:
+            return self.forecast[0] if is_steady and rest <= end else None
+        self.longest = max(gaps) if gaps[-1] >= gaps[-2] else max(self.longest, *gaps)
+        is_far = self.forecast is not None and self.forecast[1] <= _FAR_DOWN * self.longest
+        limit = self.expected(instant) if is_far else None
+        self.forecast = None
+        return limit
+
+    def expected(self, instant: Instant) -> float | None:
+        """The limit of the series so far, where an instant that is not in step with it lies within its rest."""
+        if self.forecast is None:
             return None
-        # within what was left of the series, but no longer in step with it
-        return before[0] if abs(float(instant) - before[0]) <= before[1] else None
+        limit, rest = self.forecast
+        return limit if abs(float(instant) - limit) <= rest else None
 
 
 def accumulated(limit: float, holding: list[str]) -> str:

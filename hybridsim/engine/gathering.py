@@ -9,16 +9,16 @@ from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import Series, System
 
 _REACH = (
-    2.0  # a surface this many times as far away as its rate leads in the time that is left is not the limit's
+    2.0  # a surface this many times as far away as it may move in the time that is left is not the limit's
 )
 
 
 def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: float) -> Outcome | None:
     """What holds at the limit, at local time s, of crossings or impacts; None if it is none of what can be held.
 
-    It is of the surfaces that their rates may bring to zero within the time `left`, and of the contacts whose gaps and
-    their rates come to zero in it. The state is put onto them, by less than the motion moves meanwhile; the decision is
-    that of any event (`hybridsim.engine.settle`).
+    It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
+    contacts whose gaps and their rates come to zero in it. The state is put onto them, by less than the motion moves
+    meanwhile; the decision is that of any event (`hybridsim.engine.settle`).
     """
     near = _within_reach(system, outcome, p, left)
     if len(near) < (1 if any(system.is_unilateral[near]) else 2):
@@ -75,7 +75,7 @@ def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) 
         if not (automaton.is_unique or automaton.is_unilateral) or outcome.z[c] == automaton.hold:
             continue
         (value, rate, curve), bounds = series.surfaces[k, :3], series.surface_bounds[k, :3]
-        is_near = abs(value) <= _REACH * abs(rate) * left + bounds[0]
+        is_near = abs(value) <= _REACH * (abs(rate) + abs(curve) * left) * left + bounds[0]
         if automaton.is_unilateral:
             is_near = is_near and abs(rate) <= 2.0 * _REACH * abs(curve) * left + bounds[1]
         if is_near:

@@ -272,6 +272,8 @@ class ModeLoop:
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
             outcome = self._settle_located(situation(self.system, arrival, segment), arrival)
+            if appointment is None and self._ends_series(instant, outcome):
+                return False
             outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
             if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
                 return True
@@ -378,6 +380,17 @@ class ModeLoop:
             limit, [f"{a.name}.{a.modes[a.hold]}" for a in changed if a.has_surface]
         )
         return True
+
+    def _ends_series(self, instant: Instant, outcome: Outcome) -> bool:
+        """Whether surfaces are taken together, within rounding, short of where their crossings accumulate."""
+        automata = self.system.automata
+        held = [
+            c.component
+            for c in outcome.changes
+            if automata[c.component].is_unique and c.target == automata[c.component].hold
+        ]
+        limit = self.accumulation.expected(instant) if len(held) > 1 else None
+        return limit is not None and self._gathered(limit)
 
     def _gathered(self, limit: float) -> bool:
         """Whether the motion goes on along surfaces whose crossings accumulate, or in contacts whose impacts do."""

@@ -11,8 +11,10 @@ from hybridsim.engine.clusters import clusters_of, normal_loads
 from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
+from hybridsim.engine.nonlinear import nonlinear, refuse_powers
 from hybridsim.engine.program import Assign, Item, Switch, ordered
 from hybridsim.engine.program_names import declared_name, user
+from hybridsim.engine.second_order import Partner, attraction, partners
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.switching import ATTRACTION
@@ -76,6 +78,7 @@ class Lowering:
         self.never_held: set[int] = (
             set()
         )  # components whose unknown does not act on the rate of their surface
+        self.partners: dict[int, Partner] = {}  # of those that are held by the surface of their rate
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
@@ -287,7 +290,7 @@ class Lowering:
             for d in order:
                 effect[c, d] = sp.simplify(sp.diff(total, unknown[d]))
                 if effect[c, d].free_symbols & all_unknown:
-                    raise self._nonlinear(c, d, effect[c, d].free_symbols & all_unknown)
+                    raise nonlinear(self, c, d, effect[c, d].free_symbols & all_unknown)
             rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
             self.effects.append(effect[c, c])
             if effect[c, c] == 0:
@@ -299,57 +302,24 @@ class Lowering:
                         remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
                     )
                 self.never_held.add(c)
+        self.partners = partners(self, surfaces, rate, effect)
+        self.never_held -= self.partners.keys()
         self.open_rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
         switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
         if switching:
-            self._refuse_powers(switching, self.open_rates)
+            refuse_powers(self, switching, self.open_rates)
         loads = normal_loads(self, unknown, definitions)
         clusters = clusters_of(order, effect, loads)
         items: list[Item] = []
         for cluster in clusters:
             items += self._solve(cluster, unknown, rate, effect, loads)
         for c in order:
-            if self.components[c].surface.unique:
+            if c in self.partners:
+                items.append(attraction(self, c, self.partners[c], effect))
+            elif self.components[c].surface.unique:
                 pull = sp.Integer(-1) if c in self.never_held else -effect[c, c]
                 items.append(Assign(user(ATTRACTION + self.components[c].surface.unknown), pull))
         return items, clusters
-
-    def _refuse_powers(self, unknown: dict[int, Any], rates: list[Any]) -> None:
-        """Refuse a surface's name where it is not linear: Filippov's rates lie between those of the sides."""
-        for c, u in unknown.items():
-            for x, rate in zip(self.states, rates, strict=True):
-                component = self.components[c]
-                if u in self.sp.simplify(self.sp.diff(rate, u)).free_symbols:
-                    name = declared_name(u)
-                    raise ModelError(
-                        f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",
-                        place=self.place(c),
-                        remedy=f"let {name} enter the rates linearly, or give whole fields as above and below of it",
-                    )
-
-    def _nonlinear(self, c: int, d: int, others: set[Any]) -> ModelError:
-        """The fault of an unknown that acts on a surface together with itself or others."""
-        unknown = self.symbols[self.components[d].surface.unknown]
-        name, component = declared_name(unknown), self.components[c]
-        if not component.surface.unique:
-            return ModelError(
-                f"{name} enters the motion of {component.name} nonlinearly: it cannot be solved for",
-                place=self.place(c),
-                remedy="let the force enter the derivative of the velocity linearly",
-            )
-        partners = sorted({name, *map(declared_name, others)})
-        if len(partners) == 1:
-            message = f"{name} enters the rate of the switching function '{self.written(c)}' nonlinearly"
-            remedy = (
-                f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
-            )
-        else:
-            message = (
-                f"{' and '.join(partners)} multiply each other in the rate of the switching function "
-                f"'{self.written(c)}': where their surfaces meet, the sliding motion is not unique"
-            )
-            remedy = "let the rates be sums of what each surface switches, or write the regions as modes with guards"
-        return ModelError(f"surface {component.name}: {message}", place=self.place(c), remedy=remedy)
 
     def _blends(self) -> dict[Any, Any]:
         """Variables that surfaces set, as they are in any of their modes: over the unknowns."""
@@ -390,17 +360,19 @@ class Lowering:
         right: dict[int, Any] = {}
         for c in cluster:
             given = {unknown[d]: 0 for d in cluster if (c, d) in loads}
+            partner = self.partners.get(c)
             for d in cluster:
                 by_mode = loads.get((c, d), {})
-                if effect[c, d] == 0 and c != d and not by_mode:
+                entry = partner.share(c, d, sp) if partner else effect[c, d]
+                if entry == 0 and c != d and not by_mode:
                     continue
                 name = f"effect_{c}_{d}"
                 off = {m.name: -by_mode.get(m.name, sp.Integer(0)) for m in self.components[c].modes}
                 off = dict.fromkeys(off, sp.Integer(1)) if c == d else off
-                held = off[self.components[c].surface.hold] if c in self.never_held else effect[c, d]
+                held = off[self.components[c].surface.hold] if c in self.never_held else entry
                 items.append(branches(c, name, held, off))
                 matrix[c, d] = sp.Symbol(name, real=True)
-            hold = sp.Integer(0) if c in self.never_held else -rate[c]
+            hold = sp.Integer(0) if c in self.never_held or partner else -rate[c]
             items.append(branches(c, f"right_{c}", hold, without=given))
             right[c] = sp.Symbol(f"right_{c}", real=True)
         return items + eliminated(cluster, unknown, matrix, right)

@@ -51,6 +51,9 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
     if len(sliding) < 2:
         return ""
     pull = _pull(settling, sliding, z)
+    # one whose rate no relay moves is held by the surface of its rate (hybridsim.engine.second_order)
+    moved = np.flatnonzero(pull.any(axis=1))
+    sliding, pull = [sliding[i] for i in moved], pull[np.ix_(moved, moved)]
     for size in range(1, len(sliding) + 1):
         for chosen in combinations(range(len(sliding)), size):
             block = pull[np.ix_(chosen, chosen)]

@@ -94,8 +94,29 @@ class ByHand:
             for i in range(n):
                 effect[i, j] = column[i]
         self.attraction = {f"{ATTRACTION}{name}": -effect[i, i] for i, name in enumerate(names)}
-        solution = mpmath.lu_solve(effect, -at_rest)
+        right = -at_rest
+        for i, name in enumerate(names):
+            if all(effect[i, j] == 0 for j in range(n)) and orders[name] == 1:
+                partner = self.held_by(name)
+                j = names.index(partner) if partner in names else None
+                self.attraction[f"{ATTRACTION}{name}"] = mpmath.mpf(-1) if j is None else -effect[j, i]
+                effect[i, i] = mpmath.mpf(1)
+                if j is not None:
+                    effect[i, j] = mpmath.mpf(-1)
+                right[i] = mpmath.mpf(0) if j is not None else self.value(partner)
+        solution = mpmath.lu_solve(effect, right)
         return {name: solution[i] for i, name in enumerate(names)}
+
+    def held_by(self, name: str) -> str:
+        """The relay whose function is the rate of another's, on which no relay acts: they share one value."""
+        rate = self.rate(self.holding[name])
+        return next(
+            c.surface.unknown
+            for c in self.model.all_components()
+            if c.surface
+            and c.surface.unknown != name
+            and abs(self.value(c.surface.function.text) - rate) <= mpmath.mpf(10) ** -30
+        )
 
 
 class Names(Mapping[str, Any]):

@@ -14,6 +14,7 @@ WANTED = {
     "dfcs", "dfcs-stribeck", "belt", "free-decay", "static-kinetic", "bouncing-ball", "thermostat", "square-wave",
     "sampled-servo", "base-isolation", "feeny-moon", "blade-damper", "drill-string", "pid-servo", "valve-stiction",
     "lugre-presliding", "clutches", "relay-control", "sliding-circle", "relay-spiral", "relay-pair", "chua",
+    "twisting-controller",
 }  # fmt: skip
 
 

@@ -112,22 +112,21 @@ def test_chua_from_piece_to_piece(integrator: str) -> None:
     assert sol(corner + 0.05) == pytest.approx(inside, abs=1e-9)
 
 
-def test_a_twisting_controller_is_followed_up_to_its_limit() -> None:
-    """x'' = -3 sign(x) - sign(v): half of the swing each time; the limit is sliding of second order, and is named."""
-    model = hs.Model(
-        "twisting",
-        states=[hs.State("x", 1, "v"), hs.State("v", 0, "-3*u - w")],
-        surfaces=[hs.SwitchingSurface("u", "x"), hs.SwitchingSurface("w", "v")],
-    )
-    sol = hs.simulate(model, (0, 10), integrator="exact")
+@pytest.mark.parametrize("integrator", LINEAR)
+def test_a_twisting_controller_comes_to_rest_and_stays_there(integrator: str) -> None:
+    """x'' = -2 sign(x) - sign(v): a third of the swing each time, in a time shorter by sqrt(3); then d*sin is held."""
+    model = hs.load("twisting-controller")
+    sol = hs.simulate(model, (0, 6), params={"d": 0.0}, integrator=integrator)
     swings = [event.t for event in sol.events if event.component == "w"]
-    expected, t, size = [], 0.0, 1.0
-    for _ in range(10):  # to x = 0 with 2, on to rest with 4
-        t += math.sqrt(size) + math.sqrt(size) / 2
-        expected.append(t)
-        size /= 2
-    assert swings[:10] == pytest.approx(expected, abs=1e-9)
-    limit = 1.5 / (1 - math.sqrt(0.5))
-    assert sol.status == "inconsistent"
-    assert sol.t_end == pytest.approx(limit, abs=1e-5)
-    assert "u acts on higher derivatives of its switching function alone" in sol.message
+    half = 4 * math.sqrt(2) / 3
+    expected = [half * sum(3 ** (-k / 2) for k in range(n)) for n in range(1, 16)]
+    assert swings[:15] == pytest.approx(expected, abs=1e-9)
+    limit = half / (1 - 1 / math.sqrt(3))
+    assert [event.t for event in sol.events if event.target == "sliding"] == pytest.approx(
+        [limit] * 2, abs=1e-9
+    )
+    disturbed = hs.simulate(model, (0, 20), integrator=integrator)
+    p = model.parameter_values()
+    t = np.linspace(6, 20, 101)
+    assert (disturbed(t) == 0.0).all()
+    assert disturbed.output("control", t) == pytest.approx(p["d"] * np.sin(p["omega"] * t), abs=1e-14)

@@ -21,19 +21,22 @@ def _twisting() -> Scene:
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
     def rests(solution: Any) -> list[str]:
-        if solution.status == "finished":
-            x, v = solution(5.0)
-            return [] if abs(x) + abs(v) < 1e-6 else [f"x = {x!r} and v = {v!r} where all has come to rest"]
-        if abs(solution.t_end - end) < 1e-6:
-            return []  # stopping there by name misleads nobody
-        return [f"ended as {solution.status!r} at t = {solution.t_end!r}, not at {end!r}"]
+        if solution.t_end < 5.0:
+            return []  # stopping by name misleads nobody, but does not go on
+        x, v = solution(5.0)
+        return [] if abs(x) + abs(v) < 1e-6 else [f"x = {x!r} and v = {v!r} where all has come to rest"]
+
+    def begins(solution: Any) -> list[str]:
+        held = [event.t for event in solution.events if event.target == "sliding"]
+        late = [t for t in held if abs(t - end) > 1e-9 * end]
+        return [f"held from {held} on, not from {end!r}"] if late or len(held) != 2 else []
 
     states = ((1.0, (0.5, -1.0)), (first, (-1 / 3, 0.0)), (second, (1 / 9, 0.0)))
     return Scene(
         "twisting",
         "twisting",
         (0.0, 5.0),
-        Truth(None, states, status=None, checks=(("", rests),)),
+        Truth(None, states, checks=(("", rests), ("located", begins))),
         needs("sliding", "accumulation"),
         tol_x=1e-8,
     )
