@@ -95,7 +95,7 @@ def moves(
     groups: dict[str, list[tuple[Case, dict[str, Map]]]], methods: tuple[Method, ...], path: Path
 ) -> None:
     """The 1 % lines of several cases, a row for what varies, a column for each method; right is below and right."""
-    figure = style.figure(13.0, 8.2)
+    figure = style.figure(15.0, 8.2)
     panels = figure.subplots(len(groups), len(methods), sharex=True, sharey=True)
     for row, (says, cases) in zip(panels, groups.items()):
         for panel, method in zip(row, methods):
@@ -129,8 +129,14 @@ def moves(
             panel.set_title(method.title, fontsize=10, loc="left")
             style.dress(panel)
         row[0].set(ylabel=f"{says} varied\nwidth of the zone / largest |v|")
+        # beside the panels: within them every corner has a line of some case
         row[-1].legend(
-            fontsize=8, loc="lower left", title="star: T/1200 and 8e-4 m/s there", title_fontsize=8
+            fontsize=9,
+            title="star: T/1200 and 8e-4 m/s there",
+            title_fontsize=9,
+            loc="upper left",
+            bbox_to_anchor=(1.02, 1.0),
+            frameon=False,
         )
     for panel in panels[-1]:
         panel.set(xlabel="steps per period, T/h")
