@@ -104,8 +104,8 @@ def to_ivp(
             return float(flow.guards(np.array([s]), _state(x)[None, :])[0, number])
 
         # a function has no such attributes by its type; solve_ivp reads the first two off it
-        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]
-        value.component, value.guard = component, guard  # type: ignore[attr-defined]
+        value.terminal, value.direction = True, -1  # type: ignore[attr-defined]  # SciPy reads them off the function
+        value.component, value.guard = component, guard  # type: ignore[attr-defined]  # for the caller to read
         return value
 
     events = tuple(

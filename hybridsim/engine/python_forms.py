@@ -52,7 +52,7 @@ def parts_of(model: Model) -> Parts:
     names = [p.name for p in model.parameters]
     try:
         # mypy wants the names of a namedtuple written out
-        parameters = namedtuple("Parameters", names)  # type: ignore[misc]
+        parameters = namedtuple("Parameters", names)  # type: ignore[misc]  # its fields are known at run time
     except ValueError as fault:
         message = f"model {model.name}: its functions cannot get the parameters as p.name: {fault}"
         raise UsageError(message, remedy="rename that parameter") from None

@@ -111,7 +111,7 @@ class Traced(float):
 
     __hash__ = float.__hash__
     # a decision that is not written down must not be taken
-    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # refused by being no function
 
 
 class Recipe:

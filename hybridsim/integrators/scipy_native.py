@@ -86,7 +86,7 @@ class NativeStepper:
             return float(self.flow.guards(np.array([s]), x[None, :])[0, number])
 
         # SciPy reads these off the function itself; a function has no such attributes by its type
-        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy reads them off the function
         return event
 
     def _monitor(self, number: int) -> Callable[[float, np.ndarray], float]:
@@ -96,8 +96,8 @@ class NativeStepper:
             return float(self.flow.monitors(np.array([s]), x[None, :])[0, number])
 
         # as for guards: attributes that a function does not have by its type
-        event.terminal = monitor.action != "record"  # type: ignore[attr-defined]
-        event.direction = _DIRECTIONS[monitor.direction]  # type: ignore[attr-defined]
+        event.terminal = monitor.action != "record"  # type: ignore[attr-defined]  # SciPy reads them off the function
+        event.direction = _DIRECTIONS[monitor.direction]  # type: ignore[attr-defined]  # SciPy reads them off the function
         return event
 
     def _cut(self, result: Any, guards: list[int], monitors: list[int]) -> list[Step]:

@@ -144,7 +144,7 @@ class CvodeStepper:
                 out[:] = (values - decreed @ s**powers) / abs(s) ** orders
 
         # scikit-sundae reads the directions off the function itself; a function has no such attribute by its type
-        events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]
+        events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]  # read off the function
         return events
 
     def step(self) -> Step:

@@ -117,7 +117,7 @@ class MechanicalContact(Declared):
         """
         from hybridsim.model.contact import Contact
 
-        checked = Contact(self.name, "v", self.normal, self.law, self.arguments).values()  # type: ignore[arg-type]
+        checked = Contact(self.name, "v", self.normal, self.law, self.arguments).values()  # type: ignore[arg-type]  # made an expression
         known = {name: value for name, value in checked.items() if name != "N"}
         return resolve(known)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from os import PathLike
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError, nearest
-from hybridsim.notebook import run_html
 from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.solution.summary import in_html, in_words
 from hybridsim.tables import Table, event_columns, event_frame
 
 if TYPE_CHECKING:
@@ -109,7 +108,9 @@ class Solution:
     @property
     def t_end(self) -> float:
         """Last time that the run reached."""
-        return self._span[1] if self.status == "finished" else float(self._segments[-1].end)
+        if self.status == "finished":
+            return self._span[1]
+        return float(self._segments[-1].end) if self._segments else self._span[0]
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
         """States at time t: (n,) for a number, (n, k) for k times.
@@ -465,36 +466,8 @@ class Solution:
         return event_frame(self.events, self.names)
 
     def __repr__(self) -> str:
-        kinds = Counter(o.kind for o in self._trajectory.occurrences)
-        counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) or "none"
-        counted = "not kept" if self._save == "nothing" else counted
-        lines = [
-            f"Solution of {self.model.name} by {self.integrator}: {self.status}",
-            f"  {self.message}",
-        ]
-        if self._segments:
-            final = ", ".join(
-                f"{n} = {v:.9g}" for n, v in zip(self.names, self._segments[-1].x[-1], strict=True)
-            )
-            lines += [f"  t from {self.t_start:.9g} to {self.t_end:.9g}; at the end {final}"]
-        stats = self.stats
-        lines += [
-            f"  events: {counted}",
-            f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
-            *(f"  warning: {w}" for w in self.warnings),
-        ]
-        return "\n".join(lines)
+        return in_words(self)
 
     def _repr_html_(self) -> str:
         """What notebooks show: how the run went, a strip of modes for each component, the events."""
-        stats, computed = self.stats, bool(self._segments)
-        head = {
-            self.status: f"{self.model.title or self.model.name}, by {self.integrator}",
-            "cost": f"{stats['steps']} steps ({stats['rejected']} rejected), "
-            f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
-        }
-        head |= {} if self.success else {"message": self.message}
-        span = (self.t_start, self.t_end) if computed else None
-        known = self._save != "nothing"
-        modes, events = (self.modes, self.events) if known else ({}, ())
-        return run_html(self.model, head, self.success, span, modes, events, self.warnings)
+        return in_html(self)

@@ -73,7 +73,7 @@ def method(rtol: float, shown: bool = True) -> Method:
 
 
 def _terminal(guard: Callable[[float, Any], float]) -> Any:
-    guard.terminal, guard.direction = True, -1.0  # type: ignore[attr-defined]
+    guard.terminal, guard.direction = True, -1.0
     return guard
 
 

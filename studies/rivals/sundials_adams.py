@@ -37,7 +37,7 @@ def method(rtol: float) -> Method:
                     for k, guard in enumerate(guards):
                         out[k] = guard(t, x)
 
-                events.direction = [-1] * len(guards)  # type: ignore[attr-defined]
+                events.direction = [-1] * len(guards)
                 longest = system.longest(mode, scene)
                 solvers[mode] = CVODE(
                     rates,

@@ -33,7 +33,7 @@ def differences(model: hs.Model, name: str, run: object) -> np.ndarray:
     value, found = model.parameter_values()[name], []
     for share in (1e-3, 1e-4, 1e-5):
         h = share * (abs(value) or 1.0)
-        rows = [ends(run(model.with_(**{name: value + k * h}))) for k in (2, 1, -1, -2)]  # type: ignore[operator]
+        rows = [ends(run(model.with_(**{name: value + k * h}))) for k in (2, 1, -1, -2)]
         if len({len(row) for row in rows}) == 1:
             found.append((8.0 * (rows[1] - rows[2]) - (rows[0] - rows[3])) / (12.0 * h))
     gaps = [np.abs(a - b).max() for a, b in pairwise(found)]

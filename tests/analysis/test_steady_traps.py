@@ -25,7 +25,7 @@ law = { name = "coulomb", mu = "mu" }"""
 
 
 def by_differences(changed: object, run: object, value: float, h: float = 1e-5) -> np.ndarray:
-    ends = [run(changed(value + k * h)).y[:, -1] for k in (2, 1, -1, -2)]  # type: ignore[operator]
+    ends = [run(changed(value + k * h)).y[:, -1] for k in (2, 1, -1, -2)]
     return (8.0 * (ends[1] - ends[2]) - (ends[0] - ends[3])) / (12.0 * h)
 
 
@@ -161,7 +161,7 @@ def test_a_mapping_of_measures_is_a_mapping() -> None:
     assert found.amplitude.get("q", 0.0) == 0.0
     for wrong in ("a", 1.5, -1):
         with pytest.raises(HybridsimError):
-            found.harmonic("x", wrong)  # type: ignore[arg-type]
+            found.harmonic("x", wrong)
 
 
 FORCED_TWICE = "0.2*sin(t) + 0.2*sin(sqrt(2)*t)"

@@ -70,7 +70,7 @@ def test_a_class_that_is_wrong_is_found_wrong() -> None:
     class Late(Tsitouras):
         name: ClassVar[str] = "late"
 
-        def start(self, flow, x0, *rest):  # type: ignore[no-untyped-def]
+        def start(self, flow, x0, *rest):
             return super().start(flow, x0 * (1 + 1e-5), *rest)
 
     assert outcome(Late, scenes_named(("NOS-cross",))[0]).verdict == "wrong"

@@ -9,7 +9,7 @@ from hybridsim.cli.values import DEFAULT_SECONDS, end_time
 
 
 def driven_by(**signal: object) -> hs.Model:
-    return hs.Model("m", [hs.State("x", 0, "u")], inputs=[hs.Input("u", **signal)])  # type: ignore[arg-type]  # of many kinds
+    return hs.Model("m", [hs.State("x", 0, "u")], inputs=[hs.Input("u", **signal)])
 
 
 def test_a_run_goes_on_for_periods_else_to_the_end_of_a_record() -> None:

@@ -1,17 +1,20 @@
 """A declared model evaluated by hand: every expression in mpmath, the unknowns of holding modes by a linear solve.
 
-Nothing of the engine is used: names are looked up in the declaration, and what a holding mode solves for is found
-from d(surface)/dt = 0, or for a gap from d2(gap)/dt2 = 0, differentiated numerically along the motion.
+Nothing that the engine computes is used: names are looked up in the declaration, and what a holding mode solves for
+is found from d(surface)/dt = 0, or for a gap from d2(gap)/dt2 = 0, differentiated numerically along the motion.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import mpmath
+import numpy as np
 from engine.multiple_precision import evaluate
 
+from hybridsim.engine.system import System
 from hybridsim.model import Model
 from hybridsim.model.switching import ATTRACTION
 
@@ -136,3 +139,9 @@ class Names(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(list(iter(self)))
+
+
+def combinations(system: System) -> list[np.ndarray]:
+    """The numbers of the modes of all components, in every combination."""
+    sizes = [len(a.modes) for a in system.automata]
+    return [np.array(z, dtype=np.int64) for z in itertools.product(*map(range, sizes))]

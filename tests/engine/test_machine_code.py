@@ -39,7 +39,7 @@ def module(text: str, folder: Path, name: str) -> object:
     made = type("Module", (), {"__file__": str(path)})()
     scope: dict[str, object] = {}
     exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)  # noqa: S102  # what the text says
-    made.f = scope["f"]  # type: ignore[attr-defined]
+    made.f = scope["f"]
     return made
 
 
@@ -62,7 +62,7 @@ def test_every_operation_to_the_last_bit(tmp_path: Path) -> None:
     for x in POINTS:
         for z in (0, 1):
             expected = [0.0] * len(EXPRESSIONS)
-            made.f(0.75, x, (10.0, 20.0), [z], expected)  # type: ignore[attr-defined]
+            made.f(0.75, x, (10.0, 20.0), [z], expected)
             got = called(address, 0.75, x, (10.0, 20.0), z, len(EXPRESSIONS))
             exact = [i for i, e in enumerate(EXPRESSIONS) if "**" not in e]
             assert got[exact].tolist() == np.array(expected)[exact].tolist()

@@ -123,7 +123,7 @@ def test_a_table_of_points(v: float, integrator: str) -> None:
 def test_a_coefficient_that_depends_on_place(integrator: str) -> None:
     """mu = mu_0 (1 + x/L): a harmonic motion about x = -L until it stops."""
     mu, length, v = 0.3, 2.0, 4.0
-    t, x = stop(sliding("coulomb", {"mu": f"{mu}*(1 + x/{length})"}, v), 3.0, integrator)  # type: ignore[dict-item]
+    t, x = stop(sliding("coulomb", {"mu": f"{mu}*(1 + x/{length})"}, v), 3.0, integrator)
     omega = sqrt(mu * N / length)
     radius = sqrt(length**2 + (v / omega) ** 2)
     assert x == pytest.approx(radius - length, rel=WITHIN.get(integrator, 1e-7))
@@ -212,5 +212,5 @@ def test_a_table_over_a_parameter_of_the_law() -> None:
     law = hs.FrictionLaw(
         "worn", "mu*N", "mu*N", ["x"], tables=[hs.LawTable("mu", [0, 1, 4], [0.3, 0.45, 0.9], over="x")]
     )
-    _, x = stop(sliding(law, {"x": "x"}, 4.0), 3.0, "dop853")  # type: ignore[dict-item]
+    _, x = stop(sliding(law, {"x": "x"}, 4.0), 3.0, "dop853")
     assert x == pytest.approx(sqrt(4 + 16 * 2 / 3) - 2, rel=1e-8)

@@ -11,7 +11,7 @@ import hybridsim as hs
 
 def contact(direction: object, **changes: object) -> hs.MechanicalContact:
     given: dict[str, object] = {"normal": 10, "law": "coulomb", "arguments": {"mu": 0.3}} | changes
-    return hs.MechanicalContact("a", direction, **given)  # type: ignore[arg-type]  # on purpose
+    return hs.MechanicalContact("a", direction, **given)
 
 
 def test_arguments_that_it_does_not_take_are_named() -> None:

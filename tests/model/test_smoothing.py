@@ -12,7 +12,7 @@ from hybridsim.model.smoothing import MOST, smoothed, smoothing_of
 
 def moving(rate: str, **more: object) -> hs.Model:
     states = [hs.State("x", 1, der="v"), hs.State("v", 0, der=rate)]
-    return hs.Model("m", states=states, parameters={"k": 2, "g": 0.5}, **more)  # type: ignore[arg-type]
+    return hs.Model("m", states=states, parameters={"k": 2, "g": 0.5}, **more)
 
 
 def accounts(model: hs.Model) -> dict[str, Primitive]:

@@ -154,7 +154,7 @@ def test_the_model_stays_as_it_was_written() -> None:
     assert sol.model is model
     assert hs.Model.from_toml(model.to_toml()) == model
     fun, events, _ = hs.to_ivp(model, {"f": "slip+"})
-    assert {event.component for event in events} == {"f"}  # type: ignore[attr-defined]
+    assert {event.component for event in events} == {"f"}
     for x, v in ((1.0, 2.0), (-1.0, 2.0), (0.1, 0.5)):
         rate = -x - 3 * max(x - 0.2, 0) - 0.1 * abs(v) * v - 0.5 * (1 + 0.3 * abs(x))
         assert fun(0.0, [x, v]) == pytest.approx([v, rate], rel=1e-14)

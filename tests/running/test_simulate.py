@@ -107,7 +107,7 @@ def test_progress_reaches_one() -> None:
 def test_what_does_not_fit_is_refused_by_name(arguments: dict[str, object], words: list[str]) -> None:
     given = {"t_span": (0, 1)} | arguments
     with pytest.raises(UsageError) as caught:
-        hs.simulate(decay(), **given)  # type: ignore[arg-type]  # that is what is refused
+        hs.simulate(decay(), **given)
     for word in words:
         assert word in str(caught.value)
 

@@ -135,7 +135,7 @@ FULL = Size(
     race_count=101,
     race_sample=400,
     ladder_count=15,
-    steps=_range(100, 2400, 100),  # type: ignore[arg-type]
+    steps=_range(100, 2400, 100),  # type: ignore[arg-type]  # whole numbers, made as floats
     eps=_intervals(-1.5, 0.25),
 )
 QUICK = Size(

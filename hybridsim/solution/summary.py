@@ -1,0 +1,48 @@
+"""A solution at a glance: as text in a terminal, as HTML in a notebook."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from hybridsim.notebook import run_html
+
+if TYPE_CHECKING:
+    from hybridsim.solution.solution import Solution
+
+
+def in_words(solution: Solution) -> str:
+    """How the run went, where it ended, its events by kind, its cost and its warnings."""
+    kinds = Counter(occurrence.kind for occurrence in solution._trajectory.occurrences)
+    counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) or "none"
+    counted = "not kept" if solution._save == "nothing" else counted
+    lines = [
+        f"Solution of {solution.model.name} by {solution.integrator}: {solution.status}",
+        f"  {solution.message}",
+    ]
+    if solution._segments:
+        last = solution._segments[-1].x[-1]
+        final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(solution.names, last, strict=True))
+        lines += [f"  t from {solution.t_start:.9g} to {solution.t_end:.9g}; at the end {final}"]
+    stats = solution.stats
+    lines += [
+        f"  events: {counted}",
+        f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+        *(f"  warning: {w}" for w in solution.warnings),
+    ]
+    return "\n".join(lines)
+
+
+def in_html(solution: Solution) -> str:
+    """How the run went, a strip of modes for each component, the events and the warnings."""
+    stats, model = solution.stats, solution.model
+    head = {
+        solution.status: f"{model.title or model.name}, by {solution.integrator}",
+        "cost": f"{stats['steps']} steps ({stats['rejected']} rejected), "
+        f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+    }
+    head |= {} if solution.success else {"message": solution.message}
+    span = (solution.t_start, solution.t_end) if solution._segments else None
+    known = solution._save != "nothing"
+    modes, events = (solution.modes, solution.events) if known else ({}, ())
+    return run_html(model, head, solution.success, span, modes, events, solution.warnings)
