@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import Series, System
@@ -50,11 +51,12 @@ def hidden_flight(system: System, outcome: Outcome, p: np.ndarray) -> float | No
     bounced = {
         c.component
         for c in outcome.changes
-        if automata[c.component].is_unilateral and c.target != automata[c.component].hold
+        if automata[c.component].is_unilateral and automata[c.component].hold not in (c.source, c.target)
     }
     if not bounced:
         return None
-    series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
+    errors = outcome.x_error + 4.0 * UNIT * np.abs(outcome.x)
+    series = system.series(0.0, outcome.x, p, outcome.z, errors, 0.0)
     assert isinstance(series, Series)  # models with impacts are made from expressions
     flights = []
     for k, c in enumerate(system.surface_of):

@@ -199,6 +199,9 @@ class _Collision:
         shares = answer.impulses[:, None] * changes
         # gaps that are zero are made so, in the positions, which no impulse changes
         z = np.maximum(at.z, 0)
+        for c, automaton in enumerate(automata):  # what slides or sticks would go by velocities as they were
+            if automaton.has_surface and not automaton.is_unilateral and z[c] == automaton.hold:
+                z[c] = automaton.above
         z[normal] = [automata[c].hold for c in normal]
         x = self.system.project(at.s, at.x, at.p, z)
         moved = changes.any(axis=0)

@@ -189,7 +189,7 @@ def fill(plan: Plan, j: int, e: Element, p: Values) -> None:
         has.get("w", 0.0),
     )
     if "k" in has:
-        plan.load_rows[j, int(np.flatnonzero(e.row)[0])] = has["k"]
+        plan.load_rows[j, int(np.argmax(e.row))] = has["k"]
 
 
 def unit(m: int, i: int) -> np.ndarray:

@@ -79,6 +79,65 @@ def switched(machine, on, q, v):
 
 
 @numba.njit(cache=True)
+def one_of_all(
+    kinds, active, before, rows, moves, target, low, high, hold_low, hold_high, free, impulse, now
+):
+    """Impulses that fit all laws, by trying all combinations of sides and holding; whether there are any.
+
+    Of several the one that changes least, and holds most, is taken.
+    """
+    E, best = kinds.shape[0], -1
+    sides, found = np.zeros(E, dtype=np.int64), np.zeros(E)
+    for number in range(3**E):
+        rest, likeness, fits = number, 0, True
+        for j in range(E):
+            sides[j], rest = rest % 3 - 1, rest // 3
+            pushes = (rows[j] * moves[j]).sum()
+            if not active[j]:
+                fits = fits and sides[j] == 0
+            elif kinds[j] == STOP:
+                fits = fits and sides[j] >= 0
+            elif not pushes < 0.0:
+                fits = fits and sides[j] == (1 if before[j] >= 0.0 else -1)
+            likeness += 2 * (E + 1) * (sides[j] == before[j]) + 2 * (sides[j] == 0)
+        if not fits or likeness <= best:
+            continue
+        matrix, known = np.eye(E), np.zeros(E)
+        for j in range(E):
+            if not active[j] or (kinds[j] == STOP and sides[j] == 1):
+                continue
+            if sides[j] != 0:
+                known[j] = high[j] if sides[j] > 0 else low[j]
+                continue
+            known[j] = target[j] - (rows[j] * free).sum()
+            for i in range(E):
+                matrix[j, i] = (rows[j] * moves[i]).sum() if active[i] else 0.0
+        if abs(np.linalg.det(matrix)) < 1e-30:
+            continue
+        impulses = np.linalg.solve(matrix, known)
+        new = free.copy()
+        for j in range(E):
+            if active[j]:
+                new += moves[j] * impulses[j]
+        for j in range(E):
+            s = (rows[j] * new).sum() - target[j]
+            if not active[j] or (kinds[j] != STOP and not (rows[j] * moves[j]).sum() < 0.0):
+                continue
+            if sides[j] != 0:
+                fits = fits and s * sides[j] >= 0.0
+            elif kinds[j] == STOP:
+                fits = fits and impulses[j] >= 0.0
+            else:
+                fits = fits and hold_low[j] <= impulses[j] <= hold_high[j]
+        if fits:
+            best = likeness
+            found[:], now[:] = impulses, sides
+    if best >= 0:
+        impulse[:] = found
+    return best >= 0
+
+
+@numba.njit(cache=True)
 def march(plan, q0, v0, end, samples, per):
     """Positions and heat at equal times, (samples + 1, m + 1), and the number of steps whose forces did not settle."""
     m, E, A = plan.mass.shape[0], plan.kinds.shape[0], plan.machines.shape[0]
@@ -93,7 +152,7 @@ def march(plan, q0, v0, end, samples, per):
     before = np.zeros(E)
     impulse, low, high, hold_low, hold_high = np.zeros(E), np.zeros(E), np.zeros(E), np.zeros(E), np.zeros(E)
     target, path, rows, active = np.zeros(E), np.zeros((E, m)), np.zeros((E, m)), np.zeros(E, dtype=np.bool_)
-    unsettled = 0
+    unsettled, now = 0, np.zeros(E, dtype=np.int64)
     for j in range(E):
         if plan.kinds[j] != STOP:
             s = plan.offsets[j]
@@ -134,7 +193,8 @@ def march(plan, q0, v0, end, samples, per):
         for j in range(E):
             rows[j] = plan.rows[j]
             active[j] = True
-            impulse[j] = 0.0
+            if plan.kinds[j] == STOP:
+                impulse[j] = 0.0
             if plan.kinds[j] == FRICTION:
                 law = plan.laws[j]
                 load = law[6] + law[7] * np.sin(law[8] * t)
@@ -179,6 +239,8 @@ def march(plan, q0, v0, end, samples, per):
         for j in range(E):
             moves[j] = inverse @ path[j]
         new = free.copy()
+        for j in range(E):  # from the forces of the step before, lest what sticks be found to slip on the way
+            new += moves[j] * impulse[j]
         settled = E == 0
         for _ in range(SWEEPS):
             change, largest = 0.0, 0.0
@@ -199,13 +261,13 @@ def march(plan, q0, v0, end, samples, per):
                     if not pushes < 0.0:  # a relay that does not draw to its surface: the side as it is now
                         impulse[j] = high[j] if before[j] >= 0.0 else low[j]
                     elif before[j] > 0.0 and s + gain * high[j] > 0.0:
-                        impulse[j] = high[j]
+                        impulse[j], now[j] = high[j], 1
                     elif before[j] < 0.0 and s + gain * low[j] < 0.0:
-                        impulse[j] = low[j]
+                        impulse[j], now[j] = low[j], -1
                     elif hold_low[j] <= -s / gain <= hold_high[j]:
-                        impulse[j] = -s / gain
+                        impulse[j], now[j] = -s / gain, 0
                     else:
-                        impulse[j] = high[j] if s > 0.0 else low[j]
+                        impulse[j], now[j] = (high[j], 1) if s > 0.0 else (low[j], -1)
                 change = max(change, abs(impulse[j] - old))
                 largest = max(largest, abs(impulse[j]))
                 for i in range(m):
@@ -214,15 +276,29 @@ def march(plan, q0, v0, end, samples, per):
                 settled = True
                 break
         if not settled:
-            unsettled += 1
+            unsettled += not one_of_all(
+                plan.kinds,
+                active,
+                before,
+                rows,
+                moves,
+                target,
+                low,
+                high,
+                hold_low,
+                hold_high,
+                free,
+                impulse,
+                now,
+            )
+            new = free.copy()
+            for j in range(E):
+                if active[j]:
+                    new += moves[j] * impulse[j]
         for j in range(E):
-            if plan.kinds[j] != STOP:
-                s = -target[j]
-                for i in range(m):
-                    s += rows[j, i] * new[i]
-                holds = plan.kinds[j] == FRICTION and low[j] < impulse[j] < high[j]
-                holds = holds or (hold_low[j] <= impulse[j] <= hold_high[j] and abs(s) <= 1e-11)
-                before[j] = 0.0 if holds else np.sign(s)
+            before[j] = now[j]
+            if plan.kinds[j] == RELAY and not (plan.rows[j] * moves[j]).sum() < 0.0:
+                before[j] = np.sign((rows[j] * new).sum() - target[j])
         q = middle + 0.5 * h * new
         v = new
         if (step + 1) % per == 0:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import hybridsim as hs
 
@@ -79,6 +80,33 @@ def test_bounces_lower_than_the_rounding_of_the_gap_are_rest(e, integrator):
     assert bounces[-1].target == "closed"
     assert bounces[-1].t == pytest.approx(limit, rel=2e-4)
     assert solution.y[:, -1].tolist() == [0.3, 0.0]
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "exact"])
+def test_a_body_that_slides_on_a_switching_line_is_struck_where_it_is(integrator):
+    """x + v = 0 is held by a relay until another body strikes; the velocities jump and the positions do not."""
+    e, m0, m1 = 0.4, 1.0, 3.0
+    model = hs.Model(
+        "struck",
+        states=[
+            hs.State("x", 1, der="v"),
+            hs.State("v", -1, der="(-2*u + p)/m0"),
+            hs.State("y", -1, der="w"),
+            hs.State("w", 2, der="-p/m1"),
+        ],
+        parameters={"m0": m0, "m1": m1, "e": e},
+        surfaces=[hs.SwitchingSurface("u", "x + v")],
+        impacts=[hs.Impact("p", gap="x - y", restitution="e")],
+    )
+    solution = hs.simulate(model, (0, 1), integrator=integrator, rtol=1e-12)
+    t = brentq(lambda t: math.exp(-t) - (2 * t - 1), 0, 1, xtol=1e-15)
+    before = np.array([math.exp(-t), -math.exp(-t), math.exp(-t), 2])
+    impulse = (1 + e) * (2 + math.exp(-t)) * m0 * m1 / (m0 + m1)
+    after = before + impulse * np.array([0, 1 / m0, 0, -1 / m1])
+    event = of(solution, "p")[0]
+    assert event.t == pytest.approx(t, rel=1e-11)
+    assert event.x_minus == pytest.approx(before, rel=1e-11)
+    assert event.x_plus == pytest.approx(after, rel=1e-11)
 
 
 def test_what_starts_on_the_ground_rests_rises_or_hits_it():
