@@ -88,7 +88,13 @@ SURFACE_OF_COMPONENT = table(
     },
     ("function", "unknown", "above", "hold", "jump_above", "jump_below"),
 )  # fmt: skip
-COMPONENT = table({"modes": MODES, "initial": INITIAL, "surface": SURFACE_OF_COMPONENT}, ("modes",))
+LIMIT = said(
+    "where to go, after which reset, where its transitions accumulate",
+    {"anyOf": [TEXT, table({"to": TEXT, "reset": EXPRESSIONS}, ("to",))]},
+)
+COMPONENT = table(
+    {"modes": MODES, "initial": INITIAL, "surface": SURFACE_OF_COMPONENT, "limit": LIMIT}, ("modes",)
+)
 POINTS = table(
     {"at": NUMBERS, "values": NUMBERS, "over": said("the argument; the speed v if not given", TEXT)},
     ("at", "values"),
@@ -201,7 +207,7 @@ MODEL = {
             "contacts": named(CONTACT, "friction contacts; the name is the force"),
             "surfaces": named(short(EXPRESSION, SWITCHING), "switching surfaces; the name is the sign"),
             "impacts": named(IMPACT, "unilateral contacts; the name is the normal force"),
-            "initial": INITIAL, "modes": MODES,
+            "initial": INITIAL, "limit": LIMIT, "modes": MODES,
             "components": named(COMPONENT, "automata"),
             "monitors": named(short(EXPRESSION, MONITOR), "scalars watched for zeros"),
             "schedules": named(short(TIMES, SCHEDULE), "events at known times"),

@@ -40,6 +40,12 @@ def resets_of(model: Model) -> Resets:
         if states & choice.reset.keys()
     )
     transitions |= {
+        (component.name, mode.name, component.limit.to)
+        for component in model.all_components()
+        if component.limit and states & component.limit.reset.keys()
+        for mode in component.modes
+    }
+    transitions |= {
         (impact.name, source, target)
         for impact in model.impacts
         for source, target in ((OPEN, OPEN), (OPEN, CLOSED), (CLOSED, OPEN))

@@ -169,7 +169,7 @@ class Accumulation:
 def accumulated(limit: float, holding: list[str]) -> str:
     """What a run says that ends where events accumulate; `holding`: the modes that their components could hold in."""
     if not holding:
-        return f"events accumulate at t = {limit!r}: declare the mode that they lead to"
+        return f"events accumulate at t = {limit!r}: declare the limit that they lead to, a mode of their component"
     modes = " and ".join(dict.fromkeys(holding))
     return (
         f"events accumulate at t = {limit!r}, and {modes} cannot be entered there: take a smaller rtol or another "

@@ -265,13 +265,15 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def resets(self) -> list[tuple[str, Any]]:
-        """(what, mapping) of every reset of the model: of choices, monitors and schedules, in this order."""
+        """(what, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order."""
         model = self.program.model
         found: list[tuple[Any, Any]] = []
         for c, component in enumerate(self.program.components):
             for m, mode in enumerate(component.modes):
                 for g, guard in enumerate(mode.guards):
                     found += [(("choice", c, m, g, k), choice.reset) for k, choice in enumerate(guard.then)]
+        limits = [(c, component.limit) for c, component in enumerate(self.program.components)]
+        found += [(("limit", c), limit.reset) for c, limit in limits if limit]
         found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
         found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
         return [(key, reset) for key, reset in found if reset]

@@ -1,4 +1,4 @@
-"""Where events accumulate: from there on the motion slides along their surfaces, or rests in their contacts."""
+"""Where events accumulate: from there on the motion slides along their surfaces, rests in contacts, or as declared."""
 
 from __future__ import annotations
 
@@ -36,6 +36,25 @@ def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: fl
         return None
     found.changes = [
         Change(c, "side", int(outcome.z[c]), int(found.z[c]), outcome.x, found.x) for c in near
+    ] + found.changes
+    found.continuous = False
+    return found
+
+
+def at_declared_limit(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, changed: list[int]
+) -> Outcome | None:
+    """What holds at the limit, at local time s, of transitions of these components; None where none says what."""
+    entered = [c for c in changed if system.automata[c].limit >= 0]
+    if not entered:
+        return None
+    z = outcome.z.copy()
+    z[entered] = [system.automata[c].limit for c in entered]
+    x = outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z)
+    at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
+    found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
+    found.changes = [
+        Change(c, "limit", int(outcome.z[c]), system.automata[c].limit, x, found.x) for c in entered
     ] + found.changes
     found.continuous = False
     return found

@@ -12,7 +12,7 @@ from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
-from hybridsim.engine.gathering import gathered, hidden_flight
+from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_flight
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
 from hybridsim.engine.outcome import Outcome, Situation
@@ -377,7 +377,7 @@ class ModeLoop:
         self.record.status = "accumulation"
         changed = [automata[c.component] for c in self.outcome.changes]
         self.record.message = accumulated(
-            limit, [f"{a.name}.{a.modes[a.hold]}" for a in changed if a.has_surface]
+            limit, [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
         )
         return True
 
@@ -393,10 +393,14 @@ class ModeLoop:
         return limit is not None and self._gathered(limit)
 
     def _gathered(self, limit: float) -> bool:
-        """Whether the motion goes on along surfaces whose crossings accumulate, or in contacts whose impacts do."""
+        """Whether the motion goes on along surfaces whose crossings accumulate, in contacts, or as it is declared."""
         ahead = max(Instant(limit).minus(self.origin), 0.0)
         left = ahead + self.accumulation.last_intervals(2)
-        found = gathered(self.system, self.outcome, self.p, ahead, left) if self.forward else None
+        found = None
+        if self.forward:
+            found = gathered(self.system, self.outcome, self.p, ahead, left)
+            changed = sorted({c.component for c in self.outcome.changes})
+            found = found or at_declared_limit(self.system, self.outcome, self.p, ahead, changed)
         if found is None:
             return False
         self.accumulation.begin_anew()

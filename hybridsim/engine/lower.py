@@ -454,6 +454,7 @@ class Lowering:
     def _count_phases(self) -> None:
         """Meet the frequencies that resets and outputs alone have: they are written out when phases are counted."""
         choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
+        choices += [k.limit for k in self.components if k.limit]
         for part in (*choices, *self.model.monitors, *self.model.schedules):
             for e in part.reset.values():
                 self.convert(e)

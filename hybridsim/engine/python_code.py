@@ -164,7 +164,7 @@ def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:
 
 
 def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
-    """(what, state -> function or number) of every reset: of choices, monitors and schedules."""
+    """(what, state -> function or number) of every reset: of choices, limits, monitors and schedules."""
     found: list[tuple[tuple[Any, ...], Any]] = [
         (("choice", c, m, g, k), choice.reset)
         for c, component in enumerate(model.all_components())
@@ -172,6 +172,8 @@ def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
         for g, guard in enumerate(mode.guards)
         for k, choice in enumerate(guard.then)
     ]
+    limits = [(c, component.limit) for c, component in enumerate(model.all_components())]
+    found += [(("limit", c), limit.reset) for c, limit in limits if limit]
     found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
     found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
     return [(key, {name: value(e) for name, e in reset.items()}) for key, reset in found if reset]

@@ -322,6 +322,8 @@ class Settling:
 
     def _reset_in_words(self, key: tuple[object, ...]) -> str:
         model = self.system.model
+        if key[0] == "limit":
+            return f"the limit of {self.system.automata[int(str(key[1]))].name}"
         if key[0] != "choice":
             kind, number = str(key[0]), int(str(key[1]))
             parts: Any = model.monitors if kind == "monitor" else model.schedules

@@ -45,11 +45,17 @@ class Automaton:
     is_unilateral: bool = False  # its surface is a gap: there is no mode below
     is_unique: bool = False  # its surface takes a motion only where no other is admissible
     is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
+    limit: int = -1  # the mode that is entered where its transitions accumulate
 
     @property
     def kind(self) -> str:
         """What a change of its mode is called."""
         return CORNER if self.is_corner else "transition"
+
+    @property
+    def resting(self) -> int:
+        """The mode that it may be in where its events accumulate; -1 if there is none."""
+        return self.hold if self.has_surface else self.limit
 
     @property
     def has_surface(self) -> bool:
@@ -155,6 +161,7 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         is_unilateral=bool(surface and surface.is_unilateral),
         is_unique=bool(surface and surface.unique),
         is_corner=isinstance(component, Corner),
+        limit=names.index(component.limit.to) if component.limit else -1,
     )
 
 

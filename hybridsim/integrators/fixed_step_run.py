@@ -373,7 +373,7 @@ class FixedStepRun:
             record.status = "accumulation"
             changed = [system.automata[c.component] for c in outcome.changes]
             record.message = accumulated(
-                limit, [f"{a.name}.{a.modes[a.hold]}" for a in changed if a.has_surface]
+                limit, [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
             )
         return record.status != "finished"
 

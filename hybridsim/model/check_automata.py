@@ -39,6 +39,7 @@ def _component(scope: Scope, component: Component) -> None:
         remedy = f"write initial = true in one of: {', '.join(names)}."
         scope.fail(component, f"{what} does not say in which of its {len(names)} modes it starts", remedy)
     _surface(scope, component, what, names)
+    _limit(scope, component, what, names)
     for mode in component.modes:
         _variables(scope, component, mode, what)
         for state in mode.der:
@@ -87,6 +88,19 @@ def _guard(scope: Scope, component: Component, guard: Guard, what: str, names: l
         if choice.to not in names:
             scope.unknown(choice, f"{what}: there is no mode", choice.to, names, "modes")
         check_reset(scope, choice, what, choice.reset)
+
+
+def _limit(scope: Scope, component: Component, what: str, names: list[str]) -> None:
+    limit = component.limit
+    if limit is None:
+        return
+    if component.surface is not None:
+        scope.fail(limit, f"{what} has a limit, but a surface decides", "leave out 'limit'.")
+    if limit.when is not None:
+        scope.fail(limit, f"{what}: its limit has a condition", "leave out 'when'.")
+    if limit.to not in names:
+        scope.unknown(limit, f"{what}, limit: there is no mode", limit.to, names, "modes")
+    check_reset(scope, limit, f"{what}, limit", limit.reset)
 
 
 def check_reset(scope: Scope, part: Declared, what: str, names: Iterable[str]) -> None:

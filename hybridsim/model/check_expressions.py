@@ -84,6 +84,9 @@ def _of_component(component: Component) -> Iterator[Item]:
     if surface is not None:
         for field in ("function", "jump_above", "jump_below"):
             yield f"{head}, surface {field}", getattr(surface, field), False
+    if component.limit is not None:
+        for name, expr in component.limit.reset.items():
+            yield f"{head}, limit, reset of {name}", expr, False
     for mode in component.modes:
         where = f"{head}, mode {mode.name}"
         for name, expr in mode.der.items():

@@ -58,6 +58,9 @@ def _uses(scope: Scope) -> Iterator[tuple[Declared, str, Expression]]:
     """Every place where a function may stand: the part, the place in words, what stands there."""
     model = scope.model
     for component in model.components:
+        if component.limit is not None:
+            for name, expr in component.limit.reset.items():
+                yield component.limit, f"limit of {component.name}, reset of {name}", expr
         for mode in component.modes:
             for guard in mode.guards:
                 what = f"guard {guard.name} of {component.name}.{mode.name}"

@@ -203,6 +203,10 @@ class Component(Declared):
         Mode at t0; None where a surface decides it from x0. With a single mode it is that one.
     surface : Surface, optional
         Given, the guards have no choices: the decisions go by admissibility.
+    limit : str or Choice, optional
+        Where to go, after which reset, where infinitely many of its transitions follow each other in a finite time: a
+        ball that bounces ever lower, a hose between two tanks that run dry. The time is that to which their
+        intervals add up. Without it the run ends there with status ``accumulation``.
     place : Place, optional
         Where it is written, for the messages of errors.
 
@@ -219,10 +223,16 @@ class Component(Declared):
     modes: tuple[Mode, ...]
     initial: str | None = None
     surface: Surface | None = None
+    limit: Choice | None = None
 
     def __post_init__(self) -> None:
         self._texts("name", "initial")
         self._parts("modes", Mode)
+        limit: object = self.limit
+        if isinstance(limit, str):
+            object.__setattr__(self, "limit", Choice(limit, place=self.place))
+        elif not (limit is None or isinstance(limit, Choice)):
+            raise self._fault(f"limit is {limit!r}", "give the name of a mode, or hs.Choice(...)")
         if not (self.surface is None or isinstance(self.surface, Surface)):
             raise self._fault(f"surface is {self.surface!r}", "give hs.Surface(...)")
         if self.initial is None and self.surface is None and len(self.modes) == 1:

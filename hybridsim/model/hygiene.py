@@ -96,6 +96,7 @@ def _reset_names(model: Model, own: Component | None) -> set[str]:
     for component in model.components:
         if component is not own:
             resets += [c.reset for mode in component.modes for guard in mode.guards for c in guard.then]
+            resets += [component.limit.reset] if component.limit else []
     return {name for reset in resets for name in reset}
 
 

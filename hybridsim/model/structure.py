@@ -46,6 +46,8 @@ def _lines(model: Model) -> Iterator[str]:
 def _component(component: Component) -> Iterator[str]:
     kind = "corner" if isinstance(component, Corner) else "component"
     yield f"{kind} {component.name} initial {component.initial}"
+    if component.limit:
+        yield f"  limit {component.limit.to} reset" + _map(component.limit.reset)
     surface = component.surface
     if surface:
         yield (

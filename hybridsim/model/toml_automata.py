@@ -17,7 +17,7 @@ def read_components(root: Table) -> Iterable[Component]:
     if "modes" in root.data or "initial" in root.data:
         yield _component(SINGLE, root, root.source.place(("modes",)))
     for name, table in root.entries("components", "component"):
-        table.only("modes", "initial", "surface")
+        table.only("modes", "initial", "surface", "limit")
         yield _component(name, table, table.place)
 
 
@@ -35,7 +35,11 @@ def _component(name: str, table: Table, place: Place) -> Component:
             )
     surface = _surface(table)
     modes = [read_mode(mode, part) for mode, part in tables.items()]
-    return Component(name, tuple(modes), named or (marked[0] if marked else None), surface, place=place)
+    initial, limit = named or (marked[0] if marked else None), None
+    if "limit" in table.data:
+        part = table.sub(table.data["limit"], f"{table.kind}, limit", "to", "limit")
+        limit = None if part is None else _limit(part)
+    return Component(name, tuple(modes), initial, surface, limit, place=place)
 
 
 def read_mode(name: str, table: Table) -> Mode:
@@ -65,6 +69,12 @@ def _choice(table: Table) -> Choice:
     table.only("to", "when", "reset")
     table.require("to", 'write to = "the next mode".')
     return Choice(table.text("to"), table.expression("when"), table.expressions("reset"), place=table.place)
+
+
+def _limit(table: Table) -> Choice:
+    table.only("to", "reset")
+    table.require("to", 'write to = "the mode at the limit".')
+    return Choice(table.text("to"), None, table.expressions("reset"), place=table.place)
 
 
 def _surface(parent: Table) -> Surface | None:

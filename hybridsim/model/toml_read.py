@@ -27,8 +27,8 @@ from hybridsim.model.toml_table import Source, Table
 SCHEMA = 1
 KEYS = (
     "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
-    "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "modes", "components", "monitors",
-    "schedules", "clocks", "outputs",
+    "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "limit", "modes", "components",
+    "monitors", "schedules", "clocks", "outputs",
 )  # fmt: skip
 
 

@@ -145,6 +145,8 @@ def _component(component: Component) -> Iterator[str]:
         "restitution",
     )
     entries: dict[str, Any] = {"initial": component.initial}
+    if component.limit is not None:
+        entries["limit"] = {"to": component.limit.to, "reset": component.limit.reset}
     if surface is not None:
         entries["surface"] = {field: getattr(surface, field) for field in fields}
     yield from _section(head, entries)

@@ -242,6 +242,8 @@ def test_instants_at_once_or_one_by_one(kind: str) -> None:
 
 
 def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
-    assert accumulated(2.5, []).endswith("t = 2.5: declare the mode that they lead to")
+    assert accumulated(2.5, []).endswith(
+        "t = 2.5: declare the limit that they lead to, a mode of their component"
+    )
     held = accumulated(2.5, ["p.closed", "p.closed", "q.closed"])
     assert "p.closed and q.closed cannot be entered there" in held and "declare" not in held

@@ -55,6 +55,12 @@ def _tanks() -> tuple[Scene, ...]:
             break
         events.append((t, "hose:second" if low == 1 else "hose:first"))
     events.append((t, "hose:off"))
+
+    def dry(solution: Any) -> list[str]:
+        last = solution.events[-1]
+        right = last.target == "off" and abs(last.t - 4.0) <= 4e-9
+        return [] if right else [f"at the end hose:{last.target} at {last.t!r}, not hose:off at 4.0"]
+
     common: dict[str, Any] = {"unit": 4.0, "tol_t": 1e-9, "tol_x": 1e-9}
     return (
         Scene(
@@ -69,7 +75,7 @@ def _tanks() -> tuple[Scene, ...]:
             "water-tanks-endless",
             "water-tanks",
             (0.0, 4.4),
-            Truth(None, tuple(states), status="accumulation", end=4.0),
+            Truth(None, (*states, (4.2, (0.0, 0.0))), checks=(("", dry),)),
             needs("transitions", "accumulation", "adaptive"),  # a fixed step passes the limit
             params={"left": 0.0},
             **common,

@@ -1,0 +1,81 @@
+"""Automata whose transitions accumulate go on in the limit that is declared for them: times by closed forms."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+
+ALL = ["exact", "taylor", "dop853", "tsit5", "scipy-rk45"]
+
+TANKS = hs.load("water-tanks").with_(left=0.0)
+
+
+def ball(limit: str | hs.Choice | None) -> hs.Model:
+    """A ball that bounces with e = 1/2, by a guard and a reset."""
+    floor = hs.Guard("floor", "h", hs.Choice("flight", reset={"h": 0, "w": "-w/2"}))
+    modes = [hs.Mode("flight", [floor], set={"g": 10}), hs.Mode("rest", set={"g": 0})]
+    return hs.Model(
+        "ball",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-g"), hs.State("age", 0, 1)],
+        components=[hs.Component("ball", modes, initial="flight", limit=limit)],
+    )
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_a_ball_comes_to_the_rest_that_is_declared(integrator: str) -> None:
+    """Falls of sqrt(1/5), and flights of 1, 1/2, 1/4, ... times that: three in all."""
+    sol = hs.simulate(ball(hs.Choice("rest", reset={"h": 0, "w": 0})), (0, 5), integrator=integrator)
+    assert sol.status == "finished"
+    last = sol.events[-1]
+    assert (last.source, last.target, last.guard) == ("flight", "rest", "limit")
+    assert last.t == pytest.approx(3 * sqrt(0.2), rel=1e-9)
+    assert sol(5.0)[:2].tolist() == [0.0, 0.0]
+    assert sol(5.0)[2] == pytest.approx(5.0, abs=1e-9)
+    assert sol.modes["ball"][-1].mode == "rest"
+
+
+def test_without_one_it_ends_there_and_says_what_to_declare() -> None:
+    sol = hs.simulate(ball(None), (0, 5), integrator="exact")
+    assert sol.status == "accumulation"
+    assert "declare the limit" in sol.message
+
+
+def test_it_is_written_and_read_and_in_the_structure() -> None:
+    plain, limited = ball(None), ball(hs.Choice("rest", reset={"h": 0, "w": 0}))
+    assert hs.Model.from_toml(limited.to_toml()).components == limited.components
+    assert plain.structure() != limited.structure()
+    assert ball("rest").components[0].limit == hs.Choice("rest")
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        (hs.Choice("stand"), "there is no mode 'stand'"),
+        (hs.Choice("rest", when="h > 0"), "its limit has a condition"),
+        (hs.Choice("rest", reset={"z": 1}), "resets 'z', which is no state"),
+    ],
+)
+def test_faults_of_a_limit_are_named(limit: hs.Choice, words: str) -> None:
+    with pytest.raises(hs.ModelError, match=words):
+        ball(limit).validate()
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_tanks_and_rocking_blocks_go_on_behind_their_limits(integrator: str) -> None:
+    """The tanks are dry at t = 4; the block rests after swings whose lengths are known (its q of each turn)."""
+    sol = hs.simulate(TANKS, (0, 5), integrator=integrator)
+    assert sol.status == "finished"
+    assert sol.events[-1].target == "off"
+    assert sol.events[-1].t == pytest.approx(4.0, rel=1e-9)
+    block = hs.load("rocking-block").with_(w_rest=0.0, e=0.5)
+    p = block.parameter_values()
+    sizes = 0.75 * p["e"] ** (2 * np.arange(60))
+    limit = (2 * np.arctanh(np.sqrt(sizes)).sum() - np.arctanh(sqrt(0.75))) / p["p"]
+    sol = hs.simulate(block, (0, 10), integrator=integrator)
+    assert sol.status == "finished"
+    assert sol.events[-1].t == pytest.approx(limit, rel=1e-9)
+    assert sol(10.0).tolist() == [0.0, 0.0]
