@@ -13,6 +13,7 @@ from hybridsim.engine.backward import cross_backward, entered_here, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_flight
+from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
 from hybridsim.engine.outcome import Outcome, Situation
@@ -21,7 +22,7 @@ from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.start import settled_start
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
-from hybridsim.engine.system import Series, System
+from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
@@ -341,23 +342,8 @@ class ModeLoop:
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
         resets = [("schedule", k) for k in schedules]
         settling = Settling(system, at, z.copy(), self.forward)
-        settling.jumped = self._surfaces_jump(instant, at)
+        settling.jumped = surfaces_jump(system, instant, at, self.forward)
         return settling.run((), resets)
-
-    def _surfaces_jump(self, instant: Instant, at: Situation) -> bool:
-        """Whether an input's jump carries a surface away from where it was: what was held is held no longer."""
-        system = self.system
-        if not (system.signals and system.surface_of):
-            return False
-        before = system.vector(instant, system.discrete(at.p), not self.forward)
-        values, bounds = [], []
-        for p in (before, at.p.copy()):
-            p[system.layout.pin_at] = 0.0
-            series = system.series(0.0, at.x, p, np.maximum(at.z, 0), np.zeros(system.n), 0.0)
-            assert isinstance(series, Series)  # models with surfaces are made from expressions
-            values.append(series.surfaces[:, 0])
-            bounds.append(series.surface_bounds[:, 0])
-        return bool((np.abs(values[1] - values[0]) > bounds[0] + bounds[1]).any())
 
     def _accumulated(self, instants: np.ndarray) -> bool:
         """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
