@@ -59,7 +59,7 @@ def test_run_keeps_what_was_computed(tmp_path: Path) -> None:
     code, messages = interrupted(tmp_path, *argv)
     assert code == 130, messages
     assert "stopping at the next step" in messages
-    assert "interrupted after t = " in messages and "wrote out.csv" in messages
+    assert "interrupted at t = " in messages and "wrote out.csv" in messages
     assert "Traceback" not in messages
     assert len((tmp_path / "out.csv").read_text().splitlines()) > 1
 
