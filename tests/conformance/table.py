@@ -1,6 +1,6 @@
 """Runs every scene with every integrator and writes the table of what came out.
 
-    python -m conformance.table [integrator ...]        (in tests/; takes some minutes)
+    python -m conformance.table [integrator ...]        (in tests/; ten minutes on two processors)
 
 With no name, all integrators are run and docs/reference/conformance.md is written; with names, the tables of
 these go to stdout.
@@ -8,9 +8,11 @@ these go to stdout.
 
 from __future__ import annotations
 
+import multiprocessing
 import sys
 import warnings
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import hybridsim as hs
@@ -54,12 +56,34 @@ follows an event is decided as with all others. Scenes that all of them get righ
 """
 
 
+def result_of(name: str, number: int, events: str) -> Outcome:
+    """An integrator in the scene of that number; in a process of its own."""
+    warnings.simplefilter("ignore")
+    return outcome(name, SCENES[number], **({"events": events} if events else {}))
+
+
+def outcomes(names: Sequence[str], events: str = "") -> dict[tuple[str, str], Outcome]:
+    """What came out, by integrator and scene; run on all processors."""
+    found = {}
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        jobs = {
+            (name, scene.name): pool.submit(result_of, name, k, events)
+            for k, scene in enumerate(SCENES)
+            for name in names
+        }
+        for number, (key, job) in enumerate(jobs.items(), 1):
+            found[key] = job.result()
+            print(f"\r{number} of {len(jobs)}: {' in '.join(key)}\033[K", end="", file=sys.stderr)
+    print(file=sys.stderr)
+    return found
+
+
 def native(names: Sequence[str]) -> list[str]:
     """The part of the page on `solve_ivp`'s own event finding: every failure with its mechanism."""
     solvers = [name for name in names if name.startswith("scipy-")]
-    lines = []
+    found, lines = outcomes(solvers, "native"), []
     for scene in SCENES:
-        results = [outcome(name, scene, events="native") for name in solvers]
+        results = [found[name, scene.name] for name in solvers]
         if any(result.verdict == "wrong" for result in results):
             lines.append((scene.name, *map(native_cell, results)))
     table = rows(("scene", *solvers), lines)
@@ -81,7 +105,7 @@ def rows(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
 
 def page(names: Sequence[str]) -> str:
     """The whole page for some integrators."""
-    results = {(name, scene.name): outcome(name, scene) for scene in SCENES for name in names}
+    results = outcomes(names)
     table = rows(
         ("scene", *names),
         ((scene.name, *(cell(results[name, scene.name]) for name in names)) for scene in SCENES),
