@@ -115,6 +115,9 @@ def _component(component: Component, report: Report) -> Iterator[str]:
                 else ", which its rate does not depend on: it is crossed, not slid along"
             )
         )
+    if limit := component.limit:
+        reset = ", ".join(f"{name} = {_flat(value)}" for name, value in limit.reset.items())
+        yield f"where its transitions accumulate: to {limit.to}" + (f", with {reset}" if reset else "")
     for mode in component.modes:
         linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
         yield f"mode {mode.name}{linear}"

@@ -63,6 +63,7 @@ def _record(
         "components": {
             component.name: {
                 "initial": component.initial,
+                "limit": component.limit.to if component.limit else None,
                 "modes": {mode.name: _mode_record(mode) for mode in component.modes},
             }
             for component in model.all_components()

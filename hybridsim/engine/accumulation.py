@@ -21,7 +21,7 @@ _TERMS = 10
 _MOST = 4  # events of one turn: two relays on either of their sides
 _FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
-_SAME_FACTOR = 1e-3
+SAME_FACTOR = 1e-3
 # A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
 _FAR_DOWN = 1e-6
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
@@ -48,7 +48,7 @@ def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: fl
             high, low = instants[i - known, 0], instants[i - known, 1]
         is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(high))
         for turn in range(min(i + 1, _MOST)):
-            is_shorter = gap < (1.0 - 0.5 * _SAME_FACTOR) * before[(i - turn - 1) % _MOST]
+            is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * before[(i - turn - 1) % _MOST]
             falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
             longest = max(longest, falls[turn])
         before[i % _MOST] = gap
@@ -64,7 +64,7 @@ def turn_of(gaps: list[float], count: int, same: float) -> tuple[int, float]:
         terms = count + turn - 1  # of every event of the turn
         if len(gaps) < terms + turn:
             break
-        if not gaps[-1] < gaps[-1 - turn] * (1.0 - _SAME_FACTOR):
+        if not gaps[-1] < gaps[-1 - turn] * (1.0 - SAME_FACTOR):
             continue
         factor = gaps[-1] / gaps[-1 - turn]
         pairs = zip(gaps[-terms:], gaps[-terms - turn : -turn], strict=True)
@@ -89,7 +89,7 @@ class Accumulation:
 
     def is_under_way(self) -> bool:
         """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
-        return turn_of(list(self.intervals), _FEW + 1, 2.0 * _SAME_FACTOR)[0] > 0
+        return turn_of(list(self.intervals), _FEW + 1, 2.0 * SAME_FACTOR)[0] > 0
 
     def last_intervals(self, count: int) -> float:
         """What the last intervals add up to."""
@@ -144,12 +144,12 @@ class Accumulation:
             return float(instant)
         if min(gaps) <= 0.0:
             return None
-        turn, factor = turn_of(gaps, _FEW + 1, 2.0 * _SAME_FACTOR)
+        turn, factor = turn_of(gaps, _FEW + 1, 2.0 * SAME_FACTOR)
         if turn:
             self.longest = max(self.longest, *gaps)
             rest = sum(gaps[-turn:]) * factor / (1.0 - factor)
             self.forecast = (float(float(instant) + rest), rest)
-            is_steady = turn_of(gaps, _TERMS, _SAME_FACTOR)[0] > 0
+            is_steady = turn_of(gaps, _TERMS, SAME_FACTOR)[0] > 0
             end = max(self.resolution, _END * math.ulp(float(instant)))
             return self.forecast[0] if is_steady and rest <= end else None
         self.longest = max(gaps) if gaps[-1] >= gaps[-2] else max(self.longest, *gaps)

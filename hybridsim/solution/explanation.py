@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.accumulation import SAME_FACTOR, turn_of
 from hybridsim.engine.decide import FINE, LEAVES, side_after
+from hybridsim.engine.gathering import LIMIT, SIDE
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
@@ -27,6 +30,7 @@ _LEGEND = """\
   (a mode lasts while its guards g are >= 0; g', g'' are their rates along the motion in that mode, and the first that
   is not zero decides; by decree: the event itself makes it zero, so that it is not measured)"""
 _WORDS = {FINE: "admissible", LEAVES: "not admissible"}
+_SERIES = 12  # events that are looked at to say how they accumulated
 
 
 @dataclass(frozen=True)
@@ -162,6 +166,12 @@ def explain(solution: Solution, number: int) -> Explanation:
     occurrence = happened[number]
     together = [o for o in happened if o.instant == occurrence.instant]
     segment = _segment_before(solution, occurrence)
+    if segment is None and event.guard in (SIDE, LIMIT):
+        return Explanation(event, (), (), _of_accumulation(events, event), _state(solution, event))
+    if segment is None:
+        raise UsageError(
+            f"no segment ends at t = {event.t!r}", remedy="an event at the start of a run has no past"
+        )
     fired = _fired(solution._system, segment, together)
     state = _state(solution, event)
     if not fired:
@@ -178,6 +188,21 @@ def explain(solution: Solution, number: int) -> Explanation:
     candidates = tuple(_candidate(settling, outcome, *one) for one in settling.seen)
     reason = _reason(solution, occurrence, settling, outcome, x_minus)
     return Explanation(event, views, candidates, reason, state, choices)
+
+
+def _of_accumulation(events: Sequence[Event], event: Event) -> str:
+    """What led to an instant at which no segment ends: the limit of a series of events."""
+    times = [e.t for e in events if e.kind == "transition" and e.t < event.t]
+    gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
+    turn, factor = turn_of(gaps, 3, 2.0 * SAME_FACTOR)
+    shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
+    every = "each" if turn == 1 else f"every {turn} of them"
+    series = f", {every} shorter by the factor {factor:.6g}" if turn else ""
+    end = ", as its limit is declared" if event.guard == LIMIT else ""
+    return (
+        f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
+        f"and {event.target} is entered there{end}"
+    )
 
 
 def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:
@@ -243,8 +268,8 @@ def _of_another_kind(solution: Solution, event: Event) -> str:
     )
 
 
-def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment:
-    """The segment that the event ended."""
+def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | None:
+    """The segment that the event ended; None where it ended none."""
     if solution._save != "all":
         raise UsageError(
             f"the run was made with save={solution._save!r}",
@@ -255,10 +280,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment:
         segment = segments[int(k)]
         if abs(segment.end.minus(occurrence.instant)) == 0.0 and len(segment.s) > 1:
             return segment
-    raise UsageError(
-        f"no segment ends at t = {float(occurrence.instant)!r}",
-        remedy="an event at the start of a run has no past",
-    )
+    return None
 
 
 def _fired(system: System, segment: Segment, together: list[Occurrence]) -> list[int]:

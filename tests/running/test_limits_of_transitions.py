@@ -79,3 +79,21 @@ def test_tanks_and_rocking_blocks_go_on_behind_their_limits(integrator: str) -> 
     assert sol.status == "finished"
     assert sol.events[-1].t == pytest.approx(limit, rel=1e-9)
     assert sol(10.0).tolist() == [0.0, 0.0]
+
+
+def test_the_event_is_explained_by_the_series_before_it() -> None:
+    sol = hs.simulate(TANKS, (0, 5), integrator="exact")
+    said = str(sol.explain(len(sol.events) - 1))
+    assert "each shorter by the factor 0.5; they add up to t = 4.0, and off is entered there" in said
+    twisting = hs.simulate("twisting-controller", (0, 7), integrator="exact")
+    said = str(twisting.explain(len(twisting.events) - 1))
+    assert "every 4 of them shorter by the factor" in said
+    assert "sliding is entered there" in said
+
+
+def test_a_run_that_is_stopped_in_the_series_goes_on_to_the_same_limit() -> None:
+    whole = hs.simulate("twisting-controller", (0, 7), integrator="exact")
+    part = hs.simulate("twisting-controller", (0, 7), integrator="exact", limits={"steps": 40})
+    assert part.status == "limit"
+    on = part.resume()
+    assert [e.t for e in on.events] == [e.t for e in whole.events]
