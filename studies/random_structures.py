@@ -74,8 +74,8 @@ Its numbers are drawn {draws} times; `dop853` (rtol 1e-9), `taylor` (1e-10) and,
 
 *The other method* steps through time without locating anything (`tests/reference/stepped_structures.py`): the forces of
 a step are those that fit the laws at its end. It is of first order, and is run with 2000, 4000 and 8000 steps, and with
-up to 64 000 where that does not decide. Positions are compared at 100 times. With d the difference of its last two
-runs (or half that of the two before, if larger), which is its error if the order is one,
+up to 64 000 where that does not decide. Positions are compared at 100 times. With d the largest of the
+differences of successive runs, each taken to fall with the step, which is its error if the order is one,
 
 - a run *agrees* where it is off by at most 3 d at all times, and d is below 2 % of the motion;
 - *sensitive*: where, and as far as, a change of the start by 1e-5 makes the other method itself change by more than

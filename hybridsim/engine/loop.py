@@ -16,6 +16,7 @@ from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_fligh
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
+from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
@@ -55,6 +56,7 @@ class ModeLoop:
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray
         self.accumulation = Accumulation()
+        self.notices = Notices(system, method, task, self.record)
         self.leaper = self._leaper()
         self._told = progress
 
@@ -89,6 +91,7 @@ class ModeLoop:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
             )
+        self.notices.look()
         self.record.seal()
         return self.record
 
@@ -127,6 +130,7 @@ class ModeLoop:
                 arrival = segment.run(bound, step_size)
             finally:
                 self._keep(segment)
+                self.notices.look()
             at_target = arrival.s == bound
             instant = target if at_target else self.origin.plus(arrival.s)
             stop = self._settle(instant, arrival, appointment if at_target else None, segment)
@@ -164,6 +168,7 @@ class ModeLoop:
         while True:
             landing = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
             self.origin, self.outcome = landing.origin, landing.outcome
+            self.notices.look()
             arrived = landing.end == ARRIVED
             if len(landing.instants):
                 self.adopted = Instant(*landing.instants[-1].tolist())
@@ -389,6 +394,7 @@ class ModeLoop:
             found = found or at_declared_limit(self.system, self.outcome, self.p, ahead, changed)
         if found is None:
             return False
+        self.notices.accumulated([self.system.automata[c.component].name for c in found.changes])
         self.accumulation.begin_anew()
         self._adopt(self.origin.plus(ahead), found, self.outcome.x, (), ())
         return True

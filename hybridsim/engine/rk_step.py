@@ -61,6 +61,17 @@ class Tableau:
         q_low, terms_low = self._leading(self.e_low) if self.e_low.size else (0, np.zeros(2))
         return q, float(terms[0]), float(terms[1]), q_low, float(terms_low[0])
 
+    @cached_property
+    def real_stability(self) -> float:
+        """Up to which z all |R(-z)| <= 1, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to 1e-3 or so."""
+        power, terms = np.ones(len(self.c)), [1.0]
+        for _ in self.c:
+            terms.append(float(self.b @ power))
+            power = self.a @ power
+        z = np.arange(1e-3, 3.0 * len(self.c), 1e-3)
+        unstable = np.abs(np.polynomial.polynomial.polyval(-z, terms)) > 1.0 + 1e-9
+        return float(z[np.argmax(unstable)])
+
     def _leading(self, e: np.ndarray) -> tuple[int, np.ndarray]:
         power, k = np.ones(len(self.c)), 0
         found: list[float] = []

@@ -210,6 +210,10 @@ class Method(Protocol):
     def leaps(self) -> bool:
         """Whether it has a compiled loop."""
 
+    @property
+    def stable_to(self) -> float:
+        """How far along the negative axis of h*lambda its steps are stable; 0 where they are far enough for any."""
+
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
         """Its compiled loop for one run, no segment longer than `longest`; None where this model rules it out."""
 

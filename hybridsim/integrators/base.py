@@ -71,6 +71,11 @@ class Integrator(ABC):
     dense_is_accurate: ClassVar[bool] = False
     leaps: ClassVar[bool] = False  # whether it has a compiled loop, which leaper() gives
 
+    @property
+    def stable_to(self) -> float:
+        """Of an explicit method, how far along the negative axis of h*lambda its steps are stable; else 0."""
+        return 0.0
+
     def prepare(self, system: System) -> None:
         """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
         return

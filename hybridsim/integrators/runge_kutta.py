@@ -81,6 +81,11 @@ class RungeKuttaIntegrator(Integrator):
     lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
     leaps: ClassVar[bool] = True
 
+    @property
+    def stable_to(self) -> float:
+        """The border of the stability region of the tableau, on the negative axis."""
+        return self.tableau.real_stability
+
     @classmethod
     def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
         return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)

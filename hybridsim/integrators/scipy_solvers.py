@@ -14,6 +14,11 @@ from hybridsim.integrators.scipy_stepper import SolverStepper, series_step
 
 _NOISE = {"accumulation": "hops shorter than its tolerances are noise: every restart is at order one"}
 _EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
+_STABLE = {
+    "RK23": 2.513,
+    "RK45": 3.307,
+    "DOP853": 6.394,
+}  # roots of |R(-z)| = 1 for their stability polynomials
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,11 @@ class ScipyIntegrator(Integrator):
     solver: ClassVar[str]
     implicit: ClassVar[bool] = False
     starts_blind: ClassVar[bool] = False  # a first step that is far too long makes it give up
+
+    @property
+    def stable_to(self) -> float:
+        """Of the explicit ones."""
+        return _STABLE.get(self.solver, 0.0)
 
     def start(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,8 +127,10 @@ def says_what_and_where(s: Structure, sol: hs.Solution) -> bool:
 
 
 def bounds(runs: list[np.ndarray]) -> np.ndarray:
-    """How far off the last run may be up to each time."""
-    return FACTOR * np.maximum(grown(runs[-1] - runs[-2]), 0.5 * grown(runs[-2] - runs[-3])) + FLOOR
+    """How far off the last run may be up to each time: all differences, taken to fall with the step."""
+    last = STEPS[len(runs) - 1]
+    differences = [grown(b - a) * STEPS[k + 1] / last for k, (a, b) in enumerate(pairwise(runs))]
+    return FACTOR * np.max(differences, axis=0) + FLOOR
 
 
 def grown(difference: np.ndarray) -> np.ndarray:

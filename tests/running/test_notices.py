@@ -1,0 +1,110 @@
+"""Warnings on a solution: each where its cause is, and none where it is not."""
+
+from __future__ import annotations
+
+import pytest
+
+import hybridsim as hs
+
+STIFF = hs.Model(
+    "stiff",
+    states=[hs.State("x", 1, der="-k*(x - cos(t)) - sin(t)"), hs.State("y", 0, der="x")],
+    parameters={"k": 2e3},
+)
+
+
+def told(sol: hs.Solution, word: str) -> list[str]:
+    return [warning for warning in sol.warnings if warning.startswith(word)]
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5", "scipy-rk45"])
+def test_steps_kept_short_by_stability(integrator: str) -> None:
+    """x is cos(t) after a moment; what is left is smooth, and explicit steps are 3 to 6 times 1/k all the same."""
+    sol = hs.simulate(STIFF, (0, 4), integrator=integrator, rtol=1e-6)
+    (warning,) = told(sol, "stiff")
+    assert "rodas5p" in warning
+    decay = float(warning.split("a decay within ")[1].split()[0])
+    assert decay == pytest.approx(1 / 2e3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "k"), [("rodas5p", 2e3), ("scipy-radau", 2e3), ("dop853", 1.0), ("tsit5", 1.0)]
+)
+def test_nothing_is_stiff_for_an_implicit_method_or_without_a_fast_decay(integrator: str, k: float) -> None:
+    sol = hs.simulate(STIFF, (0, 400 if k == 1.0 else 4), integrator=integrator, params={"k": k}, rtol=1e-6)
+    assert sol.warnings == ()
+
+
+def test_a_fast_oscillation_is_no_stiffness() -> None:
+    model = hs.Model("fast", states=[hs.State("x", 1, der="v"), hs.State("v", 0, der="-1e6*x - 10*v")])
+    sol = hs.simulate(model, (0, 0.5), integrator="tsit5", rtol=1e-6)
+    assert sol.stats["steps"] > 500
+    assert sol.warnings == ()
+
+
+def switched(width: float) -> hs.Model:
+    """A state driven to and fro between the edges of a hysteresis, on its way along a slow drift."""
+    return hs.Model(
+        "switched",
+        states=[hs.State("x", 1, der="u - 0.1"), hs.State("y", 0, der="1")],
+        parameters={"d": width},
+        components=[
+            hs.Component(
+                "relay",
+                [
+                    hs.Mode("high", hs.Guard("low", "x + d", "low"), set={"u": "-1"}),
+                    hs.Mode("low", hs.Guard("high", "d - x", "high"), set={"u": "1"}),
+                ],
+                initial="high",
+            )
+        ],
+    )
+
+
+def test_chattering_is_named_with_its_time() -> None:
+    for integrator in ("dop853", "exact", "scipy-dop853"):
+        sol = hs.simulate(switched(1e-4), (0, 1.2), integrator=integrator)
+        (warning,) = told(sol, "chattering")
+        assert "are of relay" in warning
+        since = float(warning.split("from t = ")[1].split()[0])
+        assert since >= 1 / 1.1  # where x first comes to the edge
+
+
+def test_a_hysteresis_that_shows_is_no_chattering() -> None:
+    sol = hs.simulate(switched(0.01), (0, 20), integrator="dop853")
+    assert len(sol.events) > 200
+    assert sol.warnings == ()
+
+
+def test_many_periods_are_no_chattering() -> None:
+    assert hs.simulate("dfcs", (0, 3)).warnings == ()
+
+
+def test_bounces_that_accumulate_are_told_as_such_and_not_as_chattering() -> None:
+    model = hs.Model(
+        "shelf",
+        states=[hs.State("h", 2, der="w"), hs.State("w", 0, der="-9.81 + p")],
+        impacts=[hs.Impact("p", gap="h - 1", restitution="0.95")],
+    )
+    sol = hs.simulate(model, (0, 20), integrator="taylor")
+    assert len(sol.events) > 200
+    assert sol.modes["p"][-1].mode == "closed"
+    assert all(warning.startswith("accumulation: events of p") for warning in sol.warnings)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "taylor", "exact"])
+def test_a_touch_is_told_where_a_compiled_loop_runs(integrator: str) -> None:
+    """1 - x is (1 - t)^2, a square that no integrator can tell from a crossing."""
+    model = hs.Model(
+        "touch",
+        states=[hs.State("x", 0, der="v"), hs.State("v", 2, der="-2")],
+        components=[
+            hs.Component(
+                "c", [hs.Mode("below", hs.Guard("top", "1 - x", "above")), hs.Mode("above")], initial="below"
+            )
+        ],
+    )
+    sol = hs.simulate(model, (0, 3), integrator=integrator)
+    crossed = any(event.kind == "transition" for event in sol.events)
+    assert crossed or told(sol, "near-grazing: guard top of c")
+    assert [e.t for e in sol.events] == pytest.approx([1.0], abs=1e-7)
