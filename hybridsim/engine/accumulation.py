@@ -14,6 +14,7 @@ import numpy as np
 
 from hybridsim.engine.checkpoint import Pace
 from hybridsim.engine.jit import kernel
+from hybridsim.engine.system import Automaton
 from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
@@ -166,12 +167,17 @@ class Accumulation:
         return limit if abs(float(instant) - limit) <= rest else None
 
 
-def accumulated(limit: float, holding: list[str]) -> str:
-    """What a run says that ends where events accumulate; `holding`: the modes that their components could hold in."""
+def accumulated(limit: float, changed: list[Automaton]) -> str:
+    """What a run says that ends where events of these components accumulate."""
+    names = ", ".join(dict.fromkeys(a.name for a in changed))
+    holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
     if not holding:
-        return f"events accumulate at t = {limit!r}: declare the limit that they lead to, a mode of their component"
+        return (
+            f"events accumulate at t = {limit!r}, of {names}: declare the limit that they lead to, a mode of their "
+            "component"
+        )
     modes = " and ".join(dict.fromkeys(holding))
     return (
-        f"events accumulate at t = {limit!r}, and {modes} cannot be entered there: take a smaller rtol or another "
-        "integrator, or let a monitor end the run before"
+        f"events accumulate at t = {limit!r}, of {names}, and {modes} cannot be entered there: take a smaller rtol or "
+        "another integrator, or let a monitor end the run before"
     )

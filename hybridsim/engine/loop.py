@@ -91,7 +91,6 @@ class ModeLoop:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
             )
-        self.notices.look()
         self.record.seal()
         return self.record
 
@@ -366,10 +365,7 @@ class ModeLoop:
         if limit is None or self._gathered(limit):
             return False
         self.record.status = "accumulation"
-        changed = [automata[c.component] for c in self.outcome.changes]
-        self.record.message = accumulated(
-            limit, [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
-        )
+        self.record.message = accumulated(limit, [automata[c.component] for c in self.outcome.changes])
         return True
 
     def _ends_series(self, instant: Instant, outcome: Outcome) -> bool:

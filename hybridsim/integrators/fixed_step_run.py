@@ -371,10 +371,7 @@ class FixedStepRun:
         limit = self.accumulation.limit(instant) if outcome.changes else None
         if limit is not None:
             record.status = "accumulation"
-            changed = [system.automata[c.component] for c in outcome.changes]
-            record.message = accumulated(
-                limit, [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
-            )
+            record.message = accumulated(limit, [system.automata[c.component] for c in outcome.changes])
         return record.status != "finished"
 
     def _crossed_in_jump(

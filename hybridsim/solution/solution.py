@@ -338,7 +338,7 @@ class Solution:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know: near-grazings, decisions inside rounding."""
+        """What the user should know: near-grazings, decisions inside rounding, accumulation, chattering, stiffness."""
         return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._trajectory.warnings.items())
 
     @property
