@@ -16,6 +16,7 @@ from hybridsim.engine.chain import Chain
 from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.series_block import SeriesBlock
+from hybridsim.engine.system import Automaton
 from hybridsim.engine.timepair import Instant
 
 
@@ -242,8 +243,12 @@ def test_instants_at_once_or_one_by_one(kind: str) -> None:
 
 
 def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
-    assert accumulated(2.5, []).endswith(
-        "t = 2.5: declare the limit that they lead to, a mode of their component"
+    def automaton(name: str, hold: int) -> Automaton:
+        return Automaton(name, ("open", "closed"), ((), ()), ((), ()), ((), ()), ((), ()), 0, -1, hold)
+
+    assert accumulated(2.5, [automaton("p", -1)]).endswith(
+        "t = 2.5, of p: declare the limit that they lead to, a mode of their component"
     )
-    held = accumulated(2.5, ["p.closed", "p.closed", "q.closed"])
+    held = accumulated(2.5, [automaton("p", 1), automaton("p", 1), automaton("q", 1)])
+    assert "of p, q" in held
     assert "p.closed and q.closed cannot be entered there" in held and "declare" not in held
