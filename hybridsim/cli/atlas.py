@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.output import print_json, require_folder
+from hybridsim.cli.output import complain, print_json, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
@@ -34,6 +34,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--class", dest="trouble", metavar="CLASS", default="", help="the scenes of this class"
     )
+    parser.add_argument("--list", action="store_true", help="print the scenes by class, and run nothing")
     parser.add_argument(
         "--integrators",
         metavar="A,B",
@@ -55,12 +56,17 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     """Run the matrix, print the counts and fill the folder."""
     if args.scenes and args.trouble:
         raise UsageError("scenes by name and --class", remedy="leave out one of the two")
-    folder: Path = args.out or _FOLDER
-    require_folder(folder, "--out")
-
-    from hybridsim.testing.atlas import atlas, scenes_named
+    from hybridsim.testing.atlas import atlas, listing, scenes_named, told
 
     scenes = scenes_named(args.scenes, args.trouble)
+    if args.list:
+        if args.json:
+            print_json([told(scene) for scene in scenes])
+        else:
+            print(listing(scenes))
+        return 0
+    folder: Path = args.out or _FOLDER
+    require_folder(folder, "--out")
     with Progress(session) as progress:
         result = atlas(
             scenes,
@@ -69,6 +75,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             workers=args.workers or os.cpu_count() or 1,
             progress=progress,
         )
+        if result.interrupted and not result.scenes:
+            raise KeyboardInterrupt
         fault = None
         try:
             _write(result, folder, session, progress)
@@ -80,16 +88,22 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         print(result.table())
     if fault is not None:
         raise UsageError(f"--out: {folder}: {fault.strerror}", remedy="choose a place that you may write to")
+    if result.interrupted:
+        complain(f"interrupted after {len(result.scenes)} of {len(scenes)} scenes")
+        return session.interrupted_code
     return 0
 
 
 def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
+    """Data, matrix, pages and pictures; of what was interrupted the data alone, which take no time."""
     from hybridsim.plot.atlas import matrix, save_small
     from hybridsim.testing.atlas import pages
 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "atlas.json").write_text(result.to_json(), encoding="utf-8")
     session.wrote(folder / "atlas.json")
+    if result.interrupted:
+        return
     save_small(matrix(result), folder / "matrix.png", dpi=_MATRIX_DPI)
     session.wrote(folder / "matrix.png")
     drawn = _pictures(result, folder, progress)

@@ -6,10 +6,14 @@ from collections import Counter
 from collections.abc import Container
 from dataclasses import dataclass
 from itertools import groupby
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import hybridsim as hs
+from hybridsim.arguments import chosen_model
+from hybridsim.engine.recent import system_of
+from hybridsim.testing.clock import ProcessorTime
 from hybridsim.testing.scene import END, Scene
 
 SCENES = Path(__file__).with_name("scenes")
@@ -55,19 +59,48 @@ def load(scene: Scene) -> Any:
     return hs.load(str(path) if path.exists() else scene.file)
 
 
-def run(scene: Scene, integrator: str, form: str = "", **settings: Any) -> Any:
-    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0."""
+def model_of(scene: Scene, form: str, settings: dict[str, Any]) -> Any:
+    """What is run: the model, or a form of `Model.regularized`, whose width v0 is taken out of the settings."""
     model = load(scene)
-    if form:
-        model = model.regularized(form, v0=settings.pop("v0"))
-    return hs.simulate(
+    return model.regularized(form, v0=settings.pop("v0")) if form else model
+
+
+def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> None:
+    """Compile what a run needs, however long it takes, so that a clock started then counts the run alone.
+
+    Errors
+    ------
+    HybridsimError as from the run itself.
+    """
+    model = chosen_model(model_of(scene, form, settings), dict(scene.params))
+    system, method = system_of(model), next(one for one in hs.list_integrators() if one.name == integrator)
+    for function in system.hot_functions():
+        system.address(function)
+    method().prepare(system)
+
+
+def run(
+    scene: Scene, integrator: str, form: str = "", processor_seconds: float = inf, **settings: Any
+) -> Any:
+    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0.
+
+    Errors
+    ------
+    KeyboardInterrupt after Ctrl-C, where `simulate` returns what it has: half a run is no answer.
+    """
+    model = model_of(scene, form, settings)
+    solution = hs.simulate(
         model,
         scene.span,
         params=dict(scene.params),
         x0=dict(scene.start),
         integrator=integrator,
+        progress=ProcessorTime(processor_seconds),
         **{**scene.options, **settings},
     )
+    if solution.status == "interrupted":
+        raise KeyboardInterrupt
+    return solution
 
 
 def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:

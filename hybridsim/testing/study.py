@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Container, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from itertools import pairwise
-from types import FrameType
 from typing import Any
 
 import hybridsim as hs
-from hybridsim.engine.recent import system_of
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.base import Integrator
 from hybridsim.testing import judge
+from hybridsim.testing.clock import bounded_work
 from hybridsim.testing.scene import Scene
 
 # Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
@@ -42,11 +37,7 @@ LIFTED = {"stick_velocity": ("zero", "exact-stick")}
 # A run stopped by its limits with more than this times the steps of the setting before, whose tolerance was a thousand
 # times looser, does not come to an end: a method of order 2 needs 32 times as many.
 RUNAWAY = 100
-LONGEST = 60  # seconds for one run of a scene: the longest takes ten on a slow machine
-
-
-class Endless(Exception):
-    """A run that does not come to an end."""
+LONGEST = 60  # seconds of processor time for one run of a scene: the longest takes ten on a slow machine
 
 
 @dataclass(frozen=True)
@@ -152,12 +143,13 @@ def carry_out(
     seconds: float = LONGEST,
     **options: Any,
 ) -> Study:
-    """Run a scene at all settings, as far as it is worth while; `seconds` bound each run."""
+    """Run a scene at all settings, as far as it is worth while; `seconds` of processor time bound each run."""
     done: list[tuple[Setting, judge.Measured]] = []
     waiting = list(settings)
     while waiting:
         setting = waiting.pop(0)
         try:
+            judge.prepare(scene, name, **setting.options, **options)
             with bounded_work(seconds):
                 run = judge.run(scene, name, **setting.options, **options)
                 measured = judge.measure(scene, run, lacks)
@@ -182,31 +174,6 @@ def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, fl
     """What a study may show that ends with this setting."""
     allowed = CUT_SHORT * last.options.get("rtol", 0.0)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
-
-
-@cache
-def compile_for(name: str) -> None:
-    """Have an integrator compiled: that may take as long as a machine needs, and must not be interrupted."""
-    integrator(name)().prepare(system_of(hs.load("free-decay")))
-
-
-@contextmanager
-def bounded_work(seconds: float = LONGEST) -> Iterator[None]:
-    """Turn work without end into an Endless error (where the platform has alarms, in the main thread)."""
-    if not hasattr(signal, "SIGALRM") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def give_up(number: int, frame: FrameType | None) -> None:
-        raise Endless(f"no end after {seconds:g} s")
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def within(measured: judge.Measured, tolerances: tuple[float, float]) -> bool:

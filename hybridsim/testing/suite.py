@@ -19,7 +19,6 @@ from hybridsim.testing.scene import Scene
 from hybridsim.testing.study import (
     allowed_errors,
     carry_out,
-    compile_for,
     integrator,
     lacking,
     settings_for,
@@ -55,7 +54,6 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
         for capability in sorted(scene.needs | ({"located"} if "contacts" in scene.needs else set())):
             if capability in lacks:
                 return Outcome(name, scene.name, "lacks", (f"{capability}: {lacks[capability]}",))
-        compile_for(name)
         study = carry_out(name, scene, settings_for(one, scene), allowed_errors(one, scene), lacks, **options)
     faults = study.faults()
     return Outcome(name, scene.name, "wrong" if faults else "right", tuple(faults), study.errors())

@@ -14,7 +14,7 @@ import hybridsim as hs
 from hybridsim.errors import UsageError
 from hybridsim.plot.atlas import matrix
 from hybridsim.plot.atlas import scene as picture
-from hybridsim.testing import SCENES, conformance_failures, outcome
+from hybridsim.testing import SCENES, conformance_failures, judge, outcome
 from hybridsim.testing.atlas import Atlas, atlas, configurations, example, pages, scenes_named
 from hybridsim.testing.atlas import cell as cells
 
@@ -115,6 +115,19 @@ def test_an_example_shows_the_true_motion_and_the_failing_one(small: Atlas) -> N
     assert found.points == ((0.0, -24.0),)
     axes = picture(found)
     assert axes.get_ylabel() == "y"
+
+
+def test_ctrl_c_ends_a_picture_too(small: Atlas, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that Ctrl-C ends is no example: `simulate` returns what it has, and the atlas does not go on with it."""
+
+    def interrupt(fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(judge, "ProcessorTime", lambda seconds: interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        example(small, small.scenes[0])
+    stopped = atlas(small.scenes, ("scipy-rk45",))
+    assert stopped.interrupted and stopped.scenes == ()
 
 
 def test_pages_tell_of_every_scene(small: Atlas) -> None:

@@ -9,8 +9,9 @@ import pytest
 
 from hybridsim.errors import UsageError
 from hybridsim.testing.atlas import verdict as v
+from hybridsim.testing.clock import Endless
 from hybridsim.testing.judge import Measured
-from hybridsim.testing.study import RUNAWAY, Endless, Setting, Study, cut_short
+from hybridsim.testing.study import RUNAWAY, Setting, Study, cut_short
 
 
 def measured(**changes: Any) -> Measured:

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from cli.conftest import Outcome
 
+from hybridsim.testing import SCENES, TROUBLES
+
 
 @pytest.mark.parametrize(
     ("words", "said"),
@@ -49,3 +51,23 @@ def test_a_small_matrix_fills_its_folder(hybridsim: Callable[..., Outcome], tmp_
         "events/box-from-the-side.png", "stick/FREE-1.png",
     }  # fmt: skip
     assert "wrote atlas/matrix.png" in outcome.err
+
+
+def test_list_prints_the_scenes_by_class_and_runs_nothing(
+    hybridsim: Callable[..., Outcome], tmp_path: Path
+) -> None:
+    outcome = hybridsim("atlas", "--list")
+    assert (outcome.code, outcome.err) == (0, "")
+    blocks = [block.splitlines() for block in outcome.out.split("\n\n")]
+    assert [block[0].partition(":")[0] for block in blocks] == list(TROUBLES)
+    listed = [line.split(maxsplit=1) for block in blocks for line in block[1:]]
+    assert {name: title.strip() for name, title in listed} == {scene.name: scene.title for scene in SCENES}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_list_of_a_class_as_json(hybridsim: Callable[..., Outcome]) -> None:
+    found = json.loads(hybridsim("atlas", "--list", "--class", "sliding", "--json").out)
+    assert {one["class"] for one in found} == {"sliding"}
+    assert {one["name"] for one in found} == {s.name for s in SCENES if s.trouble == "sliding"}
+    assert all(one["title"] and one["cause"] for one in found)
+    assert hybridsim("atlas", "--list", "SCI-cubik").code == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -16,27 +17,29 @@ from hybridsim.cli import main
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT between processes")
 
-# The program says on stderr when the simulation has begun; then it is interrupted from outside.
+# The program says on stderr when so much of its work is done; then it is interrupted from outside.
 _PROGRAM = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from hybridsim.cli.progress import Progress
 called = []
 progress = Progress.__call__
-def tell(self, *arguments):
-    if not called:
+def tell(self, done, *arguments):
+    if not called and done >= float(sys.argv[1]):
         called.append(print("begun", file=sys.stderr, flush=True))
-    progress(self, *arguments)
+    progress(self, done, *arguments)
 Progress.__call__ = tell
 from hybridsim.cli import main
-sys.exit(main(sys.argv[1:]))
+sys.exit(main(sys.argv[2:]))
 """
 
 
-def interrupted(tmp_path: Path, *argv: str, number: int = signal.SIGINT) -> tuple[int, str]:
-    """Exit code and messages of a command that gets a signal half a second after its work has begun."""
+def interrupted(
+    tmp_path: Path, *argv: str, number: int = signal.SIGINT, after: float = 0.0, patience: float = 300.0
+) -> tuple[int, str]:
+    """Exit code and messages of a command that gets a signal half a second after this part of its work is done."""
     process = subprocess.Popen(
-        [sys.executable, "-c", _PROGRAM, *argv],
+        [sys.executable, "-c", _PROGRAM, str(after), *argv],
         cwd=tmp_path,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -50,7 +53,7 @@ def interrupted(tmp_path: Path, *argv: str, number: int = signal.SIGINT) -> tupl
             break
     time.sleep(0.5)
     process.send_signal(number)
-    seen.append(process.communicate(timeout=300)[1])
+    seen.append(process.communicate(timeout=patience)[1])
     return process.returncode, "".join(seen)
 
 
@@ -93,3 +96,25 @@ def test_sweep_writes_the_points_that_it_has(tmp_path: Path) -> None:
     assert "Traceback" not in messages
     lines = (tmp_path / "sweep-dfcs" / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 90_001 and lines[-1].endswith(",not run")
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_atlas_keeps_the_scenes_that_are_done(tmp_path: Path, workers: str) -> None:
+    """The second scene takes ten seconds of work, if it is not stopped."""
+    argv = (
+        "atlas",
+        "FREE-1",
+        "TANH-1e-6",
+        "--integrators",
+        "rk4-sign,dop853",
+        "--quick",
+        "--workers",
+        workers,
+    )
+    code, messages = interrupted(tmp_path, *argv, after=0.5, patience=8.0)
+    assert code == 130, messages
+    assert "Traceback" not in messages
+    assert "interrupted after 1 of 2 scenes" in messages and "matrix.png" not in messages
+    kept = json.loads((tmp_path / "atlas" / "atlas.json").read_text(encoding="utf-8"))
+    assert [scene["name"] for scene in kept["scenes"]] == ["FREE-1"]
+    assert len(kept["cells"]) == len(kept["integrators"]) == 4

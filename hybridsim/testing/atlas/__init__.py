@@ -3,7 +3,7 @@
 from hybridsim.testing.atlas.cell import Cell, Row
 from hybridsim.testing.atlas.configurations import Configuration, configurations
 from hybridsim.testing.atlas.example import Example, example
-from hybridsim.testing.atlas.matrix import Atlas, atlas, scenes_named
+from hybridsim.testing.atlas.matrix import Atlas, atlas, listing, scenes_named, told
 from hybridsim.testing.atlas.pages import pages
 from hybridsim.testing.atlas.verdict import VERDICTS
 
@@ -17,6 +17,8 @@ __all__ = [
     "atlas",
     "configurations",
     "example",
+    "listing",
     "pages",
     "scenes_named",
+    "told",
 ]

@@ -14,9 +14,10 @@ from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.verdict import NOT_RUN, order, verdict
 from hybridsim.testing.judge import Measured
 from hybridsim.testing.scene import Scene, Truth
-from hybridsim.testing.study import Setting, carry_out, compile_for
+from hybridsim.testing.study import Setting, carry_out
 
-# What one run may take: the longest run of a right method takes five seconds, and 2e6 steps where it is compiled.
+# What one run may take, in processor time: the longest run of a right method takes five seconds, and 2e6 steps where
+# it is compiled.
 SECONDS = 10.0
 STEPS = 5e6
 LONG = 20.0  # units of time from which on only compiled methods run
@@ -87,7 +88,6 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
         settings, tolerances = settings[:1], loosened(tolerances, settings[0])
     began = time.perf_counter()
     with registered(RIVALS.get(configuration.integrator, configuration.integrator)) as name:
-        compile_for(name)
         study = carry_out(
             name,
             seen_by(scene, configuration),
@@ -96,7 +96,8 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
             lacks={"located"}
             & set(configuration.method.lacks),  # a method of steps is not asked for instants
             seconds=2 * SECONDS,  # for what does not look at its limits
-            limits={"seconds": SECONDS, "steps": STEPS},
+            processor_seconds=SECONDS,
+            limits={"steps": STEPS},
             form=configuration.form,
             **configuration.options,
         )

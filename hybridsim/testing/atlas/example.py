@@ -15,8 +15,8 @@ from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.matrix import Atlas
 from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG
+from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import END, Scene
-from hybridsim.testing.study import Endless, bounded_work
 
 # Who is shown, first of all: what people use and what fails in a way that one can see.
 TYPICAL = (
@@ -104,16 +104,12 @@ def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
         options = configuration.settings(scene)[-1].options
     try:
         rival = RIVALS.get(configuration.integrator, configuration.integrator)
-        with warnings.catch_warnings(), bounded_work(2 * SECONDS), registered(rival) as name:
+        settings = {"form": configuration.form, **options, **configuration.options}
+        with warnings.catch_warnings(), registered(rival) as name:
             warnings.simplefilter("ignore")
-            return judge.run(
-                scene,
-                name,
-                form=configuration.form,
-                limits={"seconds": SECONDS, "steps": STEPS},
-                **options,
-                **configuration.options,
-            )
+            judge.prepare(scene, name, **settings)
+            with bounded_work(2 * SECONDS):
+                return judge.run(scene, name, processor_seconds=SECONDS, limits={"steps": STEPS}, **settings)
     except (HybridsimError, Endless, ArithmeticError, ValueError):
         return None
 

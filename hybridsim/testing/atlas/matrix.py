@@ -8,8 +8,9 @@ import multiprocessing
 import os
 import signal
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -32,11 +33,13 @@ class Atlas:
     Parameters
     ----------
     cells : by scene and configuration name.
+    interrupted : whether Ctrl-C ended it; then the scenes are those that were done.
     """
 
     scenes: tuple[Scene, ...]
     configurations: tuple[Configuration, ...]
     cells: Mapping[tuple[str, str], Cell]
+    interrupted: bool = False
 
     def row(self, scene: Scene) -> list[Cell]:
         """The cells of a scene, in the order of the configurations."""
@@ -48,8 +51,7 @@ class Atlas:
 
     def by_class(self) -> dict[str, list[Scene]]:
         """The scenes of each class of trouble, in the order of the classes."""
-        found = {trouble: [s for s in self.scenes if s.trouble == trouble] for trouble in (*TROUBLES, "")}
-        return {trouble: scenes for trouble, scenes in found.items() if scenes}
+        return by_class(self.scenes)
 
     def table(self) -> str:
         """How many scenes of each verdict every configuration has, as text."""
@@ -67,9 +69,7 @@ class Atlas:
         """Plain data: scenes, configurations, and a cell for each pair."""
         return {
             "limits": {"seconds": SECONDS, "steps": STEPS},
-            "scenes": [
-                {"name": s.name, "class": s.trouble, "title": s.title, "cause": s.cause} for s in self.scenes
-            ],
+            "scenes": [told(scene) for scene in self.scenes],
             "integrators": [asdict(one) for one in self.configurations],
             "cells": [cell.to_plain() for scene in self.scenes for cell in self.row(scene)],
         }
@@ -113,7 +113,11 @@ def atlas(
     quick : the loosest setting of each study only, which shows gross failures.
     workers : processes, of which each starts Python anew: with more than one, scenes and integrators have to be the
         package's own or installed, and a script needs its ``if __name__ == "__main__"``.
-    progress : called with the finished fraction and the name of the scene.
+    progress : called with the finished fraction and the name of the scene; it may raise KeyboardInterrupt.
+
+    Returns
+    -------
+    The matrix. After Ctrl-C, that of the scenes that were done by then, with `interrupted`.
 
     Errors
     ------
@@ -131,17 +135,23 @@ def atlas(
     cells: dict[tuple[str, str], Cell] = {}
 
     def keep(cell: Cell) -> None:
+        if (
+            progress is not None
+        ):  # first of all: where Ctrl-C hit compiled code, the cell may be an error of that
+            progress((len(cells) + 1) / len(jobs), cell.scene)
         cells[cell.scene, cell.configuration] = cell
-        if progress is not None:
-            progress(len(cells) / len(jobs), cell.scene)
 
-    if workers > 1:
-        _in_processes(jobs, quick, workers, keep)
-    else:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what a naive method provokes is part of the answer
-            for scene, one in jobs:
-                keep(run_cell(scene, one, quick))
+    try:
+        if workers > 1:
+            _in_processes(jobs, quick, workers, keep)
+        else:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what a naive method provokes is part of the answer
+                for scene, one in jobs:
+                    keep(run_cell(scene, one, quick))
+    except KeyboardInterrupt:
+        done = tuple(s for s in selected if all((s.name, one.name) in cells for one in methods))
+        return Atlas(done, methods, cells, interrupted=True)
     return Atlas(selected, methods, cells)
 
 
@@ -159,20 +169,60 @@ def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
     return tuple(known[name] for name in names) or tuple(of_class)
 
 
+def by_class(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
+    """The scenes of each class of trouble, in the order of the classes."""
+    found = {trouble: [one for one in scenes if one.trouble == trouble] for trouble in (*TROUBLES, "")}
+    return {trouble: those for trouble, those in found.items() if those}
+
+
+def told(scene: Scene) -> dict[str, str]:
+    """What a scene is, as plain data."""
+    return {"name": scene.name, "class": scene.trouble, "title": scene.title, "cause": scene.cause}
+
+
+def listing(scenes: Sequence[Scene]) -> str:
+    """Names and titles of scenes by class, as text."""
+    width = max(len(scene.name) for scene in scenes)
+    return "\n\n".join(
+        "\n".join(
+            [f"{trouble}: {TROUBLES[trouble].partition(': ')[2]}" if trouble else "without a class"]
+            + [f"  {scene.name:{width}}  {scene.title}" for scene in those]
+        )
+        for trouble, those in by_class(scenes).items()
+    )
+
+
 def _in_processes(
     jobs: Sequence[tuple[Scene, Configuration]], quick: bool, workers: int, keep: Callable[[Cell], None]
 ) -> None:
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker
     )
     try:
-        futures = [pool.submit(_by_name, scene.name, one, quick) for scene, one in jobs]
+        with _signals_later():  # the workers start here
+            futures = [pool.submit(_by_name, scene.name, one, quick) for scene, one in jobs]
         for future in as_completed(futures):
             keep(future.result())
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()  # a cell may take a minute
         raise
     pool.shutdown()
+
+
+@contextmanager
+def _signals_later() -> Iterator[None]:
+    """Ctrl-C waits, also in the processes that start meanwhile: a terminal sends it to all, and it is for the parent."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _quiet_worker() -> None:

@@ -6,8 +6,9 @@ import math
 import re
 
 from hybridsim.errors import HybridsimError
+from hybridsim.testing.clock import Endless
 from hybridsim.testing.judge import Measured
-from hybridsim.testing.study import Endless, Setting, Study, judge_errors, within
+from hybridsim.testing.study import Setting, Study, judge_errors, within
 
 RIGHT = "right"
 WRONG_ANSWER = "wrong answer"

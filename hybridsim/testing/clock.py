@@ -1,0 +1,72 @@
+"""Bounds the work of a run by the processor time that it takes, so that other work on the machine changes no verdict."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from hybridsim.engine.limits import LimitReached
+
+BACKSTOP = (
+    10.0  # times as long by the clock on the wall: for what sleeps or waits, and takes no processor time
+)
+
+
+class Endless(Exception):
+    """A run that does not come to an end."""
+
+
+@contextmanager
+def bounded_work(seconds: float) -> Iterator[None]:
+    """Turn work without end into an Endless error (where the platform has such signals, in the main thread).
+
+    The signals are those of this process: its processor time in all threads, and the clock on the wall as a backstop.
+    """
+    if not hasattr(signal, "SIGPROF") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    bounds = (
+        (signal.SIGPROF, signal.ITIMER_PROF, seconds, "processor time"),
+        (signal.SIGALRM, signal.ITIMER_REAL, BACKSTOP * seconds, "waiting"),
+    )
+    before = {number: signal.getsignal(number) for number, *_ in bounds}
+    for number, timer, bound, what in bounds:
+        signal.signal(number, _giving_up(f"no end after {bound:g} s of {what}"))
+        signal.setitimer(timer, bound)
+    try:
+        yield
+    finally:
+        for number, timer, *_ in bounds:
+            signal.setitimer(timer, 0.0)
+            signal.signal(number, before[number])
+
+
+def _giving_up(message: str) -> Callable[[int, FrameType | None], None]:
+    def give_up(number: int, frame: FrameType | None) -> None:
+        raise Endless(message)
+
+    return give_up
+
+
+class ProcessorTime:
+    """A `progress` of `simulate` that ends the run with the status "limit" after so much processor time.
+
+    The time is that of the thread that runs it, counted from its first step, so that compiling is none of it.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._began: float | None = None
+
+    def __call__(self, fraction: float) -> None:
+        now = time.thread_time()
+        if self._began is None:
+            self._began = now
+        elif now - self._began >= self.seconds:
+            raise LimitReached(
+                f"{now - self._began:.3g} s of processor time, and {self.seconds:g} were allowed"
+            )

@@ -1,0 +1,88 @@
+"""What bounds a run is its own work: neither what waits for others nor what is compiled before it counts."""
+
+from __future__ import annotations
+
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hybridsim.engine import modules
+from hybridsim.engine.limits import LimitReached
+from hybridsim.testing import SCENES, Truth, judge
+from hybridsim.testing.clock import BACKSTOP, Endless, ProcessorTime, bounded_work
+
+needs_signals = pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="the platform has no such signals")
+
+
+def work(seconds: float) -> None:
+    """Take so much processor time."""
+    began = time.thread_time()
+    while time.thread_time() - began < seconds:
+        pass
+
+
+@needs_signals
+def test_waiting_is_no_work() -> None:
+    """As on a machine that is busy with something else; the work itself is bounded."""
+    with bounded_work(0.05):
+        time.sleep(0.2)
+    with pytest.raises(Endless, match=r"0\.05 s of processor time"), bounded_work(0.05):
+        work(5.0)
+
+
+@needs_signals
+def test_waiting_without_end_is_bounded_too() -> None:
+    began = time.monotonic()
+    with pytest.raises(Endless, match="waiting"), bounded_work(0.02):
+        time.sleep(30.0)
+    assert time.monotonic() - began > 0.02 * BACKSTOP
+
+
+@needs_signals
+def test_what_was_there_before_is_there_again() -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGPROF, signal.SIGALRM)]
+    with bounded_work(1.0):
+        pass
+    assert [signal.getsignal(number) for number in (signal.SIGPROF, signal.SIGALRM)] == before
+    assert signal.getitimer(signal.ITIMER_PROF)[0] == signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
+
+
+def test_a_run_is_stopped_by_its_own_work_alone() -> None:
+    clock = ProcessorTime(0.05)
+    work(0.1)  # before its first step
+    clock(0.0)
+    time.sleep(0.2)
+    clock(0.1)
+    work(0.06)
+    with pytest.raises(LimitReached, match=r"and 0\.05 were allowed"):
+        clock(0.2)
+
+
+def test_a_run_that_is_stopped_so_says_limit() -> None:
+    (scene,) = (one for one in SCENES if one.name == "FREE-1")
+    assert judge.run(scene, "scipy-rk45", processor_seconds=1e-9).status == "limit"
+
+
+def test_a_model_that_nobody_has_seen_is_compiled_before_its_clock_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "new.toml"
+    path.write_text('[states]\nx = { start = 1, der = "-x*sin(3*x + 0.8147)" }\n', encoding="utf-8")
+    scene = replace(
+        SCENES[0], name="new", file=str(path), truth=Truth(), params={}, start={}, span=(0.0, 0.1)
+    )
+    usual, compiled = modules.Compiled.address, []
+
+    def noting(self: modules.Compiled, name: str) -> object:
+        compiled.extend([] if name in self._kept else [name])
+        return usual(self, name)
+
+    monkeypatch.setattr(modules.Compiled, "address", noting)
+    judge.prepare(scene, "dop853")
+    assert "flow" in compiled
+    compiled.clear()
+    assert judge.run(scene, "dop853").stats["steps"] > 0
+    assert compiled == []
