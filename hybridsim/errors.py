@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 _ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
 # how NumPy writes its scalars in a repr
 _NUMPY = re.compile(r"\bnp\.(?:\w+\((?P<value>[-+.\w]+|'[^']*')\)|(?P<word>True|False)_)")
+# the same for words between blanks, such as a formula of a thousand terms in the place of a name
+_LONG_LINE = re.compile(r"(.{1500}).{500,}(.{200})")
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,9 @@ class HybridsimError(Exception):
                 lines.append("    " + " " * column + "^")
         if self.remedy:
             lines.append(self.remedy)
-        return _printable("\n".join(re.sub(_ENDLESS, r"\1...\2", line) for line in lines))
+        for endless in (_ENDLESS, _LONG_LINE):
+            lines = [re.sub(endless, r"\1...\2", line) for line in lines]
+        return _printable("\n".join(lines))
 
 
 class ModelError(HybridsimError):

@@ -16,6 +16,7 @@ _GROWN = 1e6  # times the size at the start (or 1): worth saying where no step s
 _NEAR, _FARTHEST = 60, 1e-5  # halvings of a probe, which reaches this share of the time so far
 
 
+@np.errstate(over="ignore", invalid="ignore")  # it looks for what is too large or no number
 def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Instant, p: np.ndarray) -> str:
     """Why no step goes on from where a run stopped, in words; empty where that cannot be told.
 

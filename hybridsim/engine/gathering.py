@@ -89,6 +89,7 @@ def hidden_flight(system: System, outcome: Outcome, p: np.ndarray) -> float | No
     return max(flights, default=None)
 
 
+@np.errstate(over="ignore")  # what is too large to tell is within reach
 def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) -> list[int]:
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found = []

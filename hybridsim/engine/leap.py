@@ -168,6 +168,8 @@ def earliest_exit(
         if sides[g] <= 0:
             return OPEN, g, 0.0
         error = 2.0 * (abs(a[order]) + abs(a[order - 1])) + 8.0 * UNIT * total + floors[g]
+        if not error < math.inf:  # nothing is below what is not a number, and halving would not end
+            return OPEN, g, 0.0
         outcome, theta = first_exit(a[: order + 1], error, orders[g], b, stack)
         if outcome == OPEN:
             return OPEN, g, theta * h

@@ -9,6 +9,7 @@ import numpy as np
 from hybridsim.engine.linear_form import Atoms, Form, LinearReader, Monomial, NotLinear
 from hybridsim.engine.system import System
 from hybridsim.errors import UsageError
+from hybridsim.model.toml_automata import SINGLE
 
 _KEPT = 64  # answers of a structure, one for each set of parameter values
 
@@ -70,13 +71,14 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
     vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
     for c, automaton in enumerate(system.automata):
         for m, mode in enumerate(automaton.modes):
-            z = vectors[f"in {automaton.name}.{mode} "] = vectors[""].copy()
+            name = f"mode {mode}" if automaton.name == SINGLE else f"{automaton.name}.{mode}"
+            z = vectors[f"in {name} "] = vectors[""].copy()
             z[c] = m
     for place, z in reversed(vectors.items()):
         try:
             LinearMode(system, Atoms(), z, p)
         except NotLinear as reason:
-            return f"{place}{reason}"
+            return str(reason) if " in mode " in str(reason) else f"{place}{reason}"  # a guard's title has it
     return None
 
 

@@ -51,7 +51,7 @@ class ModeLoop:
             int, int
         ] = {}  # monitors whose resets an event set off, and their direction
         self.adopted: Instant | None = None  # the last instant at which an event was settled
-        fastest = max(map(abs, system.rates), default=0.0)
+        fastest = float(max(map(abs, system.rates), default=0.0))
         self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray

@@ -82,7 +82,7 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
             other[c] = side
             series: Any = settling.series_of(other)
             rates.append(series.surfaces[rows, 1])
-        found[:, j] = 0.5 * (rates[0] - rates[1])
+        found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
     return found
 
 

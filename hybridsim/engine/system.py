@@ -20,6 +20,7 @@ from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase
 from hybridsim.model.component import Corner
 from hybridsim.model.smoothing import smoothed
+from hybridsim.model.toml_automata import SINGLE
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -433,7 +434,8 @@ class System:
         """A guard of the modes z in words."""
         automaton, mode = self.automata[self.owner[guard]], int(z[self.owner[guard]])
         name = automaton.guard_names[mode][automaton.guards[mode].index(guard)]
-        return f"guard {name} of {automaton.name} in mode {automaton.modes[mode]}"
+        of = "" if automaton.name == SINGLE else f" of {automaton.name}"
+        return f"guard {name}{of} in mode {automaton.modes[mode]}"
 
     def active(self, z: np.ndarray) -> np.ndarray:
         """Mask of the guards that the modes in z have."""

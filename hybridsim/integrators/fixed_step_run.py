@@ -328,9 +328,9 @@ class FixedStepRun:
         sides = np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
-        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale) + s_error * np.abs(
-            system.flow(0.0, self.x, p, self.z)
-        )
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
+        if s_error:
+            x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]

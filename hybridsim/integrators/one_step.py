@@ -134,12 +134,14 @@ class OneStepStepper(ABC):
                 return float(np.sqrt(np.mean((x / scale) ** 2)))
 
         d0, d1 = size(x), size(dx)
+        # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
+        smallest = 1e-9 * abs(self.bound)
         h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+        if not h0 > 0.0:
+            return smallest
         h0 = min(h0, abs(self.bound))
         direction = math.copysign(1.0, self.bound)
         ahead = Point(self.flow, direction * h0, x + direction * h0 * dx).dx
         steepest = max(d1, size(ahead - dx) / h0)
         h1 = (0.01 / steepest) ** (1.0 / self.order) if steepest > 1e-15 else max(1e-6, 1e-3 * h0)
-        # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
-        smallest = 1e-9 * abs(self.bound)
         return max(min(100.0 * h0, h1, abs(self.bound)), smallest) if math.isfinite(h1) else smallest

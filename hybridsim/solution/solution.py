@@ -207,7 +207,7 @@ class Solution:
         if len(times) and not ((times >= low) & (times <= high)).all():
             bad = times[~((times >= low) & (times <= high))][0]
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
-            raise UsageError(f"t = {bad!r} is outside of {whole}, which goes from {low!r} to {high!r}")
+            raise UsageError(f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}")
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hybridsim.testing.scene import Check
+
+
+def at_times(times: Sequence[float]) -> str:
+    """Times in words; of many the first three."""
+    if not times:
+        return "never"
+    shown = [repr(float(t)) for t in times[:3]]
+    if len(times) > len(shown):
+        shown.append(f"{len(times) - len(shown)} later times")
+    return "at t = " + (", ".join(shown[:-1]) + " and " if len(shown) > 1 else "") + shown[-1]
 
 
 def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...] = ()) -> Check:
@@ -25,12 +35,15 @@ def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...]
                 if not (row == value).all():
                     worst = row[np.argmax(np.abs(row - value))]
                     return [
-                        f"in stick from t = {interval.t0!r}, {name} = {float(worst)!r} instead of {value!r}"
+                        f"in the stick that begins at t = {interval.t0!r}, "
+                        f"{name} is {float(worst)!r} instead of {value!r}"
                     ]
             for name in rest:
                 row = values[names.index(name)]
                 if not (row == row[0]).all():
-                    return [f"in stick from t = {interval.t0!r}, {name} moves by {float(np.ptp(row))!r}"]
+                    return [
+                        f"in the stick that begins at t = {interval.t0!r}, {name} moves by {float(np.ptp(row))!r}"
+                    ]
         return []
 
     return check
@@ -50,8 +63,8 @@ def amplitude(name: str, t0: float, t1: float) -> Callable[[Any], float]:
 
 def no_transition(solution: Any) -> list[str]:
     """No mode changed at all."""
-    changes = [event for event in solution.events if event.kind == "transition"]
-    return [f"mode changes where nothing happens: {changes[:3]}"] if changes else []
+    changes = [event.t for event in solution.events if event.kind == "transition"]
+    return [f"a mode changes {at_times(changes)}, where nothing happens"] if changes else []
 
 
 def equals(t: float, **values: float) -> Check:
@@ -59,7 +72,9 @@ def equals(t: float, **values: float) -> Check:
 
     def check(solution: Any) -> list[str]:
         found = {name: float(solution.output(name, t)) for name in values}
-        return [f"{n} = {found[n]!r} at t = {t!r}, not {v!r}" for n, v in values.items() if found[n] != v]
+        return [
+            f"{n} is {found[n]!r} at t = {t!r} instead of {v!r}" for n, v in values.items() if found[n] != v
+        ]
 
     return check
 

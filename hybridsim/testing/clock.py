@@ -1,4 +1,4 @@
-"""Bounds the work of a run by the processor time that it takes, so that other work on the machine changes no verdict."""
+"""Bounds a run by the processor time that it takes, so that other work on the machine changes no verdict."""
 
 from __future__ import annotations
 

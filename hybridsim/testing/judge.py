@@ -16,6 +16,7 @@ from hybridsim.engine.recent import system_of
 from hybridsim.testing.clock import ProcessorTime
 from hybridsim.testing.scene import END, Scene
 
+ENDED = ("finished", "terminated")  # statuses of a run that ended as it was asked to
 SCENES = Path(__file__).with_name("scenes")
 START = (
     1e-12  # in units of time: where a motion starts on a guard, finding its mode may take an event, not time
@@ -104,7 +105,7 @@ def run(
 
 
 def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:
-    """Hold a solution against the truth; checks of what the integrator lacks are left out."""
+    """Hold a solution against the truth; checks of what the integrator lacks are left out, and all of a wrong end."""
     wrong, time_error, state_error = ending(scene, solution), 0.0, 0.0
     sequence: list[str] = []
     if not wrong and scene.truth.events is not None:
@@ -114,7 +115,7 @@ def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured
     checks = [
         sentence
         for capability, check in scene.truth.checks
-        if capability not in lacks
+        if capability not in lacks and not wrong
         for sentence in check(solution)
     ]
     return Measured(
@@ -133,12 +134,18 @@ def ending(scene: Scene, solution: Any) -> list[str]:
     """How and when the run ended."""
     truth, wrong = scene.truth, []
     if truth.status is not None and solution.status != truth.status:
-        wrong.append(f"ended as {solution.status!r}, not {truth.status!r}: {solution.message}")
-    if solution.status not in ("finished", "terminated") and not solution.message:
-        wrong.append(f"ended as {solution.status!r} without a word")
+        wrong.append(
+            f"the run ended with the status {solution.status!r} instead of {truth.status!r}: {solution.message}"
+        )
+    if solution.status not in ENDED and not solution.message:
+        wrong.append(f"the run ended with the status {solution.status!r} without a word")
+    if truth.status is None and solution.status not in ENDED:
+        sign = 1.0 if scene.span[1] > scene.span[0] else -1.0
+        if any(t != END and sign * (t - solution.t_end) > 0.0 for t, _ in truth.states):
+            wrong.append(f"the run ended with the status {solution.status!r}: {solution.message}")
     end = scene.span[1] if truth.end is None and truth.status == "finished" else truth.end
     if end is not None and not wrong and abs(solution.t_end - end) > 1e-3 * scene.unit:
-        wrong.append(f"ended at t = {solution.t_end!r}, not {end!r}")
+        wrong.append(f"the run ended at t = {solution.t_end!r} instead of {end!r}")
     return wrong
 
 
@@ -163,14 +170,17 @@ def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
         names = [name for _, name in group]
         here = found[position : position + len(names)]
         if Counter(names) != Counter(name for _, name in here):
-            seen = ", ".join(f"{name} at {at!r}" for at, name in here) or "nothing"
-            total = f"{len(found)} events found, {len(expected)} expected"
-            return [f"event {position}: {' and '.join(names)} expected at {t!r}, found {seen}; {total}"], 0.0
+            due = f"{' and '.join(names)} at t = {t!r}"
+            seen = ", ".join(f"{name} at t = {at!r}" for at, name in here)
+            number, total = position + 1, f"{len(found)} events are found, and {len(expected)} are due"
+            what = f"should be {due}, and is {seen}" if here else f"is missing: {due}"
+            return [f"event {number} {what}; {total}"], 0.0
         error = max(error, *(abs(at - t) / scene.unit for at, _ in here))
         position += len(names)
     if position < len(found):
-        extra = ", ".join(f"{name} at {t!r}" for t, name in found[position : position + 3])
-        return [f"{len(found) - position} events too many after {position}, first {extra}"], 0.0
+        extra = ", ".join(f"{name} at t = {t!r}" for t, name in found[position : position + 3])
+        more = f"{len(found) - position} more than the {position} that are due"
+        return [f"{len(found)} events are found, {more}; the first of these: {extra}"], 0.0
     return [], error
 
 

@@ -193,10 +193,10 @@ def judge_errors(
         for (before, larger), (setting, error) in pairwise(errors):
             if error > setting.excused and error * setting.fall > max(larger, before.excused):
                 wrong.append(
-                    f"{setting.text}: error of {what} {error:.2g}, at the setting before {larger:.2g}"
+                    f"{setting.text}: the error of {what} is {error:.2g}, after {larger:.2g} at the setting before"
                 )
         if errors and not errors[-1][1] <= tolerance:
             wrong.append(
-                f"{errors[-1][0].text}: error of {what} {errors[-1][1]:.2g} is above {tolerance:.2g}"
+                f"{errors[-1][0].text}: the error of {what} is {errors[-1][1]:.2g}, above the {tolerance:.2g} allowed"
             )
     return wrong

@@ -98,3 +98,76 @@ def test_a_message_about_a_word_without_end_has_an_end() -> None:
 def test_a_motion_that_is_not_settled_after_the_first_stretch(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["steady", "bouncing-ball", "--max-periods", "4"]) in (0, 1)
     assert "internal error" not in capsys.readouterr().err
+
+
+HUGE = """
+[states]
+x = {{ start = {x}, der = "v" }}
+v = {{ start = {v}, der = "cos(t) - x - f" }}
+[contacts.f]
+velocity = "v"
+normal = 1
+law = {{ name = "coulomb", mu = 1 }}
+"""
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5", "rodas5p", "scipy-rk45", "auto"])
+@pytest.mark.parametrize(("x", "v"), [("0", "1e308"), ("-1e150", "1"), ("1", "1e150")])
+def test_a_start_that_no_double_can_square(integrator: str, x: str, v: str) -> None:
+    model = hs.Model.from_toml(HUGE.format(x=x, v=v))
+    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"steps": 1000, "seconds": 5})
+    assert sol.status in ("finished", "limit", "step-failure") and sol.message
+
+
+def test_a_frequency_that_is_too_small_for_a_period() -> None:
+    model = hs.Model.from_toml('[states]\nx = { start = 1, der = "cos(1e-308*t)" }\n')
+    assert hs.simulate(model, (0.0, 1.0), integrator="dop853")(1.0)[0] == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_load_without_a_value_where_a_fixed_step_starts() -> None:
+    model = hs.Model.from_toml("""
+[states]
+x = { start = 0, der = "v" }
+v = { start = 1, der = "cos(t) - x - f" }
+[contacts.f]
+velocity = "v"
+normal = "1 + 1.5/x"
+opens = true
+law = { name = "coulomb", mu = 1 }
+""")
+    sol = hs.simulate(model, (0.0, 1.0), integrator="rk4-dichotomy", limits={"steps": 1000})
+    assert sol.status == "step-failure" and "not a number" in sol.message
+
+
+def test_relays_whose_rates_fill_the_range_of_doubles() -> None:
+    model = hs.Model.from_toml("""
+[states]
+x = { start = 1, der = "-u - 2*w" }
+y = { start = 1, der = "1e308*u - w" }
+[surfaces]
+u = "x"
+w = "y"
+""")
+    sol = hs.simulate(model, (0.0, 1.0), limits={"seconds": 2, "steps": 5000})
+    assert sol.message
+
+
+def test_a_guard_whose_bound_is_no_number_ends_with_the_limits() -> None:
+    """exp(-1/r**2) is 0 where r is, and has derivatives that no series finds there."""
+    model = hs.Model.from_toml("""
+[definitions]
+r = "max(s - 3, 0)"
+[states]
+s = { start = 2, der = "v" }
+v = { start = 0, der = "max(exp(-1/r**2), s - 0.5) - max(-r, min(r, v))" }
+""")
+    sol = hs.simulate(model, (0.0, 1.0), limits={"seconds": 2, "steps": 5000})
+    assert sol.message
+
+
+def test_a_message_about_a_name_of_a_thousand_words_has_an_end() -> None:
+    shape = "name if name > 0 else " * 1000
+    with pytest.raises(hs.ModelError, match="there is no shape") as caught:
+        hs.Model.from_toml(f'[inputs.p]\nkind = "wave"\nshape = "{shape}"\nperiod = 1\n'
+                           '[states]\nx = { start = 0, der = "p" }\n')  # fmt: skip
+    assert len(str(caught.value)) < 4000

@@ -37,7 +37,7 @@ def test_a_rate(name: str) -> None:
 def test_a_guard(name: str) -> None:
     sol = hs.simulate(model(guard="sqrt(x) + 1"), (0.0, 2.0), integrator=name)
     assert sol.status == "step-failure"
-    assert "guard g of mode in mode down is not a number" in sol.message
+    assert "guard g in mode down is not a number" in sol.message
 
 
 @pytest.mark.parametrize("name", [*METHODS, "exact"])

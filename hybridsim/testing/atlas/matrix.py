@@ -214,7 +214,7 @@ def _in_processes(
 
 @contextmanager
 def _signals_later() -> Iterator[None]:
-    """Ctrl-C waits, also in the processes that start meanwhile: a terminal sends it to all, and it is for the parent."""
+    """Ctrl-C waits, also in the processes that start meanwhile: a terminal sends it to all, for the parent to take."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

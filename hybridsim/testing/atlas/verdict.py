@@ -7,7 +7,7 @@ import re
 
 from hybridsim.errors import HybridsimError
 from hybridsim.testing.clock import Endless
-from hybridsim.testing.judge import Measured
+from hybridsim.testing.judge import ENDED, Measured
 from hybridsim.testing.study import Setting, Study, judge_errors, within
 
 RIGHT = "right"
@@ -37,8 +37,7 @@ def verdict(study: Study) -> tuple[str, str]:
         text, error = study.failure
         if isinstance(error, Endless):
             return HANG, f"{text}: {error}"
-        name = "" if isinstance(error, HybridsimError) else f"{type(error).__name__}: "
-        return REFUSED, f"{text}: {name}{one_line(str(error))}"
+        return REFUSED, f"{text}: {one_line(refusal(error))}"
     if within(study.done[-1][1], study.tolerances):
         return RIGHT, ""
     faults = judge_errors(study.done, study.tolerances)
@@ -48,7 +47,7 @@ def verdict(study: Study) -> tuple[str, str]:
 def of_run(run: Measured) -> tuple[str, str]:
     """The verdict on one run, errors of numbers apart."""
     # what stops early and says why has misled nobody
-    silent = WRONG_ANSWER if run.status in ("finished", "terminated") else REFUSED
+    silent = WRONG_ANSWER if run.status in ENDED else REFUSED
     if run.ending:
         return (HANG if run.status == "limit" else silent), one_line(run.ending[0])
     if run.sequence:
@@ -56,6 +55,13 @@ def of_run(run: Measured) -> tuple[str, str]:
     if run.checks:
         return silent, one_line(run.checks[0])
     return RIGHT, ""
+
+
+def refusal(error: Exception) -> str:
+    """What an error says, with its remedy; what is none of the package's own is a fault of the package."""
+    if isinstance(error, HybridsimError):
+        return "; ".join(part for part in (error.message, error.remedy) if part)
+    return f"internal error, please report it: {type(error).__name__}: {error}"
 
 
 def one_line(text: str) -> str:

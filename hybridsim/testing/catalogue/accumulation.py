@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.testing.checks import equals
+from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import CASES
 from hybridsim.testing.scene import Scene, Truth, needs
 
@@ -24,12 +24,13 @@ def _twisting() -> Scene:
         if solution.t_end < 5.0:
             return []  # stopping by name misleads nobody, but does not go on
         x, v = solution(5.0)
-        return [] if abs(x) + abs(v) < 1e-6 else [f"x = {x!r} and v = {v!r} where all has come to rest"]
+        rest = abs(x) + abs(v) < 1e-6
+        return [] if rest else [f"x is {x:.3g} and v is {v:.3g} at t = 5, where all has come to rest"]
 
     def begins(solution: Any) -> list[str]:
         held = [event.t for event in solution.events if event.target == "sliding"]
         late = [t for t in held if abs(t - end) > 1e-9 * end]
-        return [f"held from {held} on, not from {end!r}"] if late or len(held) != 2 else []
+        return [f"the motion is held {at_times(held)} instead of {end!r}, along both"] if late or len(held) != 2 else []
 
     states = ((1.0, (0.5, -1.0)), (first, (-1 / 3, 0.0)), (second, (1 / 9, 0.0)))
     return Scene(

@@ -99,6 +99,10 @@ def sequence(wanted: list[str]) -> Any:
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]
-        return [] if found == wanted else [f"{found}, not {wanted}"]
+        return (
+            []
+            if found == wanted
+            else [f"the modes follow as {', '.join(found)} instead of {', '.join(wanted)}"]
+        )
 
     return check

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.testing.checks import equals
+from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import CASES, recomputed
 from hybridsim.testing.scene import END, Scene, Truth, needs
 
@@ -241,12 +241,12 @@ def emptied(solution: Any) -> list[str]:
     wrong = []
     low = [event.t for event in solution.events if event.component == "low"]
     if len(low) != 1 or abs(low[0] - 1.998) > 2e-3:
-        wrong.append(f"low water at {low}, not once at 1.998")
+        wrong.append(f"low water is found {at_times(low)} instead of once, at t = 1.998")
     end = solution.t_end
     if solution.status == "finished":
         last = float(solution(end)[0])
         if not abs(last) < 1e-6:
-            wrong.append(f"x = {last!r} at the end")
+            wrong.append(f"x is {last!r} at the end instead of 0")
     elif abs(end - 2.0) > 1e-3:
-        wrong.append(f"ended as {solution.status!r} at t = {end!r}, not at 2")
+        wrong.append(f"the run ended with the status {solution.status!r} at t = {end!r} instead of 2")
     return wrong

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.testing.checks import equals
+from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import TRUTHS
 from hybridsim.testing.scene import END, Scene, Truth, needs
 
@@ -39,7 +39,11 @@ def closes(*names: str) -> Any:
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
-        return [f"{name} closes at {times}, not once" for name, times in found.items() if len(times) != 1]
+        return [
+            f"{name} closes {at_times(times)} instead of once"
+            for name, times in found.items()
+            if len(times) != 1
+        ]
 
     return check
 
@@ -50,7 +54,7 @@ def rests(*names: str) -> Any:
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
         return [
-            f"{name} closes at {times}, not at {REST!r}"
+            f"{name} closes {at_times(times)} instead of {REST!r}"
             for name, times in found.items()
             if times and abs(times[0] - REST) > 1e-6
         ]

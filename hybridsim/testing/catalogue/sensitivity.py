@@ -48,7 +48,11 @@ def lifting() -> Scene:
 
     def counted(solution: Any) -> list[str]:
         found = len(turns(solution))
-        return [] if found == expected["n_events"] else [f"{found} events, not {expected['n_events']}"]
+        return (
+            []
+            if found == expected["n_events"]
+            else [f"{found} changes of mode are found instead of {expected['n_events']}"]
+        )
 
     def nearest_to(t: float) -> Any:
         return lambda solution: min(turns(solution), key=lambda found: abs(found - t))

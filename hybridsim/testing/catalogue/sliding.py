@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.testing.checks import equals, says
+from hybridsim.testing.checks import at_times, equals, says
 from hybridsim.testing.facts import CASES, TRUTHS
 from hybridsim.testing.scene import END, Check, Scene, Truth
 
@@ -42,7 +42,9 @@ def stays(component: str, *terms: str) -> Check:
                 )
                 target = 1.0 if any(term.endswith("2") for term in terms) else 0.0
                 if np.abs(value - target).max() > 1e-14:
-                    return [f"off the surface of {component} by {np.abs(value - target).max():.2g}"]
+                    return [
+                        f"while it slides, {component} is off its surface by {np.abs(value - target).max():.2g}"
+                    ]
         return []
 
     return check
@@ -126,7 +128,7 @@ def spirals_in(solution: Any) -> list[str]:
     wrong = [f"|x1| + |x2| is off by {off:.2g}"] if off > 1e-8 else []  # the rates are constant in between
     reached = [event.t for event in solution.events if event.target == SLIDING]
     if len(reached) != 2 or any(abs(t - 1.5) > 1e-6 for t in reached):
-        wrong.append(f"sliding begins at {reached}, not at 1.5 along both")
+        wrong.append(f"sliding begins {at_times(reached)} instead of 1.5 along both surfaces")
     return wrong
 
 

@@ -25,7 +25,7 @@ def scheduled() -> tuple[Scene, ...]:
 
     def small(solution: Any) -> list[str]:
         y = float(solution(2.0)[0])
-        return [] if abs(y / disc["2"] - 1) < 1e-4 else [f"y = {y!r} at t = 2"]
+        return [] if abs(y / disc["2"] - 1) < 1e-4 else [f"y is {y!r} at t = 2 instead of {disc['2']!r}"]
 
     return (
         Scene(
