@@ -45,7 +45,7 @@ def add_to(commands: Any) -> None:
         "--quick", action="store_true", help="only the loosest setting of each study: gross failures"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=values.count, help="processes (default: one for each processor)"
+        "--workers", metavar="N", type=values.workers, help="processes (default: one for each processor)"
     )
     options.add_out(parser, "atlas")
     options.add_json(parser, "all verdicts")

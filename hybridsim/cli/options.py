@@ -27,7 +27,7 @@ def add_rtol(parser: argparse.ArgumentParser, default: str) -> None:
 def add_workers(parser: argparse.ArgumentParser, of: str = "") -> None:
     """How many threads, of what."""
     parser.add_argument(
-        "--workers", metavar="N", type=values.count, help=f"threads{of} (default: one for each processor)"
+        "--workers", metavar="N", type=values.workers, help=f"threads{of} (default: one for each processor)"
     )
 
 

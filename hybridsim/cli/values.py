@@ -20,6 +20,7 @@ DEFAULT_PERIODS = 100
 COMPARED_PERIODS = 20  # a comparison runs dozens of times: a minute, not five
 DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
 
+MOST_WORKERS = 1024  # beyond the processors of a machine; each takes memory
 _PERIODS = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*T\s*")
 
 
@@ -59,6 +60,14 @@ def count(text: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above zero")
     return int(text)
+
+
+def workers(text: str) -> int:
+    """A number of threads or processes."""
+    number = count(text)
+    if number > MOST_WORKERS:
+        raise argparse.ArgumentTypeError(f"{text} workers are more than {MOST_WORKERS}")
+    return number
 
 
 def counts(text: str) -> tuple[int, ...]:

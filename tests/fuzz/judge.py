@@ -10,6 +10,7 @@ import random
 import shutil
 import signal
 import tempfile
+import threading
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -94,14 +95,19 @@ def line_case(seed: int, number: int, folder: Path) -> Finding:
     """A mutated command line, with a model file and a kept run in the folder."""
     pick = random.Random(f"line {seed} {number}")
     argv = mutated_lines.mutated(pick)
-    named = [tail for word in argv for tail in (word, word.partition("=")[2])]
+    named = [tail for word in argv for tail in (word, word.partition("=")[2]) if tail and "\0" not in tail]
+    # a result is written beside its place and then put there; a folder may have to be made with those above
+    places = [Path(os.path.abspath(folder / name)) for word in named for name in (word, f"{word}.part")]
     defaults = ("compare-", "sweep-", "study-", "atlas")
 
     def expected(place: Path) -> bool:
         inside = place.relative_to(folder).parts if place.is_relative_to(folder) else ("..",)
         return bool(inside) and (
             inside[0].startswith(defaults)
-            or any(n and place.is_relative_to(os.path.abspath(folder / n)) for n in named if "\0" not in n)
+            or any(place.is_relative_to(named_place) for named_place in places)
+            or any(
+                named_place.is_relative_to(place) and place.is_relative_to(folder) for named_place in places
+            )
         )
 
     out, err = io.StringIO(), io.StringIO()
@@ -151,14 +157,20 @@ def noted(faults: list[str], what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def ctrl_c_after(seconds: float) -> Iterator[None]:
-    """SIGINT after so long, once."""
-    previous = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    """SIGINT after so long, once, also where whoever started this process had it ignored, as a shell has for `&`.
+
+    From a thread, since a command may use the timers of the process itself.
+    """
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
+    timer.daemon = True
+    timer.start()
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, previous)
+        timer.cancel()
+        timer.join()
+        signal.signal(signal.SIGINT, previous)
 
 
 @contextlib.contextmanager

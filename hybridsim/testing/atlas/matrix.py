@@ -143,7 +143,7 @@ def atlas(
 
     try:
         if workers > 1:
-            _in_processes(jobs, quick, workers, keep)
+            _in_processes(jobs, quick, min(workers, len(jobs)), keep)
         else:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # what a naive method provokes is part of the answer
