@@ -2,11 +2,11 @@
 
     python studies/fuzz.py [files] [lines] [--count N] [--seed S] [--results FOLDER] [--only K]
 
-Without a kind both, 10^4 of each unless told otherwise; half an hour on one core; that makes docs/studies/fuzz.md.
-Findings are printed. Cases are run in a child process, which is ended where one of them takes longer than a minute, and
-begun again behind it. With a folder for results the same command goes on where it stopped. `--only K` runs the K-th case
-alone and shows what becomes of it. Thousands of models are compiled: give it a cache folder of its own in
-HYBRIDSIM_CACHE.
+Without a kind both, 10^4 of each unless told otherwise; half an hour on one core; that makes
+docs/studies/fuzz.md. Findings are printed. Cases are run in a child process, which is ended where one of them
+takes longer than a minute, and begun again behind it. With a folder for results the same command goes on where
+it stopped. `--only K` runs the K-th case alone and shows what becomes of it. Thousands of models are compiled:
+give it a cache folder of its own in HYBRIDSIM_CACHE.
 """
 
 from __future__ import annotations
@@ -82,47 +82,49 @@ def read(results: Path) -> list[Case]:
 
 TEXT = """# Wrong files, wrong command lines
 
-Made by `studies/fuzz.py`, which runs the program on what people, editors and scripts get wrong, and on what somebody may
-try who means harm. Nothing of it may end in an internal error, a traceback, a warning of a library, a hang or a file that
-nobody asked for, and no text of a file may ever run as code.
+Made by `studies/fuzz.py`, which runs the program on what people, editors and scripts get wrong, and on what
+somebody may try who means harm. Nothing of it may end in an internal error, a traceback, a warning of a
+library, a hang or a file that nobody asked for, and no text of a file may ever run as code.
 
 ## Model files
 
-{files} files, each a model of the package or a scene of the atlas with one to a few changes: a line lost, doubled or moved,
-a number out of all range (5e-324, 1e308, a thousand digits), a wrong type, a misspelt key, an expression that is code, too
-deep, too long or without a value, letters of other scripts, control characters, bytes that are no text. Each file that is
-taken is looked over for warnings and run for up to a second of its time, with an integrator drawn at random and limits of
-2 seconds, 5000 steps and 500 megabytes.
+{files} files, each a model of the package or a scene of the atlas with one to a few changes: a line lost,
+doubled or moved, a number out of all range (5e-324, 1e308, a thousand digits), a wrong type, a misspelt key, an
+expression that is code, too deep, too long or without a value, letters of other scripts, control characters,
+bytes that are no text. Each file that is taken is looked over for warnings and run for up to a second of its
+time, with an integrator drawn at random and limits of 2 seconds, 5000 steps and 500 megabytes.
 
 | ending | files |
 | --- | --- |
 {file_rows}
 
-A *refusal* is an error that names what is wrong and where. An error *on running* is one that only the run can find: a method
-that lacks what the model needs, a start in no mode. The others are the status of the run.
+A *refusal* is an error that names what is wrong and where. An error *on running* is one that only the run can
+find: a method that lacks what the model needs, a start in no mode. The others are the status of the run.
 
 ## Command lines
 
-{lines} command lines, each a right one of any of the commands with one to a few changes: a word lost, doubled, moved,
-misspelt or replaced, values of all the kinds above, names of devices, of folders and of files that are not there. What runs
-longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+{lines} command lines, each a right one of any of the commands with one to a few changes: a word lost, doubled,
+moved, misspelt or replaced, values of all the kinds above, names of devices, of folders and of files that are
+not there. What runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
 {line_rows}
 
-The exit codes are [those of the reference](../reference/cli.md#exit-codes).
+The exit codes are [those of the reference](../reference/cli.md).
 
 ## What is watched
 
-Each case runs in a process that is looked at from inside: a function and a module whose names stand in the mutated texts tell
-when they are reached; an audit hook sees every file that is opened for writing, every folder made, every program
-started and every connection opened. Exceptions, warnings, an exit code that is not documented, a failure without a message, output that
-is no JSON under `--json`, and {limit:g} seconds without an end are faults.
+Each case runs in a process that is looked at from inside: a function and a module whose names stand in the
+mutated texts tell when they are reached; an audit hook sees every file that is opened for writing, every folder
+made, every program started and every connection opened. Exceptions, warnings, an exit code that is not
+documented, a failure without a message, output that is no JSON under `--json`, and {limit:g} seconds without an
+end are faults.
 
-{verdict} Everything that earlier runs found is mended, and is a test in `tests/fuzz/test_found.py`: numbers at the ends of
-the range of doubles above all, whose squares and quotients are infinite, a guard whose bound is no number and whose search never
-ended, and messages as long as the word that they are about. A few cases of each kind run with the tests.
+{verdict} Everything that earlier runs found is mended, and is a test in `tests/fuzz/test_found.py`: numbers at
+the ends of the range of doubles above all, whose squares and quotients are infinite, a guard whose bound is no
+number and whose search never ended, and messages as long as the word that they are about. A few cases of each
+kind run with the tests.
 """
 
 

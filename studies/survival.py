@@ -25,15 +25,39 @@ import numpy as np
 import hybridsim as hs
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "survival.md"
-SCENES = {"dfcs": 0.05, "bouncing-ball": 3.0, "sampled-servo": 0.05, "square-wave": 2.0, "relay-pair": 3.0}
-LEAPERS = (
-    "exact",
-    "taylor",
-    "dop853",
-    "tsit5",
-)  # stop between stretches of a thousand segments: a longer run
-LONGER = {"dfcs": 5.0}
+BAR = str(Path(hs.__file__).parent / "testing" / "scenes" / "bar.toml")
+# Ends of the runs. A compiled loop looks at its limits between stretches of a thousand segments or of some thousand
+# fixed steps, so that a run has to be several of them long to be stopped at all.
+SCENES = {
+    "dfcs": 0.05,
+    "square-wave": 2.0,
+    "sampled-servo": 0.05,
+    "relay-pair": 3.0,
+    "bouncing-ball": 3.0,
+    "vibrating-table": 0.15,
+    "bar": 2.0,
+    "thrown-block": 2.0,
+}
+LONGER = {
+    **{(name, "dfcs"): 20.0 for name in ("exact", "taylor", "dop853", "tsit5")},
+    **{
+        (name, scene): end
+        for name in ("rk4-dichotomy", "rk4-sign", "moreau")
+        for scene, end in {
+            "dfcs": 1.0,
+            "square-wave": 24.0,
+            "sampled-servo": 0.2,
+            "bouncing-ball": 30.0,
+            "vibrating-table": 20.0,
+            "bar": 20.0,
+            "thrown-block": 20.0,
+        }.items()
+    },
+}
+# Nothing in these has a period, of which a fixed step would be a share.
+STEPS = dict.fromkeys(("sampled-servo", "bouncing-ball", "bar", "thrown-block"), 1e-3)
 INTEGRATORS = ("exact", "taylor", "dop853", "tsit5", "rodas5p", "rk4-dichotomy", "rk4-sign", "moreau")
+FIXED = ("rk4-dichotomy", "rk4-sign", "moreau")
 FORCES, SPEEDS = 40, 25  # points of the sweep that is killed, by its two parameters
 
 
@@ -59,13 +83,17 @@ def resumed(
     scene: str, integrator: str, moments: int, draws: np.random.Generator
 ) -> tuple[int, int, list[str]]:
     """Moments at which a run was stopped, those at which it was already done, and what differed."""
-    end = LONGER.get(scene, SCENES[scene]) if integrator in LEAPERS else SCENES[scene]
-    model, span = hs.load(scene), (0.0, end)
-    whole = hs.simulate(model, span, integrator=integrator)
+    model, span = (
+        hs.load(BAR if scene == "bar" else scene),
+        (0.0, LONGER.get((integrator, scene), SCENES[scene])),
+    )
+    given = {"step": STEPS[scene]} if integrator in FIXED and scene in STEPS else {}
+    whole = hs.simulate(model, span, integrator=integrator, **given)
     most, stopped, done, faults = max(int(whole.stats["steps"]), 2), 0, 0, []
+    began = time.perf_counter()
     for _ in range(moments):
         steps = int(draws.integers(1, most))
-        part = hs.simulate(model, span, integrator=integrator, limits={"steps": steps})
+        part = hs.simulate(model, span, integrator=integrator, limits={"steps": steps}, **given)
         if part.status == "limit":
             stopped += 1
             part = part.resume()
@@ -73,6 +101,10 @@ def resumed(
             done += 1
         if fault := difference(whole, part):
             faults.append(f"{scene} with {integrator} after {steps} steps: {fault}")
+    print(
+        f"{integrator} {scene}: {most} steps, {stopped} stopped, {time.perf_counter() - began:.1f} s",
+        flush=True,
+    )
     return stopped, done, faults
 
 
@@ -105,7 +137,7 @@ def point(model: hs.Model) -> dict[str, float]:
         with open(log, "a", encoding="utf-8") as file:
             file.write(f"{values['F0']!r} {values['omega']!r}\n")
     sol = hs.simulate(model, (0.0, 0.6), integrator="dop853")
-    return {"x": float(sol.x_end[0]), "v": float(sol.x_end[1]), "events": float(len(sol.events))}
+    return {"x": float(sol.y[0, -1]), "v": float(sol.y[1, -1]), "events": float(len(sol.events))}
 
 
 def swept(journal: Path | None) -> hs.Sweep:

@@ -172,15 +172,14 @@ def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
         if Counter(names) != Counter(name for _, name in here):
             due = f"{' and '.join(names)} at t = {t!r}"
             seen = ", ".join(f"{name} at t = {at!r}" for at, name in here)
-            number, total = position + 1, f"{len(found)} events are found, and {len(expected)} are due"
+            number, total = position + 1, f"events found: {len(found)}, due: {len(expected)}"
             what = f"should be {due}, and is {seen}" if here else f"is missing: {due}"
             return [f"event {number} {what}; {total}"], 0.0
         error = max(error, *(abs(at - t) / scene.unit for at, _ in here))
         position += len(names)
     if position < len(found):
         extra = ", ".join(f"{name} at t = {t!r}" for t, name in found[position : position + 3])
-        more = f"{len(found) - position} more than the {position} that are due"
-        return [f"{len(found)} events are found, {more}; the first of these: {extra}"], 0.0
+        return [f"events found: {len(found)}, due: {position}; the first too many: {extra}"], 0.0
     return [], error
 
 
