@@ -30,7 +30,11 @@ def _twisting() -> Scene:
     def begins(solution: Any) -> list[str]:
         held = [event.t for event in solution.events if event.target == "sliding"]
         late = [t for t in held if abs(t - end) > 1e-9 * end]
-        return [f"the motion is held {at_times(held)} instead of {end!r}, along both"] if late or len(held) != 2 else []
+        return (
+            [f"the motion is held {at_times(held)} instead of {end!r}, along both"]
+            if late or len(held) != 2
+            else []
+        )
 
     states = ((1.0, (0.5, -1.0)), (first, (-1 / 3, 0.0)), (second, (1 / 9, 0.0)))
     return Scene(
