@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from time import perf_counter
 from typing import Any
 
@@ -22,7 +23,16 @@ from hybridsim.engine.packs import packed
 from hybridsim.engine.segment_end import State, reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
-from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Leaps, Tolerances
+from hybridsim.engine.stepping import (
+    ARRIVED,
+    BEFORE_SOMETHING,
+    PAUSED,
+    Counters,
+    Landing,
+    Leaps,
+    StepFailure,
+    Tolerances,
+)
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
@@ -63,8 +73,11 @@ def compile_leaps(system: System, make: Maker) -> None:
         np.zeros(guards),
         np.zeros(0),
     )
-    leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
-    _compiled.append(make)
+    with suppress(
+        StepFailure
+    ):  # such as a rate without a value; it is for the run to tell, and compiles by itself
+        leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
+        _compiled.append(make)
 
 
 class Leaper(ABC):

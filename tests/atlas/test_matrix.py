@@ -56,7 +56,7 @@ def test_a_run_without_end_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cells, "SECONDS", 0.2)
     (cell,) = atlas(scenes_named(("TANH-1e-6",)), ("dop853",)).cells.values()
     assert cell.verdict == "hang (bounded)"
-    assert cell.seconds < 5
+    assert sum(row.seconds for row in cell.rows) < 20  # by the clock, which others share
 
 
 def test_a_class_of_ones_own_is_judged_without_being_registered() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.cli import main
+from hybridsim.engine import leaper
 
 
 def test_a_frequency_that_a_reset_or_an_output_alone_has() -> None:
@@ -34,7 +35,13 @@ y = "sin(7*t)"
 
 
 @pytest.mark.parametrize("rate", ["acos(9*k)", "1e200*x", "x/(k - 3)"])
-def test_a_linear_rate_that_has_no_value_or_too_large_a_one(rate: str) -> None:
+@pytest.mark.parametrize("is_first", [True, False], ids=["first", "later"])
+def test_a_linear_rate_that_has_no_value_or_too_large_a_one(
+    rate: str, is_first: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the model is the first of a process, for which the loop is compiled."""
+    if is_first:
+        monkeypatch.setattr(leaper, "_compiled", [])
     model = hs.Model.from_toml(f"""
 [parameters]
 k = 3
@@ -61,10 +68,11 @@ guards.zero = { expr = "-y", then = "above" }
 [modes.above]
 guards.zero = { expr = "y", then = "below" }
 """)
-    began = time.perf_counter()
-    sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"seconds": 1})
-    assert sol.status in ("finished", "limit")
-    assert time.perf_counter() - began < 60.0  # with what is to be compiled
+    for _ in ("to compile what is to be compiled", "to be timed"):
+        began = time.thread_time()
+        sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"seconds": 1})
+        assert sol.status in ("finished", "limit")
+    assert time.thread_time() - began < 30.0
 
 
 def test_a_jump_of_friction_that_has_no_value_at_zero_warns_of_nothing() -> None:
