@@ -99,7 +99,8 @@ time, with an integrator drawn at random and limits of 2 seconds, 5000 steps and
 {file_rows}
 
 A *refusal* is an error that names what is wrong and where. An error *on running* is one that only the run can
-find: a method that lacks what the model needs, a start in no mode. The others are the status of the run.
+find: a method that lacks what the model needs, a start in no mode. A *hang* is what took longer than {limit:g}
+seconds. The others are the status of the run.
 
 ## Command lines
 
@@ -121,10 +122,12 @@ made, every program started and every connection opened. Exceptions, warnings, a
 documented, a failure without a message, output that is no JSON under `--json`, and {limit:g} seconds without an
 end are faults.
 
-{verdict} Everything that earlier runs found is mended, and is a test in `tests/fuzz/test_found.py`: numbers at
-the ends of the range of doubles above all, whose squares and quotients are infinite, a guard whose bound is no
-number and whose search never ended, and messages as long as the word that they are about. A few cases of each
-kind run with the tests.
+{verdict}
+
+Everything else that was found in this and in earlier runs is mended, and is a test in
+`tests/fuzz/test_found.py`: numbers at the ends of the range of doubles above all, whose squares and quotients
+are infinite, a guard whose bound is no number and whose search never ended, and messages as long as the word
+that they are about. A few cases of each kind run with the tests.
 """
 
 
@@ -136,7 +139,7 @@ def page(found: dict[str, list[Case]]) -> str:
         )
         for kind, cases in found.items()
     }
-    faulty = sum(bool(case[2]) for cases in found.values() for case in cases)
+    faulty = [f"{kind} {case[0]} ({case[1]})" for kind, cases in found.items() for case in cases if case[2]]
     return TEXT.format(
         files=len(found["files"]),
         lines=len(found["lines"]),
@@ -144,7 +147,9 @@ def page(found: dict[str, list[Case]]) -> str:
         line_rows=rows["lines"],
         commanded=COMMANDED,
         limit=LIMIT,
-        verdict=f"{faulty} cases of this run have a fault." if faulty else "No case of this run has a fault.",
+        verdict=f"Cases of this run with a fault: {', '.join(faulty)}."
+        if faulty
+        else "No case of this run has one.",
     )
 
 

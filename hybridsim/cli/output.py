@@ -50,7 +50,11 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
     if suffixes and path.suffix.lower() not in suffixes:
         found = f"the ending {path.suffix!r}" if path.suffix else "no ending"
         raise UsageError(f"{option}: {path} has {found}", remedy=f"use one of {' '.join(suffixes)}")
-    if path.is_dir():
+    try:
+        is_folder = path.is_dir()
+    except OSError as fault:  # a name that no file can have
+        raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="name another file") from None
+    if is_folder:
         raise UsageError(
             f"{option}: {path} is a folder", remedy=f"name a file in it, such as {path / 'result'}"
         )

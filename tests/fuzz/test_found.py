@@ -179,3 +179,10 @@ def test_a_message_about_a_name_of_a_thousand_words_has_an_end() -> None:
         hs.Model.from_toml(f'[inputs.p]\nkind = "wave"\nshape = "{shape}"\nperiod = 1\n'
                            '[states]\nx = { start = 0, der = "p" }\n')  # fmt: skip
     assert len(str(caught.value)) < 4000
+
+
+@pytest.mark.parametrize("place", ["x" * 300, "y/" * 3000, "(F0 + 1)*" * 600])
+def test_a_result_with_a_name_that_no_file_can_have(place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "belt", "--t-end", "0.01", "--csv", place]) == 2
+    said = capsys.readouterr().err
+    assert "--csv" in said and "too long" in said and len(said) < 3000
