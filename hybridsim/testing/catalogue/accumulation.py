@@ -64,7 +64,11 @@ def _tanks() -> tuple[Scene, ...]:
     def dry(solution: Any) -> list[str]:
         last = solution.events[-1]
         right = last.target == "off" and abs(last.t - 4.0) <= 4e-9
-        return [] if right else [f"at the end hose:{last.target} at {last.t!r}, not hose:off at 4.0"]
+        return (
+            []
+            if right
+            else [f"the last change is hose:{last.target} at t = {last.t!r} instead of hose:off at 4"]
+        )
 
     common: dict[str, Any] = {"unit": 4.0, "tol_t": 1e-9, "tol_x": 1e-9}
     return (
