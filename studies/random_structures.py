@@ -81,7 +81,7 @@ differences of successive runs, each taken to fall with the step, which is its e
 - *sensitive*: where, and as far as, a change of the start by 1e-5 makes the other method itself change by more than
   300 times that (a grazing impact, a stop that barely happens, chaos). Up to there the run has to agree;
 - *unresolved*: the other method has not converged by its smallest step;
-- *disagrees*: everything else. Each was looked at.
+- *disagrees*: everything else.
 
 """
 
