@@ -49,6 +49,10 @@ class NotLinear(StepFailure):
     """A rate or a guard that is no linear form; the message says which kind of operation is in the way."""
 
 
+class DividesByZero(NotLinear):
+    """A form over a number that is zero: forces that several holding modes cannot keep apart have no values."""
+
+
 @dataclass(frozen=True)
 class Atom:
     """An angle or exponent rate*s + offset + sum of weights*p[source], a value, or local time (rate 1)."""
@@ -182,7 +186,7 @@ class LinearReader:
             return (_plain(_product(_form(first), _form(second))),)
         if op == DIV and isinstance(first, dict) and isinstance(second, float):
             if second == 0.0:
-                raise NotLinear("a quotient by zero")
+                raise DividesByZero("a quotient by zero")
             return (_plain({key: weight / second for key, weight in first.items()}),)
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 

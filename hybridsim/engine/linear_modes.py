@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybridsim.engine.linear_form import Atoms, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.linear_form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear
 from hybridsim.engine.system import System
 from hybridsim.errors import UsageError
 from hybridsim.model.toml_automata import SINGLE
@@ -45,7 +45,34 @@ def _named(reader: LinearReader, register: int, title: str) -> Form:
     try:
         return reader.form(register)
     except NotLinear as reason:
-        raise NotLinear(f"{title} has {reason}") from None
+        raise type(reason)(f"{title} has {reason}") from None
+
+
+class NoMode:
+    """In the place of a vector of modes that has no motion: nothing moves, and no guard admits it."""
+
+    def __init__(self, system: System, z: np.ndarray) -> None:
+        self.rates: list[Form] = [{} for _ in system.names]
+        self.guards: dict[int, Form] = {int(g): {(): -1.0} for g in np.flatnonzero(system.active(z))}
+
+    def monomials(self) -> set[Monomial]:
+        """It has no functions of time."""
+        return set()
+
+
+def modes_of(
+    system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None
+) -> list[LinearMode | NoMode]:
+    """The forms of vectors of modes (K, components) of one run, some of which may only be neighbours of what it met."""
+    found: list[LinearMode | NoMode] = []
+    for z in met:
+        try:
+            found.append(LinearMode(system, atoms, z, p))
+        except DividesByZero:
+            if len(met) == 1:
+                raise
+            found.append(NoMode(system, z))
+    return found
 
 
 def what_is_not_linear(system: System) -> str | None:

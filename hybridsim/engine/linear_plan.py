@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.linear_form import Atoms, Form
-from hybridsim.engine.linear_modes import LinearMode
+from hybridsim.engine.linear_modes import modes_of
 from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
 
@@ -25,7 +25,7 @@ class LinearPlan:
     def __init__(self, system: System, met: np.ndarray, p: np.ndarray) -> None:
         numbers = Numbers(p[: system.layout.parameters].tolist())
         atoms = Atoms()
-        modes = [LinearMode(system, atoms, z, numbers.inputs) for z in met]
+        modes = modes_of(system, atoms, met, numbers.inputs)
         monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
         n, guards = system.n, system.guard_count
         size = n + len(monomials)

@@ -29,3 +29,14 @@ def test_the_judge_sees_a_run_of_other_numbers() -> None:
     other = {**draw.params, name: 0.9 * draw.params[name]}
     wrong = hs.simulate(model, (0.0, END), params=other, x0=draw.start, integrator="dop853")
     assert judged(s, draw, wrong)[0] == "disagrees"
+
+
+@pytest.mark.parametrize(("number", "draw_number"), [(138, 8), (169, 20)])
+def test_neighbours_without_a_motion_are_no_obstacle(number: int, draw_number: int) -> None:
+    """A contact and a relay that would both hold one speed: their joint hold has no forces, and is not met."""
+    s = structure(number, SEED)
+    draw = s.draw(np.random.default_rng([SEED, number, draw_number]))
+    model = hs.Model.from_toml(s.toml)
+    sol = hs.simulate(model, (0.0, END), params=draw.params, x0=draw.start, integrator="exact")
+    assert sol.status == "finished"
+    assert judged(s, draw, sol)[0] == "agrees"
