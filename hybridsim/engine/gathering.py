@@ -9,7 +9,7 @@ from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import Series, System
 
-SIDE, LIMIT = "side", "limit"  # as guards of the changes that are made where events accumulate
+LIMIT = "limit"  # as the guard of the changes that are made where events accumulate
 _REACH = (
     2.0  # a surface this many times as far away as it may move in the time that is left is not the limit's
 )
@@ -36,7 +36,7 @@ def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: fl
     ):
         return None
     found.changes = [
-        Change(c, SIDE, int(outcome.z[c]), int(found.z[c]), outcome.x, found.x) for c in near
+        Change(c, LIMIT, int(outcome.z[c]), int(found.z[c]), outcome.x, found.x) for c in near
     ] + found.changes
     found.continuous = False
     return found

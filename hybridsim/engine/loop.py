@@ -359,10 +359,10 @@ class ModeLoop:
             self.accumulation.begin_anew()  # a contact that has closed bounces no more
             return False
         flight = hidden_flight(self.system, self.outcome, self.p)
-        if flight is not None and self._gathered(float(self.origin.plus(flight))):
+        if flight is not None and self._gathered(float(self.origin.plus(flight)), flight):
             return False
         limit = self.accumulation.limit_of_all(instants)
-        if limit is None or self._gathered(limit):
+        if limit is None or self._gathered(limit, self.accumulation.last_intervals(2)):
             return False
         self.record.status = "accumulation"
         self.record.message = accumulated(limit, [automata[c.component] for c in self.outcome.changes])
@@ -377,12 +377,15 @@ class ModeLoop:
             if automata[c.component].is_unique and c.target == automata[c.component].hold
         ]
         limit = self.accumulation.expected(instant) if len(held) > 1 else None
-        return limit is not None and self._gathered(limit)
+        return limit is not None and self._gathered(limit, self.accumulation.last_intervals(2))
 
-    def _gathered(self, limit: float) -> bool:
-        """Whether the motion goes on along surfaces whose crossings accumulate, in contacts, or as it is declared."""
+    def _gathered(self, limit: float, passed: float) -> bool:
+        """Whether the motion goes on along surfaces whose crossings accumulate, in contacts, or as it is declared.
+
+        passed : how long the last events before the limit took.
+        """
         ahead = max(Instant(limit).minus(self.origin), 0.0)
-        left = ahead + self.accumulation.last_intervals(2)
+        left = ahead + passed
         found = None
         if self.forward:
             found = gathered(self.system, self.outcome, self.p, ahead, left)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import SAME_FACTOR, turn_of
 from hybridsim.engine.decide import FINE, LEAVES, side_after
-from hybridsim.engine.gathering import LIMIT, SIDE
+from hybridsim.engine.gathering import LIMIT
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
@@ -66,6 +66,9 @@ class GuardView:
                 terms.append(f"{name} = 0 by decree")
             elif k == self.order:
                 terms.append(f"{name} = {value:.3g}{unit}")
+                break
+            elif math.isnan(value + bound):
+                terms.append(f"{name} is not a number")
                 break
             else:
                 terms.append(f"{name} = 0 within rounding ({bound:.1g}{unit})")
@@ -151,9 +154,11 @@ class _Watched(Settling):
         return found
 
 
-def explain(solution: Solution, number: int) -> Explanation:
+def explain(solution: Solution, number: int | Event) -> Explanation:
     """The explanation of one of a solution's events; see `Solution.explain`."""
     events = solution.events
+    if number in events:
+        number = events.index(number)
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
         raise UsageError(
             f"the run has {len(events)} events, and event {number!r} is asked for",
@@ -166,8 +171,8 @@ def explain(solution: Solution, number: int) -> Explanation:
     occurrence = happened[number]
     together = [o for o in happened if o.instant == occurrence.instant]
     segment = _segment_before(solution, occurrence)
-    if segment is None and event.guard in (SIDE, LIMIT):
-        return Explanation(event, (), (), _of_accumulation(events, event), _state(solution, event))
+    if event.guard == LIMIT and (segment is None or not _is_declared(solution, event)):
+        return Explanation(event, (), (), _of_accumulation(solution, event), _state(solution, event))
     if segment is None:
         raise UsageError(
             f"no segment ends at t = {event.t!r}", remedy="an event at the start of a run has no past"
@@ -190,15 +195,22 @@ def explain(solution: Solution, number: int) -> Explanation:
     return Explanation(event, views, candidates, reason, state, choices)
 
 
-def _of_accumulation(events: Sequence[Event], event: Event) -> str:
+def _is_declared(solution: Solution, event: Event) -> bool:
+    """Whether the mode that an event left declares the guard that it names."""
+    component = next(c for c in solution.model.all_components() if c.name == event.component)
+    return any(guard.name == event.guard for guard in component.mode(event.source).guards)
+
+
+def _of_accumulation(solution: Solution, event: Event) -> str:
     """What led to an instant at which no segment ends: the limit of a series of events."""
-    times = [e.t for e in events if e.kind == "transition" and e.t < event.t]
+    times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
     turn, factor = turn_of(gaps, 3, 2.0 * SAME_FACTOR)
     shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
     every = "each" if turn == 1 else f"every {turn} of them"
     series = f", {every} shorter by the factor {factor:.6g}" if turn else ""
-    end = ", as its limit is declared" if event.guard == LIMIT else ""
+    component = next(c for c in solution.model.all_components() if c.name == event.component)
+    end = ", as its limit is declared" if component.limit else ""
     return (
         f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
         f"and {event.target} is entered there{end}"
@@ -275,9 +287,10 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
             f"the run was made with save={solution._save!r}",
             remedy="run it with save='all' to have events explained",
         )
-    segments, ends = solution._segments, solution._ends
-    for k in np.flatnonzero(ends == float(occurrence.instant)):
-        segment = segments[int(k)]
+    segments = solution._segments
+    last = int(np.searchsorted(solution._starts, float(occurrence.instant), side="right"))
+    for k in range(last - 1, max(last - 4, -1), -1):  # behind it there may be segments of no length
+        segment = segments[k]
         if abs(segment.end.minus(occurrence.instant)) == 0.0 and len(segment.s) > 1:
             return segment
     return None
@@ -377,6 +390,8 @@ def _reason(
         if a != b
     )
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
+        if after != occurrence.target:  # the run had it closer to the rounding of its own steps
+            return f"an impact after which the gap opens by less than its rounding: {occurrence.target} from here on"
         return f"an impact: its impulses change {changed}; {after} just after"
     if not automaton.has_surface:
         reset = f", with {changed}" if changed else ""

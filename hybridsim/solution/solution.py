@@ -251,12 +251,12 @@ class Solution:
     def _happened(self) -> tuple[Event, ...]:
         return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
-    def explain(self, number: int) -> Explanation:
+    def explain(self, number: int | Event) -> Explanation:
         """Why an event went as it did: what came to zero, which modes could hold just after, and why that one.
 
         Parameters
         ----------
-        number : its place in `events`.
+        number : its place in `events`, or the event.
 
         Raises
         ------

@@ -371,3 +371,26 @@ def test_a_run_in_parts_goes_on_in_contact():
     part = hs.simulate("vibrating-table", (0, 0.15))
     assert part.modes["p"][-1].mode == "closed"
     assert part.resume(1.0).y[:, -1] == pytest.approx(whole.y[:, -1], rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-rk45"])
+def test_a_ball_that_comes_to_rest_leaves_another_in_the_air(integrator: str) -> None:
+    """Two balls from 1 m and 1.1 m; the first rests at once (e = 1e-5), the second falls on and bounces with e = 1/2."""
+    model = hs.Model(
+        "two",
+        states=[
+            hs.State("a", 1, "va"),
+            hs.State("va", 0, "p - 10"),
+            hs.State("b", 1.1, "vb"),
+            hs.State("vb", 0, "q - 10"),
+        ],
+        impacts=[hs.Impact("p", "a", restitution=1e-5), hs.Impact("q", "b", restitution=0.5)],
+    )
+    sol = hs.simulate(model, (0, 0.6), integrator=integrator, rtol=1e-10)
+    first, second = math.sqrt(0.2), math.sqrt(0.22)
+    assert [e.t for e in sol.events if e.component == "q"] == pytest.approx([second], abs=1e-9)
+    assert [e.t for e in sol.events if e.target == "closed"] == pytest.approx([first], abs=2e-5)
+    s = 0.6 - second
+    assert sol(0.6) == pytest.approx([0, 0, 5 * second * s - 5 * s**2, 5 * second - 10 * s], abs=1e-8)
+    for event in sol.events:
+        assert "closed" in sol.explain(event).reason or event.target == "open"
