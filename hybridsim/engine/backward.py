@@ -28,6 +28,22 @@ def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
     return ""
 
 
+def has_no_past(
+    system: System,
+    z: np.ndarray,
+    fired: tuple[int, ...],
+    stopping: tuple[int, ...],
+    schedules: tuple[int, ...],
+) -> str:
+    """Why what happened where a segment ended has no unique past: guards, stopping monitors and schedules; or empty."""
+    model = system.model
+    resets = [model.schedules[k].name for k in schedules if model.schedules[k].reset]
+    resets += [system.monitor_names[k] for k in stopping if model.monitors[k].reset]
+    if resets:
+        return f"running backward, the reset of {', '.join(resets)} has no unique past"
+    return entered_here(system, z, fired)
+
+
 @dataclass(frozen=True)
 class Entry:
     """A guard of another mode whose zero may be where the present mode was entered: modes to evaluate it in, number."""

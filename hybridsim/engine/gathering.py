@@ -61,6 +61,12 @@ def at_declared_limit(
     return found
 
 
+def holds_several(system: System, outcome: Outcome) -> bool:
+    """Whether an event ends with several switching surfaces held that were not held before it."""
+    changed = [(system.automata[c.component], c.target) for c in outcome.changes]
+    return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
+
+
 def hidden_flight(system: System, outcome: Outcome, p: np.ndarray) -> float | None:
     """How long a contact that has just bounced stays open, if so low that rounding hides its gap; else None.
 

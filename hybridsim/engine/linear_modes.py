@@ -101,9 +101,15 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
             name = f"mode {mode}" if automaton.name == SINGLE else f"{automaton.name}.{mode}"
             z = vectors[f"in {name} "] = vectors[""].copy()
             z[c] = m
+    for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
+        names = " and ".join(system.automata[c].name for c in cluster)
+        z = vectors[f"where {names} hold together "] = vectors[""].copy()
+        z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
     for place, z in reversed(vectors.items()):
         try:
             LinearMode(system, Atoms(), z, p)
+        except DividesByZero:
+            continue  # no such motion
         except NotLinear as reason:
             return str(reason) if " in mode " in str(reason) else f"{place}{reason}"  # a guard's title has it
     return None

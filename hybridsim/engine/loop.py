@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation, accumulated
-from hybridsim.engine.backward import cross_backward, entered_here, held
+from hybridsim.engine.backward import cross_backward, has_no_past, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
-from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_flight
+from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_flight, holds_several
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
@@ -56,6 +56,7 @@ class ModeLoop:
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray
         self.accumulation = Accumulation()
+        self.last_limit = math.nan
         self.notices = Notices(system, method, task, self.record)
         self.leaper = self._leaper()
         self._told = progress
@@ -268,7 +269,7 @@ class ModeLoop:
             self.origin = instant
             return True
         if not self.forward:
-            refused = self._refuse_backward(arrival, schedules)
+            refused = has_no_past(self.system, self.outcome.z, arrival.fired, arrival.stopping, schedules)
             if refused:
                 self.origin = instant
                 self.record.status, self.record.message = "backward-nonunique", refused
@@ -277,8 +278,13 @@ class ModeLoop:
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
             outcome = self._settle_located(situation(self.system, arrival, segment), arrival)
-            if appointment is None and self._ends_series(instant, outcome):
-                return False
+            limit = None if appointment else self.accumulation.expected(instant)
+            if limit is not None and holds_several(
+                self.system, outcome
+            ):  # within rounding, short of the limit
+                stop = self._gathered(limit, self.accumulation.last_intervals(2))
+                if stop is not None:
+                    return stop
             outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
             if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
                 return True
@@ -359,55 +365,47 @@ class ModeLoop:
             self.accumulation.begin_anew()  # a contact that has closed bounces no more
             return False
         flight = hidden_flight(self.system, self.outcome, self.p)
-        if flight is not None and self._gathered(float(self.origin.plus(flight)), flight):
-            return False
+        stop = None if flight is None else self._gathered(float(self.origin.plus(flight)), flight)
+        if stop is not None:
+            return stop
         limit = self.accumulation.limit_of_all(instants)
-        if limit is None or self._gathered(limit, self.accumulation.last_intervals(2)):
-            return False
+        stop = None if limit is None else self._gathered(limit, self.accumulation.last_intervals(2))
+        if limit is None or stop is not None:
+            return bool(stop)
         self.record.status = "accumulation"
         self.record.message = accumulated(limit, [automata[c.component] for c in self.outcome.changes])
         return True
 
-    def _ends_series(self, instant: Instant, outcome: Outcome) -> bool:
-        """Whether surfaces are taken together, within rounding, short of where their crossings accumulate."""
-        automata = self.system.automata
-        held = [
-            c.component
-            for c in outcome.changes
-            if automata[c.component].is_unique and c.target == automata[c.component].hold
-        ]
-        limit = self.accumulation.expected(instant) if len(held) > 1 else None
-        return limit is not None and self._gathered(limit, self.accumulation.last_intervals(2))
+    def _gathered(self, limit: float, passed: float) -> bool | None:
+        """Go on behind a limit: along surfaces, in contacts, or as it is declared; whether the run stops there.
 
-    def _gathered(self, limit: float, passed: float) -> bool:
-        """Whether the motion goes on along surfaces whose crossings accumulate, in contacts, or as it is declared.
-
-        passed : how long the last events before the limit took.
+        None where there is nothing that goes on. passed : how long the last events before the limit took.
         """
-        ahead = max(Instant(limit).minus(self.origin), 0.0)
-        left = ahead + passed
-        found = None
-        if self.forward:
-            found = gathered(self.system, self.outcome, self.p, ahead, left)
-            changed = sorted({c.component for c in self.outcome.changes})
-            found = found or at_declared_limit(self.system, self.outcome, self.p, ahead, changed)
+        if not self.forward or limit == self.last_limit:  # a limit that leads back into its own series
+            return None
+        appointment = self.timetable.next(self.origin, self.forward)
+        target = appointment.instant if appointment else self.end
+        room = target.minus(self.origin)
+        ahead = min(max(Instant(limit).minus(self.origin), 0.0), room)  # what is due until then is due
+        before = self.outcome
+        found = gathered(self.system, before, self.p, ahead, ahead + passed)
         if found is None:
-            return False
+            changed = sorted({c.component for c in before.changes})
+            found = at_declared_limit(self.system, before, self.p, ahead, changed)
+        if found is None:
+            return None
         self.notices.accumulated([self.system.automata[c.component].name for c in found.changes])
         self.accumulation.begin_anew()
-        self._adopt(self.origin.plus(ahead), found, self.outcome.x, (), ())
-        return True
-
-    def _refuse_backward(self, arrival: Arrival, schedules: tuple[int, ...]) -> str:
-        resets = [
-            self.system.model.schedules[k].name for k in schedules if self.system.model.schedules[k].reset
-        ]
-        resets += [
-            self.system.monitor_names[k] for k in arrival.stopping if self.system.model.monitors[k].reset
-        ]
-        if resets:
-            return f"running backward, the reset of {', '.join(resets)} has no unique past"
-        return entered_here(self.system, self.outcome.z, arrival.fired)
+        self.last_limit = limit
+        found = self._apply_crossed(found, ahead, before.monitor_sides, ())
+        instant = target if ahead == room else self.origin.plus(ahead)
+        stop = self._adopt(instant, found, before.x, (), (), before.monitor_sides)
+        if stop or appointment is None or ahead < room:
+            return stop
+        self.timetable.kept(target)
+        x = self.outcome.x
+        settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
+        return self._adopt(target, settled, x, appointment.schedules, (), self.outcome.monitor_sides)
 
     def _adopt(
         self,

@@ -139,7 +139,7 @@ class Settling:
         for k, c in enumerate(system.surface_of):
             automaton, value = system.automata[c], series.surfaces[k, 0]
             if abs(value) <= series.surface_bounds[k, 0]:
-                if at.z[c] in (-1, automaton.hold) or self.on_surface[c]:
+                if at.z[c] in (-1, automaton.hold) or self.on_surface[c] or automaton.is_unique:
                     found.add(c)
                 continue
             if value < 0.0 and automaton.is_unilateral:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -88,3 +89,36 @@ def test_a_third_derivative_is_not_held() -> None:
     sol = hs.simulate(model, (0, 1), integrator="exact")
     assert sol.status == "inconsistent"
     assert "higher order" in sol.message
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_a_jump_onto_it_is_held(integrator: str) -> None:
+    model = replace(
+        stage("0.5 - 2*u - w"), schedules=[hs.Schedule("put", times=[0.5], reset={"x": 0, "v": 0})]
+    )
+    sol = hs.simulate(model, (0, 3), integrator=integrator)
+    assert sol.status == "finished"
+    assert {e.component for e in sol.events if e.target == "sliding"} == {"u", "w"}
+    assert sol(3.0).tolist() == [0.0, 0.0]
+
+
+def test_the_choice_of_an_integrator_looks_at_what_both_hold() -> None:
+    """A gain that depends on time is linear alone, and a quotient where both hold: up to t = 10, where it is zero."""
+    sol = hs.simulate(stage("0.5 - (2 - 0.2*t)*u - w", x=0.1), (0, 9))
+    assert sol.status == "finished"
+    assert (sol(8.0) == 0.0).all()
+
+
+def test_derivatives_through_the_limit() -> None:
+    """z' = r u + w, so that z = d T - v(T) + v0 with v(T) = 0, whatever r."""
+    model = hs.Model(
+        "stage",
+        parameters={"d": 0.5, "r": 2.0},
+        states=[hs.State("x", 1, "v"), hs.State("v", 0, "d - r*u - w"), hs.State("z", 0, "r*u + w")],
+        surfaces=[hs.SwitchingSurface("u", "x"), hs.SwitchingSurface("w", "v")],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 7), integrator="taylor"))
+    assert found.by_parameter[2] == pytest.approx([7, 0], abs=1e-9)
+    assert found.by_start[2] == pytest.approx([0, 1, 1], abs=1e-9)
+    with pytest.raises(hs.UsageError, match="not followed to rounding"):
+        hs.sensitivities(hs.simulate(model, (0, 7), integrator="exact"))

@@ -375,7 +375,7 @@ def test_a_run_in_parts_goes_on_in_contact():
 
 @pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-rk45"])
 def test_a_ball_that_comes_to_rest_leaves_another_in_the_air(integrator: str) -> None:
-    """Two balls from 1 m and 1.1 m; the first rests at once (e = 1e-5), the second falls on and bounces with e = 1/2."""
+    """From 1 m and 1.1 m: the first rests at once (e = 1e-5), the second falls on and bounces with e = 1/2."""
     model = hs.Model(
         "two",
         states=[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -97,3 +98,49 @@ def test_a_run_that_is_stopped_in_the_series_goes_on_to_the_same_limit() -> None
     assert part.status == "limit"
     on = part.resume()
     assert [e.t for e in on.events] == [e.t for e in whole.events]
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_what_is_due_at_the_limit_happens(integrator: str) -> None:
+    """Tanks that are dry at t = 4 beside a clock that ticks at 1, 2, 3, 4, 5, and a monitor that passes t = 4."""
+    watched = replace(
+        TANKS,
+        states=[*TANKS.states, hs.State("ticks", 0, 0), hs.State("age", 0, 1)],
+        schedules=[hs.Schedule("clock", period=1, start=1, reset={"ticks": "ticks + 1"})],
+        monitors=[hs.Monitor("four", "age - 4", action="record")],
+    )
+    sol = hs.simulate(watched, (0, 5.5), integrator=integrator)
+    assert [e.t for e in sol.events if e.kind == "scheduled"] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert sol(5.5)[2] == 5.0
+    assert [e.t for e in sol.events if e.kind == "monitor"] == pytest.approx([4.0], abs=1e-9)
+    assert sol.events[-1].component == "clock"
+    assert [e.t for e in sol.events if e.target == "off"] == pytest.approx([4.0], abs=4e-9)
+
+
+@pytest.mark.parametrize("integrator", ALL)
+def test_a_limit_that_nothing_holds_in_ends_the_run_there(integrator: str) -> None:
+    fault = hs.Component(
+        "ball",
+        [
+            hs.Mode("flight", hs.Guard("floor", "h", hs.Choice("flight", reset={"h": 0, "w": "-w/2"}))),
+            hs.Mode("rest", hs.Guard("never", "-1 - t", "flight")),
+        ],
+        initial="flight",
+        limit=hs.Choice("rest", reset={"h": 0, "w": 0}),
+    )
+    back = replace(fault, limit="flight")
+    for component, status in ((fault, "cascade"), (back, "accumulation")):
+        model = hs.Model(
+            "ball", states=[hs.State("h", 1, "w"), hs.State("w", 0, -10)], components=[component]
+        )
+        sol = hs.simulate(model, (0, 3), integrator=integrator, limits={"events": 1000})
+        assert sol.status == status
+        assert sol.t_end == pytest.approx(3 * sqrt(0.2), rel=1e-9)
+
+
+def test_derivatives_are_not_carried_through_a_reset_at_a_limit() -> None:
+    plain = hs.sensitivities(hs.simulate(ball(hs.Choice("rest", reset={"h": 0, "w": 0})), (0, 5)))
+    assert plain.by_start[:2, :2] == pytest.approx(np.zeros((2, 2)), abs=1e-9)
+    aged = ball(hs.Choice("rest", reset={"h": 0, "w": 0, "age": "2*age"}))
+    with pytest.raises(hs.UsageError, match="resets h, w, age by an expression"):
+        hs.sensitivities(hs.simulate(aged, (0, 5)))

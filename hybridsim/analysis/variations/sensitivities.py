@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
+from hybridsim.analysis.variations.refused_limits import refuse_limits
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -138,3 +139,4 @@ def _refuse(solution: Solution) -> None:
         )
     if solution.t_end <= solution.t_start:
         raise UsageError("the run goes backward in time, or nowhere", remedy="give a run forward in time")
+    refuse_limits(solution)
