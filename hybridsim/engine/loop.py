@@ -83,7 +83,8 @@ class ModeLoop:
             self._run()
         except StepFailure as failure:
             self.record.status = "step-failure"
-            self.record.message = f"after t = {float(self.origin)!r}: {failure}{self._in_the_way()}"
+            why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
+            self.record.message = f"after t = {float(self.origin)!r}: {failure}" + (f"; {why}" if why else "")
         except LimitReached as reached:
             self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
@@ -94,10 +95,6 @@ class ModeLoop:
             )
         self.record.seal()
         return self.record
-
-    def _in_the_way(self) -> str:
-        why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
-        return f"; {why}" if why else ""
 
     def _run(self) -> None:
         task, system = self.task, self.system
@@ -278,13 +275,12 @@ class ModeLoop:
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
             outcome = self._settle_located(situation(self.system, arrival, segment), arrival)
-            limit = None if appointment else self.accumulation.expected(instant)
-            if limit is not None and holds_several(
-                self.system, outcome
-            ):  # within rounding, short of the limit
-                stop = self._gathered(limit, self.accumulation.last_intervals(2))
-                if stop is not None:
-                    return stop
+            # surfaces that are taken together, within rounding, short of where their crossings accumulate
+            is_early = appointment is None and holds_several(self.system, outcome)
+            limit = self.accumulation.expected(instant) if is_early else None
+            stop = None if limit is None else self._gathered(limit, self.accumulation.last_intervals(2))
+            if stop is not None:
+                return stop
             outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
             if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
                 return True
@@ -365,8 +361,10 @@ class ModeLoop:
             self.accumulation.begin_anew()  # a contact that has closed bounces no more
             return False
         flight = hidden_flight(self.system, self.outcome, self.p)
-        stop = None if flight is None else self._gathered(float(self.origin.plus(flight)), flight)
-        if stop is not None:
+        if (
+            flight is not None
+            and (stop := self._gathered(float(self.origin.plus(flight)), flight)) is not None
+        ):
             return stop
         limit = self.accumulation.limit_of_all(instants)
         stop = None if limit is None else self._gathered(limit, self.accumulation.last_intervals(2))
@@ -403,9 +401,9 @@ class ModeLoop:
         if stop or appointment is None or ahead < room:
             return stop
         self.timetable.kept(target)
-        x = self.outcome.x
+        x, sides = self.outcome.x, self.outcome.monitor_sides
         settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
-        return self._adopt(target, settled, x, appointment.schedules, (), self.outcome.monitor_sides)
+        return self._adopt(target, settled, x, appointment.schedules, (), sides)
 
     def _adopt(
         self,

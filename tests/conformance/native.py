@@ -7,6 +7,7 @@ ENDS = "only step ends"
 BRENT = "Brent's method"
 TWO_VALUES = "two values at a step end"
 NUMBERS = "no number in a trial"
+LONG = "a long run"
 DENSE = "a zero of the dense output"
 
 MECHANISMS = {
@@ -17,6 +18,8 @@ MECHANISMS = {
     BRENT: "its root finder stops with an error after 100 iterations where a zero is of third order",
     TWO_VALUES: "signs are tested on the state at the end of a step and the zero is sought on the dense output, which "
     "differs there by rounding: the root finder stops with an error, finding no change of sign",
+    LONG: "no fault of the events: a thousand periods without damping take more steps than there is time for, or lose "
+    "more digits than the scene allows",
     DENSE: "a zero is found on the dense output, which is less accurate than the steps: errors stay where it leaves "
     "them",
     NUMBERS: "the step beyond the domain of the model is tried and its Jacobian or its state is no number; the solver "
@@ -42,6 +45,8 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "grazing-stop": (ENDS, {"scipy-rk23": ""}),
     "eight-decades": (DENSE, {"scipy-lsoda": ""}),
     "vibrating-table": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
+    "twisting": ("", {"scipy-radau": TWO_VALUES}),
+    "long-swing": ("", {"scipy-rk23": LONG, "scipy-radau": LONG, "scipy-bdf": LONG}),
     "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),
 }
 

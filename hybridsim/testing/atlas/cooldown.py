@@ -63,6 +63,5 @@ class _Blind(NativeStepper):
         def blinded(s: float, x: np.ndarray) -> float:
             return far if abs(s) < self.cooldown else float(event(s, x))
 
-        # as for any event of SciPy: attributes that a function does not have by its type
-        blinded.terminal, blinded.direction = event.terminal, event.direction or -1.0  # type: ignore[attr-defined]
+        blinded.terminal, blinded.direction = event.terminal, event.direction or -1.0  # type: ignore[attr-defined]  # SciPy's
         return blinded

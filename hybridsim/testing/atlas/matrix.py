@@ -119,9 +119,10 @@ def atlas(
     -------
     The matrix. After Ctrl-C, that of the scenes that were done by then, with `interrupted`.
 
-    Errors
+    Raises
     ------
-    UsageError for a name that does not exist.
+    UsageError
+        For a name that does not exist.
     """
     own = [one for one in integrators or () if not isinstance(one, str)]
     if len(own) > 1 or (own and len(integrators or ()) > 1):
