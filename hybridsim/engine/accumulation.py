@@ -20,6 +20,7 @@ from hybridsim.engine.timepair import Instant
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
 _TERMS = 10
 _MOST = 4  # events of one turn: two relays on either of their sides
+_AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
 _FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
 SAME_FACTOR = 1e-3
@@ -91,6 +92,10 @@ class Accumulation:
     def is_under_way(self) -> bool:
         """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
         return turn_of(list(self.intervals), _FEW + 1, 2.0 * SAME_FACTOR)[0] > 0
+
+    def reach(self) -> float:
+        """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
+        return _AHEAD * max(list(self.intervals)[-_MOST:]) if self.is_under_way() else math.inf
 
     def last_intervals(self, count: int) -> float:
         """What the last intervals add up to."""

@@ -118,8 +118,9 @@ class ModeLoop:
                         self._mark(None)
                         self._progress(self.origin)
                     continue
-            if abs(target.minus(self.origin)) > self.renewal:
-                target = self.origin.plus(self.renewal if self.forward else -self.renewal)
+            reach = min(self.renewal, self.accumulation.reach())
+            if abs(target.minus(self.origin)) > reach:
+                target = self.origin.plus(reach if self.forward else -reach)
                 appointment = Appointment(target, (), is_renewal=True)
             segment = self._segment_run()
             bound = target.minus(self.origin)

@@ -73,7 +73,7 @@ def test_restarting_parts_is_as_good_as_restarting_everything() -> None:
         ({"z0": {"f1": "stick"}}, "z0 is given"),
         ({"save": 3.0}, "save is 3.0"),
         ({"x0": {"w": 1.0}}, "names 'w'"),
-        ({"tolerance": 1e-3}, "tolerance is given"),
+        ({"tolerance": 1e-3}, "tolerance is an option of moreau"),
     ],
 )
 def test_what_it_does_not_take_is_refused_with_a_remedy(changes: dict, said: str) -> None:
