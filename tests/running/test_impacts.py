@@ -394,3 +394,11 @@ def test_a_ball_that_comes_to_rest_leaves_another_in_the_air(integrator: str) ->
     assert sol(0.6) == pytest.approx([0, 0, 5 * second * s - 5 * s**2, 5 * second - 10 * s], abs=1e-8)
     for event in sol.events:
         assert "closed" in sol.explain(event).reason or event.target == "open"
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+@pytest.mark.parametrize("end", [2.0, 1e3, 1e5])
+def test_the_limit_of_bounces_does_not_move_with_the_end_of_the_run(integrator: str, end: float) -> None:
+    sol = hs.simulate(ball(e=0.5, g=10), (0, end), integrator=integrator)
+    closed = next(e.t for e in sol.events if e.target == "closed")
+    assert closed == pytest.approx(3 * math.sqrt(0.2), rel=1e-9)
