@@ -70,7 +70,7 @@ def test_the_order_is_that_of_the_two_finest_settings() -> None:
 
 
 def test_reasons_name_no_folders() -> None:
-    assert v.one_line("/home/me/scenes/bar.toml:16: p\n  and q") == "bar.toml:16: p and q"
+    assert v.one_line("/models/scenes/bar.toml:16: p\n  and q") == "bar.toml:16: p and q"
 
 
 def test_a_study_that_is_cut_short_allows_for_its_last_tolerance() -> None:
