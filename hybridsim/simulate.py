@@ -161,6 +161,7 @@ def simulate(
     arguments.refuse_unused(method, rtol=rtol, atol=atol)
     if isinstance(system.code, PythonCode):
         _check_functions(method, system, system.code, system.start_state(x0_states), span[0])
+    _refuse_velocity_powers(method, model)
     for function in system.hot_functions():
         system.address(function)
     method.prepare(system)
@@ -194,6 +195,23 @@ def _check_functions(method: Integrator, system: System, code: PythonCode, x0: n
     if reason:
         raise UsageError(f"{method.name} cannot run {system.model.name}: {reason}", remedy=remedy)
     code.check(x0, system.vector(Instant(t0), system.discrete_start))
+
+
+def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
+    """Refuse to decide between stick and slip by derivatives that are not there."""
+    from hybridsim.integrators.base import Integrator
+    from hybridsim.model.velocity_powers import velocity_powers
+
+    if type(method).run is not Integrator.run:
+        return  # it decides by itself, and takes no derivative
+    for power in velocity_powers(model):
+        raise UsageError(
+            f"{method.name} cannot run {model.name}: '{power.text}' in {power.where} is a fractional power of the "
+            f"velocity of contact {power.contact}, which has no Taylor series where the contact sticks, so that stick "
+            "and slip cannot be told apart there",
+            place=power.place,
+            remedy=f"{power.remedy}; or choose integrator='moreau', step=..., which takes no derivatives",
+        )
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:

@@ -38,22 +38,46 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         return f"{states}: it may grow without bound"
     rates = system.flow(s, x, p, z)
     if not np.isfinite(rates).all():
-        return _said(
-            system, "the rate of", [system.names[i] for i in np.flatnonzero(~np.isfinite(rates))], x, z
-        )
+        names = [system.names[i] for i in np.flatnonzero(~np.isfinite(rates))]
+        return _said(system, "the rate of", names, x, z) + power_without_value(system, names, float(here), x)
     reach = _FARTHEST * max(abs(float(here)), abs(s), 1e-300)
     for k in range(_NEAR, -1, -1):
         step = reach * 0.5**k
         ahead = system.flow(s + step, x + step * rates, p, z)
         if not np.isfinite(ahead).all():
             names = [system.names[i] for i in np.flatnonzero(~np.isfinite(ahead))]
-            return _said(system, "just after, the rate of", names, x, z)
+            power = power_without_value(system, names, float(here) + step, x + step * rates)
+            return _said(system, "just after, the rate of", names, x, z) + power
         guards = system.rows(
             "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
         )[0]
         lost = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
         if len(lost):
             return _said(system, "just after,", [system.guard_title(int(g), z) for g in lost], x, z)
+    return ""
+
+
+def power_without_value(system: System, names: list[str], t: float, x: np.ndarray) -> str:
+    """The root or fractional power in the rates of some states that has no value in a state, and what to write."""
+    from hybridsim.expr.write import write
+    from hybridsim.model.meanings import Meanings
+    from hybridsim.model.nonsmooth import roots_in
+    from hybridsim.model.one_sided import number_of
+
+    model = system.model
+    if model.flow is not None:
+        return ""
+    meanings = Meanings(model)
+    values = model.parameter_values() | dict(zip(system.names, x.tolist(), strict=True)) | {"t": t}
+    modes = [mode for component in model.all_components() for mode in component.modes]
+    rates = [state.der for state in model.states if state.name in names]
+    rates += [mode.der[name] for mode in modes for name in names if name in mode.der]
+    rates += [expr for mode in modes for expr in mode.set.values()]
+    for node, base, power in (found for rate in rates for found in roots_in(rate, meanings)):
+        value = number_of(base, values, meanings.lookup)
+        if value is not None and value < 0.0:  # None: it depends on what a mode sets
+            remedy = f"to go on beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
+            return f": '{write(node)}' has no value for {write(base)} < 0; {remedy}, or end the run there by a monitor"
     return ""
 
 

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
@@ -187,8 +188,10 @@ class FixedStepRun:
         instant = target if why == BOUND else self.origin.plus(s)
         if why == NOT_FINITE:
             self.record.status = "step-failure"
+            ahead = self.x + self.march.step * system.flow(s, self.x, p, self.z)
+            power = power_without_value(system, list(system.names), float(instant) + self.march.step, ahead)
             self.record.message = (
-                f"after t = {float(instant)!r}: the state or a guard is not a number after one step"
+                f"after t = {float(instant)!r}: the state or a guard is not a number after one step{power}"
             )
             return True
         if why == RESTITUTION:

@@ -185,10 +185,13 @@ def implicit_matrix(
     for i in range(n):
         room.free[i] = room.rates[i]
     for j in range(n):
-        step = _NUDGE * max(abs(x[j]), room.sizes[j])
-        room.nudged[j] = x[j] + step
-        step = room.nudged[j] - x[j]
-        call(flow, s, room.nudged, p, room.sides, room.rates)
+        nudge = _NUDGE * max(abs(x[j]), room.sizes[j])
+        for way in (1.0, -1.0):  # a law need not have a value on the other side of rest
+            room.nudged[j] = x[j] + way * nudge
+            step = room.nudged[j] - x[j]
+            call(flow, s, room.nudged, p, room.sides, room.rates)
+            if math.isfinite(np.sum(room.rates)):
+                break
         for i in range(n):
             room.M[i, j] = -h * theta * (room.rates[i] - room.free[i]) / step
         room.M[j, j] += 1.0
@@ -301,15 +304,17 @@ def moreau_step(
         if has_impacts:
             gap_rates(table, X, free, room)
         settled = forces(table, room, m, tolerance, has_impacts)
-        change = 0.0
+        change, is_number = 0.0, True
         for i in range(n):
             moved = free[i]
             for k in range(m):
                 moved += room.w[k, i] * room.force[k]
             change = max(change, abs(moved - X[i]) / max(abs(moved), room.sizes[i]))
             X[i] = moved
-        if not change < math.inf:
-            break
+            is_number = is_number and math.isfinite(moved)
+        if not is_number:  # what holds is set exactly below, and would hide it
+            put(X, out)
+            return _UNSETTLED
         if iteration > 0 and change <= tolerance and settled:
             is_done = True
             break

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import Place
+from hybridsim.expr.write import write
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.one_sided import never_negative, number_of
 
@@ -86,6 +87,17 @@ def limited(node: ast.expr, meanings: Meanings) -> ast.expr | None:
                 if not is_whole(exponent, meanings):
                     return part
     return None
+
+
+def roots_in(expr: Expression, meanings: Meanings) -> Iterator[tuple[ast.expr, ast.expr, str]]:
+    """The roots and fractional powers of what moves in an expression: each, its base, and its exponent as text."""
+    for part in ast.walk(meanings.written_out(expr.tree)):
+        match part:
+            case ast.Call(func=ast.Name(id="sqrt"), args=[base]) if meanings.moves(base):
+                yield part, base, "0.5"
+            case ast.BinOp(left=base, op=ast.Pow(), right=exponent) if meanings.moves(base):
+                if not is_whole(exponent, meanings):
+                    yield part, base, write(exponent)
 
 
 def is_whole(exponent: ast.expr, meanings: Meanings) -> bool:

@@ -14,6 +14,7 @@ from hybridsim.model.check_names import check_names
 from hybridsim.model.check_signals import check_signals
 from hybridsim.model.check_surfaces import check_surfaces
 from hybridsim.model.check_values import check_values
+from hybridsim.model.check_velocity_powers import check_velocity_powers
 from hybridsim.model.scope import Scope
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_signals(scope)
     check_functions(scope)
     check_expressions(scope)
+    if not scope.errors:
+        check_velocity_powers(scope)
     if not scope.errors:
         model.once("is sound", lambda: True)
         check_values(scope)
