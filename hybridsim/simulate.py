@@ -215,6 +215,8 @@ def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:
+    from hybridsim.integrators.registry import list_integrators
+
     needs = {
         "contacts": any(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata),
         "impacts": any(a.is_unilateral for a in system.automata),
@@ -225,9 +227,17 @@ def _refuse_lacking(method: Integrator, model: Model, system: System, span: tupl
         "backward": span[1] < span[0],
         "corners": "corners" in method.lacks and system.has_corners,
     }
-    for capability, needed in needs.items():
-        if needed and capability in method.lacks:
+    needed = [capability for capability, is_needed in needs.items() if is_needed]
+    for capability in needed:
+        if capability in method.lacks:
+            # what is not linear is not known here, and would be refused next
+            able = [one.name for one in list_integrators() if not {"nonlinear", *needed} & one.lacks.keys()]
+            such = (
+                f"choose one that can, such as {', '.join(able[:3])}"
+                if able
+                else "no integrator takes all of it"
+            )
             raise UsageError(
                 f"{method.name} cannot run {model.name}: {method.lacks[capability]}",
-                remedy="choose another integrator (hs.list_integrators() says what each lacks)",
+                remedy=f"{such} (hs.list_integrators() says what each lacks)",
             )

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.checkpoint import Checkpoint
+from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.limits import Gauge, LimitReached

@@ -66,14 +66,14 @@ class Moreau(Integrator):
     reference: ClassVar[str] = "Jean 1999, doi:10.1016/S0045-7825(98)00383-1"
     when: ClassVar[str] = "many contacts; accumulations; a second opinion"
     lacks: ClassVar[dict[str, str]] = {
-        "adaptive": "its step is fixed: rtol and atol do not enter",
-        "located": "no event is located: stops, reversals and contacts show where the step that they are in begins, "
-        "a reversal as a stick of one; a bounce is no event",
-        "stiff": "its iteration for the new state needs steps that resolve stiff rates",
-        "multiple-roots": "only the signs at the ends of a step are compared",
-        "backward": "the law of a contact that sticks has no past",
-        "sliding": "its solve is made for friction forces; what a switching surface weighs needs another",
-        "functions": "it takes forces apart that are declared by expressions",
+        "adaptive": "its step is fixed (options step and steps_per_period)",
+        "located": "no event is located: a stop, a reversal or a contact is dated to where the step that it falls into "
+        "begins, a reversal shows as a stick of one step, and a bounce is no event",
+        "stiff": "where rates are stiff, its Newton iteration converges only with steps that resolve the fastest",
+        "multiple-roots": "it compares signs at both ends of a step, and misses what changes twice in between",
+        "backward": "it runs forward in time only: nothing tells when a contact that sticks began to",
+        "sliding": "it solves for the forces of contacts, and knows no sliding along a switching surface",
+        "functions": "it takes the forces of contacts out of the rates, which needs these as expressions",
     }
 
     steps_per_period: float = 1200.0

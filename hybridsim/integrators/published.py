@@ -18,11 +18,11 @@ from hybridsim.integrators.rk4_march import FixedStep, Rk4March
 
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"
 _FIXED = {
-    "adaptive": "its step is fixed: rtol and atol do not enter",
-    "multiple-roots": "only the signs at the ends of a step are compared",
+    "adaptive": "its step is fixed (options step and steps_per_period)",
+    "multiple-roots": "it compares signs at both ends of a step, and misses what changes twice in between",
     "stiff": "explicit, with a fixed step",
-    "backward": "the zone rule of the force has no past",
-    "sliding": "its zone rule is made for friction, which opposes a velocity; a relay needs another",
+    "backward": "it runs forward in time only: its rule for the zone around zero velocity has no past",
+    "sliding": "its rule for the zone around zero velocity is one of friction, and knows no switching surface",
     "impacts": "its rule is made for friction forces, not for impulses",
     "functions": "it is a method for contacts, which are declared by expressions",
 }

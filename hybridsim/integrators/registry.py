@@ -114,13 +114,34 @@ def option_names(cls: type[Any]) -> tuple[str, ...]:
     return tuple(f.name for f in fields(cls))
 
 
-# What users of SciPy's solve_ivp ask for, and where it is here.
-_OF_SOLVE_IVP = {
+_START = "the start is x0=..., by name ({'x': 1.0}) or one number for each state in the order of declaration"
+_PARAMETERS = "give values of parameters by params={...}"
+_SPAN = "both ends of the run are t_span=(t0, t1)"
+_STEP = "max_step=... bounds the step; a fixed one is step=... of integrator='moreau' or 'rk4-dichotomy'"
+# What users of SciPy's solve_ivp and of other tools ask for, and where it is here.
+_ELSEWHERE = {
+    "y0": _START,
+    "u0": _START,
     "method": "name the method by integrator=..., such as 'scipy-rk45'",
+    "solver": "name the method by integrator=..., such as 'scipy-rk45'",
     "events": "declare monitors in the model, hs.Monitor(name, expression); a mode's guards are found anyway",
-    "args": "give values of parameters by params={...}",
+    "args": _PARAMETERS,
+    "p": _PARAMETERS,
     "dense_output": "leave it out: every solution is a function of time, sol(t)",
+    "vectorized": "leave it out: the model is compiled",
+    "jac": "leave it out: derivatives come from the model's own expressions",
+    "t0": _SPAN,
+    "t1": _SPAN,
+    "tspan": _SPAN,
+    "t_end": _SPAN,
+    "dt": _STEP,
+    "h": _STEP,
 }
+
+
+def keyword_elsewhere(keyword: str) -> str | None:
+    """The remedy for a keyword of another tool that has a counterpart in `simulate`."""
+    return _ELSEWHERE.get(keyword)
 
 
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
@@ -132,8 +153,9 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
             remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"
             close = near(option, (*known, *keywords))
             remedy = nearest(option, close) if close else remedy
-            remedy = _OF_SOLVE_IVP.get(option, remedy)
-            raise UsageError(f"{name} has no option {option!r}", remedy=remedy)
+            what = f"simulate has no argument, and {name} no option {option!r}"
+            what = what if keywords else f"{name} has no option {option!r}"
+            raise UsageError(what, remedy=keyword_elsewhere(option) or remedy)
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():
         if not fits(value, kinds[option]):

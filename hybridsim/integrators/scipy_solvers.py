@@ -12,7 +12,9 @@ from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.scipy_native import NativeStepper
 from hybridsim.integrators.scipy_stepper import SolverStepper, series_step
 
-_NOISE = {"accumulation": "hops shorter than its tolerances are noise: every restart is at order one"}
+_NOISE = {
+    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+}
 _EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
 _STABLE = {
     "RK23": 2.513,

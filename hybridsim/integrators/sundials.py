@@ -14,13 +14,13 @@ from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.past_steps import MOST, converges, through
 
 _MISSES = (
-    "CVODE compares the signs of a guard at both ends of a step and so misses two zeros within one step "
+    "CVODE compares the signs of a guard at both ends of a step, and misses one that changes its sign twice in between "
     "(SUNDIALS, CVODE user guide, section on rootfinding)"
 )
-_NOISE = "hops shorter than its tolerances are noise to its root finding; the run then stops saying so"
+_NOISE = "events that follow each other within its tolerances are noise to its root finding; the run then stops, and says so"
 _TANGENT = (
-    "its root finding sees the value of a guard, which is below the error of the states at first where a surface over "
-    "several of them is left at a tangency; the run then stops saying so"
+    "where a motion leaves a surface over several states at a tangency, the guard is smaller at first than the error of "
+    "the states, so that its root finding may not see the way out; the run then stops, and says so"
 )
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
@@ -221,7 +221,7 @@ class CvodeAdams(Integrator):
         "multiple-roots": _MISSES,
         "accumulation": _NOISE,
         "tangent-exit": _TANGENT,
-        "stiff": "functional order drops with the step: use cvode-bdf",
+        "stiff": "where rates are stiff its iteration converges with very short steps only: use cvode-bdf",
     }
     dense_is_accurate: ClassVar[bool] = True
 

@@ -17,7 +17,13 @@ if TYPE_CHECKING:
     from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.mechanics.system import MechanicalSystem
 
-_OF_MODELS = ("params", "z0", "first_step", "limits")  # of `simulate`, and without a meaning here
+# Of `simulate`, and without a meaning here; with what to do instead.
+_OF_MODELS = {
+    "params": "put the values into its arrays, or run to_model()",
+    "z0": "leave it out: who sticks at the start follows from x0",
+    "first_step": "leave it out: a series knows its own step",
+    "limits": "leave it out, or run to_model()",
+}
 _OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
 
 
@@ -45,6 +51,7 @@ def simulate_mechanical(
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
     from hybridsim.integrators.fixed_step_length import refuse_longer
+    from hybridsim.integrators.registry import keyword_elsewhere
     from hybridsim.mechanics.plant import build
     from hybridsim.mechanics.run import MechanicalRun
     from hybridsim.mechanics.solution import MechanicalSolution
@@ -72,12 +79,10 @@ def simulate_mechanical(
             taken = (*(simulate_mechanical.__kwdefaults__ or ()), *_OF_MOREAU)
             raise UsageError(
                 f"{argument!r} is no argument for a MechanicalSystem",
-                remedy=nearest(argument, taken, kind="arguments"),
+                remedy=keyword_elsewhere(argument) or nearest(argument, taken, kind="arguments"),
             )
         if value is not None:
-            raise UsageError(
-                f"{argument} is given for a MechanicalSystem", remedy="give other arrays, or run to_model()"
-            )
+            raise UsageError(f"a MechanicalSystem takes no {argument}", remedy=_OF_MODELS[argument])
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(

@@ -51,7 +51,7 @@ SPAN = (0.0, 0.01)
         ({"t_eval": 5}, "t_eval is 5", "times from t0 to t1"),
         ({"t_eval": [[0, 1]]}, r"t_eval is \[0, 1\]", "times from t0 to t1"),
         ({"rtoll": 1e-9}, "no option 'rtoll'", "did you mean 'rtol'"),
-        ({"tspan": SPAN, "integrator": "taylor"}, "no option 'tspan'", "has no options"),
+        ({"tspan": SPAN, "integrator": "taylor"}, "no option 'tspan'", "ends of the run are t_span"),
         ({"maxstep": 1, "integrator": "moreau"}, "no option 'maxstep'", "did you mean 'max_step'"),
         ({"integrator": "rk45"}, "no integrator 'rk45'", "'scipy-rk45'.*hybridsim integrators"),
         ({"rtol": np.float64(2)}, r"rtol is 2\.0", "below 1"),
