@@ -156,17 +156,6 @@ class ModelError(HybridsimError):
 class ExpressionError(ModelError):
     """A text that is no expression, or an expression that has no value.
 
-    Parameters
-    ----------
-    message : str
-        What is wrong, naming the object and the value.
-    place : Place, optional
-        Where it is written, if it is written anywhere.
-    remedy : str, optional
-        What the user can do about it.
-    errors : iterable of ModelError, optional
-        The single faults, where there are several.
-
     Examples
     --------
     >>> import hybridsim as hs
@@ -180,15 +169,6 @@ class ExpressionError(ModelError):
 
 class UsageError(HybridsimError, ValueError):
     """A call or a command line that asks for something that does not exist.
-
-    Parameters
-    ----------
-    message : str
-        What is wrong, naming the object and the value.
-    place : Place, optional
-        Where it is written, if it is written anywhere.
-    remedy : str, optional
-        What the user can do about it.
 
     Examples
     --------
@@ -205,15 +185,6 @@ class UsageError(HybridsimError, ValueError):
 
 class SimulationError(HybridsimError):
     """A run that could not be carried out.
-
-    Parameters
-    ----------
-    message : str
-        What is wrong, naming the object and the value.
-    place : Place, optional
-        Where it is written, if it is written anywhere.
-    remedy : str, optional
-        What the user can do about it.
 
     Notes
     -----

@@ -28,7 +28,10 @@ def test_form(name: str) -> None:
     where = f"{getattr(hs, name).__module__}.{name}"
     assert Validator._load_obj(where) is getattr(hs, name)
     found = validate(where)["errors"]
-    assert [(code, text) for code, text in found if code not in NOT_ASKED] == []
+    thing = getattr(hs, name)
+    # an error that is made as its base is says nothing anew of its parameters
+    inherited = {"PR01"} if isinstance(thing, type) and "__init__" not in vars(thing) else set()
+    assert [(code, text) for code, text in found if code not in NOT_ASKED.keys() | inherited] == []
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hybridsim.engine.cache import kernel_folder
+from hybridsim.engine.cache import cache_root, kernel_folder
 
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 
@@ -71,7 +71,7 @@ if ENABLED:
                 if compiled.startswith("hybridsim."):
                     numba.config.OPT = min(numba.config.OPT, type(numba.config.OPT)(_LEVEL))
                     if so_far > _NOTICED:  # a part that no run has needed before, such as derivatives
-                        _tell("hybridsim: compiling the engine for this, once ...")
+                        _tell(f"hybridsim: compiling the engine for this, once (10 to 30 s); {_kept()} ...")
                 return
             if of.depth == 0:
                 of.since = time.perf_counter()
@@ -251,7 +251,11 @@ def announce_compilation() -> None:
     if ENABLED and not announced.exists():
         announced.parent.mkdir(parents=True, exist_ok=True)
         announced.touch()
-        _tell("hybridsim: compiling the engine, once (half a minute) ...")
+        _tell(f"hybridsim: compiling the engine, once (half a minute); {_kept()} ...")
+
+
+def _kept() -> str:
+    return f"kept for later runs in {cache_root()}"
 
 
 _told: set[str] = set()  # in this process: one line is enough

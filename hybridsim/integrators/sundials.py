@@ -19,8 +19,8 @@ _MISSES = (
 )
 _NOISE = "events that follow each other within its tolerances are noise to its root finding; the run then stops, and says so"
 _TANGENT = (
-    "where a motion leaves a surface over several states at a tangency, the guard is smaller at first than the error of "
-    "the states, so that its root finding may not see the way out; the run then stops, and says so"
+    "where a motion leaves a surface over several states at a tangency, the guard is smaller at first than the error "
+    "of the states, so that its root finding may not see the way out; the run then stops, and says so"
 )
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000

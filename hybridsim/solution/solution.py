@@ -33,7 +33,9 @@ class Solution:
     Attributes
     ----------
     t, y : array
-        Times (m,) and states (n, m), as in SciPy; an event time stands twice, with x- and x+.
+        Times (m,) and states (n, m), as in SciPy: a row for each state, in the order in which the model
+        declares them (``names``; states that a friction law brings come after those), a column for each time;
+        an event time stands twice, with x- and x+.
     events, modes, stats, status, success, message, warnings : object
         See the properties.
 
@@ -48,6 +50,8 @@ class Solution:
     >>> sol = hs.simulate("dfcs", (0, 0.1))
     >>> sol(0.05).shape, len(sol.events)
     ((2,), 27)
+    >>> sol.names
+    ('x', 'v')
     """
 
     def __init__(

@@ -139,7 +139,7 @@ def observed(folder: Path, expected: object) -> Iterator[Finding]:
             warnings.simplefilter("always")
             try:
                 yield finding
-            except Exception:
+            except Exception:  # whatever was raised is what is looked for: it is the finding
                 finding.faults.append(traceback.format_exc()[-3000:])
         finding.faults += [f"{w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in caught]
         finding.faults += seen.code
@@ -151,7 +151,7 @@ def noted(faults: list[str], what: str) -> Iterator[None]:
     """An exception of the judge's own questions is a fault."""
     try:
         yield
-    except Exception as why:
+    except Exception as why:  # of any kind: after a mutation none of these questions may fail
         faults.append(f"{what}: {why}")
 
 

@@ -12,6 +12,27 @@ from hybridsim.cli import main
 from hybridsim.engine import leaper
 
 
+def rubbing_block(
+    x: object = 0,
+    v: object = 0,
+    push: str = "cos(t)",
+    normal: str = "1",
+    law: str = '{ name = "coulomb", mu = 1 }',
+    more: str = "",
+) -> hs.Model:
+    """A block on a spring that is pushed, with one contact."""
+    return hs.Model.from_toml(f"""
+[states]
+x = {{ start = {x}, der = "v" }}
+v = {{ start = {v}, der = "{push} - x - f" }}
+[contacts.f]
+velocity = "v"
+normal = {normal}
+law = {law}
+{more}
+""")
+
+
 def test_a_frequency_that_a_reset_or_an_output_alone_has() -> None:
     model = hs.Model.from_toml("""
 [states]
@@ -76,15 +97,8 @@ guards.zero = { expr = "y", then = "below" }
 
 
 def test_a_jump_of_friction_that_has_no_value_at_zero_warns_of_nothing() -> None:
-    model = hs.Model.from_toml("""
-[states]
-x = { start = 0, der = "v" }
-v = { start = 0, der = "sin(t) - x - f" }
-[contacts.f]
-velocity = "v"
-normal = "1"
-law = { name = "static-kinetic", mu_s = "1", mu_k = "1/sin(t)" }
-""")
+    law = '{ name = "static-kinetic", mu_s = "1", mu_k = "1/sin(t)" }'
+    model = rubbing_block(v=0, push="sin(t)", law=law)
     sol = hs.simulate(model, (0.0, 1.0), limits={"steps": 1000})
     assert sol.success and [i.mode for i in sol.modes["f"]] == ["stick"]
 
@@ -108,21 +122,10 @@ def test_a_motion_that_is_not_settled_after_the_first_stretch(capsys: pytest.Cap
     assert "internal error" not in capsys.readouterr().err
 
 
-HUGE = """
-[states]
-x = {{ start = {x}, der = "v" }}
-v = {{ start = {v}, der = "cos(t) - x - f" }}
-[contacts.f]
-velocity = "v"
-normal = 1
-law = {{ name = "coulomb", mu = 1 }}
-"""
-
-
 @pytest.mark.parametrize("integrator", ["dop853", "tsit5", "rodas5p", "scipy-rk45", "auto"])
 @pytest.mark.parametrize(("x", "v"), [("0", "1e308"), ("-1e150", "1"), ("1", "1e150")])
 def test_a_start_that_no_double_can_square(integrator: str, x: str, v: str) -> None:
-    model = hs.Model.from_toml(HUGE.format(x=x, v=v))
+    model = rubbing_block(x=x, v=v)
     sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"steps": 1000, "seconds": 5})
     assert sol.status in ("finished", "limit", "step-failure") and sol.message
 
@@ -133,16 +136,7 @@ def test_a_frequency_that_is_too_small_for_a_period() -> None:
 
 
 def test_a_load_without_a_value_where_a_fixed_step_starts() -> None:
-    model = hs.Model.from_toml("""
-[states]
-x = { start = 0, der = "v" }
-v = { start = 1, der = "cos(t) - x - f" }
-[contacts.f]
-velocity = "v"
-normal = "1 + 1.5/x"
-opens = true
-law = { name = "coulomb", mu = 1 }
-""")
+    model = rubbing_block(v=1, normal='"1 + 1.5/x"', more="opens = true")
     sol = hs.simulate(model, (0.0, 1.0), integrator="rk4-dichotomy", limits={"steps": 1000})
     assert sol.status == "step-failure" and "not a number" in sol.message
 

@@ -82,7 +82,7 @@ def one_draw(s: Structure, model: hs.Model, number: int, seed: int, integrator: 
         kind, detail = judged(s, draw, sol)
     except hs.ModelError:
         raise
-    except Exception as error:
+    except Exception as error:  # of any kind: a run that raises is a verdict, and the other draws go on
         return Verdict(number, integrator, "exception", "fault", repr(error)[:500], "", 0, ())
     return Verdict(
         number, integrator, sol.status, kind, detail, sol.message, len(sol.events), tuple(sol.warnings)
