@@ -17,7 +17,7 @@ _MISSES = (
     "CVODE compares the signs of a guard at both ends of a step, and misses one that changes its sign twice in between "
     "(SUNDIALS, CVODE user guide, section on rootfinding)"
 )
-_NOISE = "events that follow each other within its tolerances are noise to its root finding; the run then stops, and says so"
+_NOISE = "events closer to each other than its tolerances are noise to its root finding; the run then stops, saying so"
 _TANGENT = (
     "where a motion leaves a surface over several states at a tangency, the guard is smaller at first than the error "
     "of the states, so that its root finding may not see the way out; the run then stops, and says so"
