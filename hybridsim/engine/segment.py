@@ -106,6 +106,8 @@ class SegmentRun:
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
         """Step to the first event, or to the bound."""
+        for g in self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]:
+            self._refuse_undefined(int(g), 0.0)  # its side was decided by nothing
         stepper = self._start(bound, first_step)
         self.counters.restarts += 1
         while True:
@@ -157,12 +159,15 @@ class SegmentRun:
         """Search a step; where something stops the segment, return the step up to there and the arrival."""
         found = self.locator.search(step)
         first = self._first_stop(found)
-        for hit in found.crossings:
-            passed = first is None or hit.theta < first[0].theta
-            recorded = self.monitors[hit.number].action == "record"
-            if passed and recorded and self._wanted(hit.number, hit.direction):
-                ended = self._refine(stepper, step, hit, is_monitor=True)
-                self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
+        passed = [hit for hit in found.crossings if self._is_recorded(hit, first)]
+        located = []
+        for hit, is_monitor in [*((hit, True) for hit in passed), *([first] if first else [])]:
+            ended, is_reached = self._refine(stepper, step, hit, is_monitor)
+            if not is_reached:
+                return self._examine(stepper, ended)
+            located.append(ended)
+        for hit, ended in zip(passed, located, strict=False):
+            self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
         limit = first[0].theta if first else 1.0
         for theta, g in found.guard_gaps:
             if first is None or theta < limit:
@@ -172,8 +177,7 @@ class SegmentRun:
             if grazing.theta < limit:
                 self.grazings.append((g, step.s0 + grazing.theta * (step.s1 - step.s0), grazing.distance))
         if first is not None:
-            hit, is_monitor = first
-            ended = self._refine(stepper, step, hit, is_monitor)
+            (hit, is_monitor), ended = first, located[-1]
             x = self._projected(ended)
             self._remember_monitors(found, hit.theta)
             if is_monitor:
@@ -191,6 +195,12 @@ class SegmentRun:
     def _wanted(self, monitor: int, direction: int) -> bool:
         want = _DIRECTIONS[self.monitors[monitor].direction]
         return want in (0, direction)
+
+    def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
+        """Whether a monitor is only to be recorded, before the first stop."""
+        is_before = first is None or hit.theta < first[0].theta
+        recorded = self.monitors[hit.number].action == "record"
+        return is_before and recorded and self._wanted(hit.number, hit.direction)
 
     def _first_stop(self, found: Findings) -> tuple[Hit, bool] | None:
         stops = [(hit, False) for hit in found.exits]
@@ -213,6 +223,7 @@ class SegmentRun:
         A guard that the search left open and that is negative beyond rounding at the end was zero before it.
         """
         locator = self.locator
+        start = dict(vars(locator))
         open_guards = [int(g) for g in self.watch.guards if found.guard_ends[g] == 0]
         open_monitors = [k for k in range(len(self.monitors)) if found.monitor_ends[k] == 0]
         locator.sides, locator.orders = found.guard_ends.copy(), np.zeros_like(locator.orders)
@@ -238,7 +249,10 @@ class SegmentRun:
                 (passed if order == 0 else fired).append(g)
         if passed:
             hit = min((locator.exit(step, g) for g in passed), key=lambda hit: hit.theta)
-            ended = self._refine(stepper, step, hit, is_monitor=False)
+            ended, is_reached = self._refine(stepper, step, hit, is_monitor=False)
+            if not is_reached:
+                vars(locator).update(start)
+                return self._examine(stepper, ended)
             return ended, Arrival(ended.s1, self._projected(ended), fired=(hit.number,))
         for k in open_monitors:
             side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
@@ -256,16 +270,19 @@ class SegmentRun:
             return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
         return step, None
 
-    def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> Step:
-        """The step up to the event, with the method's own accuracy there.
+    def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
+        """The step up to the event, with the method's own accuracy there, and True; or a shorter one, and False.
 
         Where the dense output is less accurate than the method, the step is repeated to the event time and
-        that time corrected by Newton's method until the guard is zero to rounding.
+        that time corrected by Newton's method until the guard is zero to rounding. An event of a step whose error
+        there is not within the tolerance is none: a shorter step is to be searched in its place.
         """
         s = step.s0 + hit.theta * (step.s1 - step.s0) if hit.theta < 1.0 else step.s1
         if self.method.dense_is_accurate or s == step.s0:
+            if step.holds is not None and s != step.s0 and not step.holds(s):
+                return stepper.restep(step, s), False
             x = step.dense(np.array([s]))[0]
-            return Step(step.s0, s, step.x0, x, step.dense)
+            return Step(step.s0, s, step.x0, x, step.dense), True
         on_dense = s
         # the dense output errs by a small part of a step: what Newton's method finds further off is another zero
         window = _NEIGHBOURHOOD * abs(step.s1 - step.s0)
@@ -273,6 +290,8 @@ class SegmentRun:
         high = min(max(step.s0, step.s1), s + window)
         ended = stepper.restep(step, s)
         for _ in range(_CORRECTIONS):
+            if ended.s1 != s:
+                return ended, False
             x = self._projected(ended)
             zero = np.zeros(self.system.n)
             series = self.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0)
@@ -285,10 +304,12 @@ class SegmentRun:
                 break
             s = corrected
             ended = stepper.restep(step, s)
+        if ended.s1 != s:
+            return ended, False
         if self._is_zero(ended, hit.number, is_monitor):
-            return ended
+            return ended, True
         # the dense output crosses zero and the repeated step does not reach it: go by the dense output
-        return Step(step.s0, on_dense, step.x0, step.dense(np.array([on_dense]))[0], step.dense)
+        return Step(step.s0, on_dense, step.x0, step.dense(np.array([on_dense]))[0], step.dense), True
 
     def _is_zero(self, step: Step, number: int, is_monitor: bool) -> bool:
         """Whether a guard or monitor is zero at the end of a step, within the rounding of state and time."""

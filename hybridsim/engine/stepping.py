@@ -60,6 +60,7 @@ class Step:
     """One accepted step from s0 to s1 (local times) with its dense output.
 
     roots is None where the mode loop locates events itself; else the zeros at s1 that the integrator found.
+    holds, of a method that tests its dense output at the end of a step alone, tests it at a time inside, too.
     """
 
     s0: float
@@ -68,6 +69,7 @@ class Step:
     x1: np.ndarray
     dense: Dense
     roots: tuple[Root, ...] | None = None
+    holds: Callable[[float], bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,10 @@ class Stepper(Protocol):
         """The next accepted step; raises StepFailure."""
 
     def restep(self, step: Step, s: float) -> Step:
-        """The step anew from its start to s exactly: the method's own accuracy at an event time."""
+        """The step anew from its start to s exactly: the method's own accuracy at an event time.
+
+        Where its error there is not within the tolerance, a shorter step, from whose end the next one goes on.
+        """
 
 
 ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a leap ended

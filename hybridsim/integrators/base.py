@@ -53,7 +53,8 @@ class Integrator(ABC):
        negative when time runs backward.
     5. ``step.dense(times)`` takes local times (k,) inside the step to states (k, n) and meets x0 and x1 at its ends.
        Say in ``dense_is_accurate`` whether it is as accurate as the method; if not, give ``stepper.restep(step, s)``,
-       the same step up to s exactly, and event times get the accuracy of the method.
+       the same step up to s exactly, and event times get the accuracy of the method. Where its error up to s is
+       above the tolerance, return a shorter step, from whose end ``step()`` goes on: it is searched anew.
     6. A method that finds zeros by itself returns them in ``step.roots`` and ends its step at them; ``watch`` says
        what to look for and which leading coefficients are zero at the start, by decree.
     7. What a method cannot do stands in ``lacks``: capability (a key of `CAPABILITIES`) to the reason. A model that

@@ -16,6 +16,7 @@ from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
 from hybridsim.engine.trajectory import Pieces
 
 _MOST_PARTS = 64  # of a step that is repeated up to an event
+_SHORTER = 0.5  # factor on a step whose error up to an event is above the tolerance
 
 
 class Point:
@@ -106,11 +107,30 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, self.here.x, self._dense(start, self.here, trial))
 
     def restep(self, step: Step, s: float) -> Step:
-        """The step up to s in one step of exactly that length; in equal parts where its error asks for them."""
-        count = 1
+        """The step up to s in one step of exactly that length, or a shorter one where its error asks for it.
+
+        A law may be steep where an event is and flat on either side of it, which the stages of the longer step missed.
+        What moves by less than the tolerance is taken in equal parts: a law without a slope is not followed further.
+        """
+        start, length = self._point(step.s0, step.x0), s - step.s0
+        trial = self._attempt(start, length)
+        if trial.error <= 1.0:
+            end = self._point(s, trial.x)
+            return Step(step.s0, s, step.x0, trial.x, self._dense(start, end, trial))
+        self.flow.counters.rejected += 1
+        rtol, atol = self.control
+        moves = np.abs(step.dense(np.array([s]))[0] - step.x0)
+        if (moves > atol + rtol * np.abs(step.x0)).any():
+            self.here, self.h = start, _SHORTER * abs(length)
+            return self.step()
+        return self._in_parts(start, s)
+
+    def _in_parts(self, start: Point, s: float) -> Step:
+        """A step up to s in equal parts, as many as its error asks for and no more than there may be."""
+        count = 2
         while True:
-            knots = np.linspace(step.s0, s, count + 1)
-            points, trials = [self._point(step.s0, step.x0)], []
+            knots = np.linspace(start.s, s, count + 1)
+            points, trials = [start], []
             for a, b in pairwise(knots.tolist()):
                 trials.append(self._attempt(points[-1], b - a))
                 points.append(self._point(b, trials[-1].x))
@@ -121,7 +141,7 @@ class OneStepStepper(ABC):
         parts = tuple(
             self._dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
         )
-        return Step(step.s0, s, step.x0, points[-1].x, parts[0] if count == 1 else Pieces(knots, parts))
+        return Step(start.s, s, start.x, points[-1].x, Pieces(knots, parts))
 
     def _first_step(self) -> float:
         """Starting step of Hairer, Norsett and Wanner 1993, section II.4."""

@@ -78,7 +78,6 @@ class ScipyRK23(ScipyIntegrator):
     reference: ClassVar[str] = "Bogacki and Shampine 1989, doi:10.1016/0893-9659(89)90079-7"
     when: ClassVar[str] = "very loose tolerances, 1e-3 and above"
     lacks: ClassVar[dict[str, str]] = _EXPLICIT
-    dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "RK23"
 
 

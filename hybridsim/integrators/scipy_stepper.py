@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.pieces import Pieces
 from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
 
 _SHARE_OF_A_TURN = 0.1  # of the fastest forcing, in radians: what a first step may span
@@ -85,16 +84,15 @@ class SolverStepper:
         return self._advance(self.solver)
 
     def restep(self, step: Step, s: float) -> Step:
-        """From the start of a step to s in one step of exactly that length (more only if it is rejected)."""
+        """From the start of a step to s in one step of exactly that length, or the shorter one taken instead."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
-        parts = [self._advance(solver)]
-        while solver.status == "running":
-            parts.append(self._advance(solver))
-        dense = parts[0].dense
-        if len(parts) > 1:
-            knots = np.array([step.s0, *(part.s1 for part in parts)])
-            dense = Pieces(knots, tuple(part.dense for part in parts))
-        return Step(step.s0, s, step.x0, parts[-1].x1, dense)
+        part = self._advance(solver)
+        if solver.status != "running":
+            return Step(step.s0, s, step.x0, part.x1, part.dense)
+        length = abs(part.s1 - part.s0)
+        self.solver = self._solver(part.s1, part.x1, self.bound, min(length, abs(self.bound - part.s1)))
+        self.reached, self.last_step = (part.s1, part.x1), length
+        return part
 
     def _advance(self, solver: Any) -> Step:
         before = solver.nfev

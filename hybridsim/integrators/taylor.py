@@ -55,7 +55,7 @@ class TaylorStepper:
             last = h >= left - smallest  # what would be left is too short for a step of its own
             h = left if last else h
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
-            if math.isnan(h) or self._holds(coefficients, x1, direction * h):
+            if math.isnan(h) or self._holds(coefficients, self.x, x1, self.s, direction * h):
                 break
             self.flow.counters.rejected += 1
             h *= _SHORTER
@@ -64,25 +64,32 @@ class TaylorStepper:
         s0, x0 = self.s, self.x
         self.s = self.bound if last else s0 + direction * h
         self.x = self.flow.landed(self.s, x1)
-        return Step(s0, self.s, x0, x1, _dense(s0, coefficients))
+        dense = _dense(s0, coefficients)
 
-    def _holds(self, coefficients: np.ndarray, x1: np.ndarray, d: float) -> bool:
-        """Whether the series still satisfies the equation at the end of the step.
+        def holds(s: float) -> bool:
+            return self._holds(coefficients, x0, dense(np.array([s]))[0], s0, s - s0)
+
+        return Step(s0, self.s, x0, x1, dense, holds=holds)
+
+    def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
+        """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.
 
         The terms of a series tell nothing of what is beyond rounding where it starts: a saturated tanh, the other
-        branch of a root.
+        branch of a root, a friction that is larger near rest alone.
         """
         powers = np.arange(1, coefficients.shape[1])
         slope = coefficients[:, 1:] @ (powers * d ** (powers - 1))
-        defect = abs(d) * np.abs(slope - self.flow.rhs(self.s + d, x1))
+        defect = abs(d) * np.abs(slope - self.flow.rhs(s0 + d, x1))
         self.flow.counters.rhs_evaluations += 1
-        scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(self.x), np.abs(x1))
+        scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(x0), np.abs(x1))
         change = np.abs(coefficients[:, 1:]) @ np.abs(d) ** powers
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Not needed: the series is as accurate inside the step as at its end."""
-        raise NotImplementedError("the dense output of a Taylor series is the series")
+        """A shorter step, where the series does not hold at s: where it holds it is as accurate as at its end."""
+        self.flow.counters.rejected += 1
+        self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
+        return self.step()
 
 
 def _dense(s0: float, coefficients: np.ndarray) -> Dense:

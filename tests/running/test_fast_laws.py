@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
+from scipy.integrate import quad
 
 import hybridsim as hs
 
@@ -28,3 +31,39 @@ def test_a_step_repeated_up_to_an_event_keeps_its_error(integrator: str) -> None
     exact = hs.simulate(model, (0, 6), integrator="scipy-radau", rtol=1e-10, max_step=0.01)
     found = hs.simulate(model, (0, 6), integrator=integrator, rtol=1e-9)
     assert found.events[-1].t == pytest.approx(exact.events[-1].t, abs=1e-7)
+
+
+LOCATED = [
+    "dop853", "tsit5", "rodas5p", "taylor", "scipy-rk23", "scipy-rk45", "scipy-dop853", "scipy-radau"
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("watched", [False, True])
+@pytest.mark.parametrize("v_s", [0.1, 0.01, 1e-3])
+@pytest.mark.parametrize("integrator", LOCATED)
+def test_a_law_that_is_steep_only_where_the_body_stops(integrator: str, v_s: float, watched: bool) -> None:
+    """Friction rises within v_s of rest, in the last share v_s of a stretch along which the speed falls evenly.
+
+    A step across it meets the friction at no stage and in no term of a series: (1 - v) = mu_k t before it and, by the
+    law's continuation, after it. The time to rest is the integral of dv/f(v).
+    """
+    low, more = 0.3, 0.3
+    stop, _ = quad(
+        lambda v: 1.0 / (low + more * math.exp(-((v / v_s) ** 2))),
+        0.0,
+        1.0,
+        points=[k * v_s for k in (0.5, 1, 2, 4, 6)],
+        epsabs=1e-13,
+    )
+    law = {"mu_s": low + more, "mu_k": low, "v_s": v_s}
+    contact = hs.Contact("f", velocity="v", normal=1, law="stribeck", arguments=law)
+    model = hs.Model(
+        "braked",
+        states=[hs.State("x", 0, "v"), hs.State("v", 1, "-f")],
+        contacts=[contact],
+        monitors=[hs.Monitor("half", "x - 0.5")] if watched else [],
+    )
+    sol = hs.simulate(model, (0, 5), integrator=integrator, rtol=1e-8)
+    assert [(e.component, e.target) for e in sol.events][-1] == ("f", "stick")
+    assert sol.events[-1].t == pytest.approx(stop, abs=3e-7)
+    assert len(sol.events) == (2 if watched else 1)

@@ -60,3 +60,16 @@ def test_a_state_that_grows() -> None:
 def test_a_start() -> None:
     sol = hs.simulate(model(rate="log(x - 2)"), (0.0, 2.0), integrator="dop853")
     assert not sol.success and "the rate of x is not a number" in sol.message
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_corner(name: str) -> None:
+    """exp(-1/u**2) has no value where u = max(x, 0) is nothing: which of two is larger cannot be told from there on."""
+    nested = hs.Model(
+        "nested",
+        states=[hs.State("x", 1, "-1"), hs.State("y", 0, "max(-0.5 - x, exp(-1/max(x, 0)**2))")],
+    )
+    sol = hs.simulate(nested, (0.0, 3.0), integrator=name)
+    assert sol.status == "step-failure"
+    assert "max(-0.5 - x, exp(-1/max(x, 0)**2)) in mode + is not a number" in sol.message
+    assert sol.t_end == pytest.approx(1.0)
