@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -17,18 +17,21 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.errors import UsageError
+from hybridsim.model.impact import SPEED
+from hybridsim.model.one_sided import number_of
 from hybridsim.model.switching import ATTRACTION
 from hybridsim.model.units import rate_of, time_unit, unit_of, units_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
+    from hybridsim.model.component import Choice
     from hybridsim.solution.event import Event
     from hybridsim.solution.solution import Solution
 
 _LEGEND = """\
   (a mode lasts while its guards g are >= 0; g', g'' are their rates along the motion in that mode, and the first that
-  is not zero decides; by decree: the event itself makes it zero, so that it is not measured)"""
+  is not zero decides; exactly: the event itself makes it zero, so that there is no rounding in it)"""
 _WORDS = {FINE: "admissible", LEAVES: "not admissible"}
 _SERIES = 12  # events that are looked at to say how they accumulated
 
@@ -41,7 +44,7 @@ class GuardView:
     ----------
     mode, guard, text : whose guard it is, and its expression.
     derivatives, bounds : its value and derivatives with respect to time (4,), and bounds of their rounding errors.
-    decreed : how many of them, from the first on, are zero by decree and not looked at.
+    decreed : how many of them, from the first on, the event itself makes zero: they are not looked at.
     side : its sign just after, 0 where that is a question of rounding; order : of the derivative that decides.
     units : of the guard and its derivatives (4,), empty where they are not known.
     """
@@ -63,7 +66,7 @@ class GuardView:
         for k, (value, bound) in enumerate(zip(self.derivatives, self.bounds, strict=True)):
             name, unit = "g" + "'" * k, f" {self.units[k]}" if self.units[k] else ""
             if k < self.decreed:
-                terms.append(f"{name} = 0 by decree")
+                terms.append(f"{name} = 0 exactly")
             elif k == self.order:
                 terms.append(f"{name} = {value:.3g}{unit}")
                 break
@@ -188,10 +191,23 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     forward = solution._run.task.forward
     settling = _Watched(solution._system, at, at.z.copy(), forward)
     settling.seen = []
-    x_minus, choices = at.x.copy(), _choices(solution, event, at)
+    x_minus, x_error, choices = at.x.copy(), at.x_error.copy(), _choices(solution, event, at)
+    then, taken = _taken(solution, event, at)
+    resets = then[taken].reset if then else {}
     outcome = settling.run(fired, [])
-    candidates = tuple(_candidate(settling, outcome, *one) for one in settling.seen)
-    reason = _reason(solution, occurrence, settling, outcome, x_minus)
+    owners = {int(solution._system.owner[g]) for g in fired}
+    touched = owners | set(np.flatnonzero(outcome.z != segment.z).tolist())
+    seen = [one for one in settling.seen if touched & set(one[1])]
+    candidates = tuple(_candidate(settling, outcome, *one) for one in seen)
+    moved = np.abs(outcome.x - x_minus) > 2.0 * x_error  # less is what rounding left of a zero, set exactly
+    changed = ", ".join(
+        f"{name} from {a:.6g} to {b:.6g}"
+        + (f" (= {resets[name].text})" if name in resets and resets[name].names else "")
+        for name, a, b, has_moved in zip(solution.names, x_minus, outcome.x, moved, strict=True)
+        if has_moved
+    )
+    blow = next((view for view in views if view.mode.startswith(f"{event.component} ")), None)
+    reason = _reason(solution, occurrence, settling, outcome, changed, choices, blow)
     return Explanation(event, views, candidates, reason, state, choices)
 
 
@@ -243,21 +259,29 @@ def _with_unit(value: float, unit: str) -> str:
     return f"{value:.6g} {unit}".rstrip()
 
 
-def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
-    """The ordered choice of the guard that fired, if it has more than one: conditions, values, and what was taken."""
-    model, system = solution.model, solution._system
-    component = next((k for k in model.all_components() if k.name == event.component), None)
+def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
+    """The ordered choice of the guard that fired, and the place in it of what was taken; empty where it has none."""
+    component = next((c for c in solution.model.all_components() if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
-    if component is None or mode is None or guard is None or len(guard.then) < 2:
+    if component is None or mode is None or guard is None or not guard.then:
+        return (), 0
+    system = solution._system
+    number = [a.name for a in system.automata].index(event.component)
+    place = component.modes.index(mode), mode.guards.index(guard)
+    return guard.then, system.choose(number, *place, at.s, at.x, at.p, at.z)
+
+
+def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
+    """The ordered choice of the guard that fired, if it has more than one: conditions, values, and what was taken."""
+    then, taken = _taken(solution, event, at)
+    if len(then) < 2:
         return ()
-    numbers = [a.name for a in system.automata].index(event.component)
-    place = component.modes.index(mode)
-    taken = system.choose(numbers, place, mode.guards.index(guard), at.s, at.x, at.p, at.z)
+    model = solution.model
     known = dict(zip(solution.names, event.x_minus.tolist(), strict=True)) | model.parameter_values()
     units = units_of(model) | {q.name: q.unit for q in model.parameters}
     lines = []
-    for k, choice in enumerate(guard.then):
+    for k, choice in enumerate(then):
         said = "in all other cases"
         if choice.when is not None:
             read = [n for n in sorted(choice.when.names) if n in known]
@@ -266,6 +290,23 @@ def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]
         came = "does not hold" if k < taken else "holds, and is taken" if k == taken else "is not reached"
         lines.append(f"{said}: {came} -> {choice.to}")
     return tuple(lines)
+
+
+def _restitution(solution: Solution, settling: _Watched, outcome: Outcome, c: int, blow: GuardView) -> str:
+    """How fast a gap closed and how fast it opens, and by which restitution."""
+    system, automaton = settling.system, settling.system.automata[c]
+    declared = next(i for i in solution.model.impacts if i.name == automaton.name).restitution
+    z = outcome.z.copy()
+    z[c] = 1 - automaton.hold  # open: it alone has the gap for a guard
+    guard = automaton.guards[z[c]][0]
+    at = replace(settling.at, x=outcome.x)
+    (after,) = _views(system, at, z, [guard], np.zeros(system.guard_count, int))
+    before, unit = -blow.derivatives[1], blow.units[1]
+    known = solution.model.parameter_values() | {SPEED: before}
+    value = number_of(declared.tree, known, {n: expr.tree for n, expr in solution.model.definitions}.get)
+    e = declared.text if value is None or not declared.names else f"{declared.text} = {value:.6g}"
+    speeds = [f"{max(speed, 0.0):.6g} {unit}".rstrip() for speed in (before, after.derivatives[1])]
+    return f" with restitution {e}, the gap closing at {speeds[0]} and opening at {speeds[1]}"
 
 
 def _of_another_kind(solution: Solution, event: Event) -> str:
@@ -375,7 +416,13 @@ def _candidate(
 
 
 def _reason(
-    solution: Solution, occurrence: Occurrence, settling: _Watched, outcome: Outcome, x_minus: np.ndarray
+    solution: Solution,
+    occurrence: Occurrence,
+    settling: _Watched,
+    outcome: Outcome,
+    changed: str,
+    choices: tuple[str, ...],
+    blow: GuardView | None,
 ) -> str:
     system = settling.system
     if outcome.status:
@@ -384,18 +431,15 @@ def _reason(
     c = names.index(occurrence.component)
     automaton = system.automata[c]
     after = automaton.modes[outcome.z[c]]
-    changed = ", ".join(
-        f"{name} from {a:.6g} to {b:.6g}"
-        for name, a, b in zip(system.names, x_minus, outcome.x, strict=True)
-        if a != b
-    )
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
         if after != occurrence.target:  # the run had it closer to the rounding of its own steps
             return f"an impact after which the gap opens by less than its rounding: {occurrence.target} from here on"
-        return f"an impact: its impulses change {changed}; {after} just after"
+        said = _restitution(solution, settling, outcome, c, blow) if blow else ""
+        return f"an impact{said}: its impulses change {changed}; {after} just after"
     if not automaton.has_surface:
         reset = f", with {changed}" if changed else ""
-        return f"the first choice of guard {occurrence.guard} whose condition held leads to {occurrence.target}{reset}"
+        first = "the first choice of guard {} whose condition held leads" if choices else "guard {} leads"
+        return f"{first.format(occurrence.guard)} to {occurrence.target}{reset}"
     admissible = [z for z, members, verdict, _ in settling.seen if c in members and verdict == FINE]
     if len(admissible) == 1:
         members = next(m for z, m, verdict, _ in settling.seen if c in m and verdict == FINE)

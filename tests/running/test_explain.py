@@ -35,7 +35,7 @@ def test_a_release_at_equal_coefficients_is_decided_by_the_second_derivative(int
     assert (released.decreed, released.order, released.side) == (2, 2, 1)
     assert released.derivatives[2] == pytest.approx(jerk, rel=1e-9)
     assert why.reason == "slip+ is the only mode that is admissible just after"
-    assert "g = 0 by decree, g' = 0 by decree, g'' =" in str(why)
+    assert "g = 0 exactly, g' = 0 exactly, g'' =" in str(why)
 
 
 def test_a_release_with_a_drop_of_friction_is_decided_by_the_first() -> None:
@@ -153,3 +153,60 @@ def test_joint_decisions_and_schedules_are_named() -> None:
     assert not any("is undecided" in text for text in texts)  # the load of a clutch that is not engaged is 0
     assert not any("rule of the integrator's own" in text for text in texts)
     assert "how fast its two sides drive towards it" in str(hs.simulate("relay-pair", (0.0, 1.0)).explain(0))
+
+
+FALLING = """
+name = "falling"
+[parameters]
+e = { value = 0.5 }
+[states]
+h = { start = 1, der = "w", unit = "m" }
+w = { start = 0, der = "-9.81 + p", unit = "m/s" }
+x = { start = 0, der = "v" }
+v = { start = 0, der = "0.1*sin(t) - x - f" }
+y = { start = 0, der = "u" }
+u = { start = 1, der = "-g" }
+[impacts.p]
+gap = "h"
+restitution = "e"
+[contacts.f]
+velocity = "v"
+normal = 1
+law = { name = "coulomb", mu = 0.3 }
+[contacts.g]
+velocity = "u"
+normal = "p"
+law = { name = "coulomb", mu = 0.3 }
+"""
+
+
+def test_an_impact_names_its_restitution_and_both_speeds() -> None:
+    model = hs.Model.from_toml(FALLING)
+    sol = hs.simulate(model, (0.0, 0.6), integrator="scipy-dop853")
+    reason = sol.explain(0).reason
+    speed = (2 * 9.81) ** 0.5
+    assert (
+        f"restitution e = 0.5, the gap closing at {speed:.6g} m/s and opening at {speed / 2:.6g} m/s"
+        in reason
+    )
+    assert f"w from {-speed:.6g} to {speed / 2:.6g}" in reason
+    assert "h from" not in reason  # what rounding left of the gap is no change
+
+
+def test_a_restitution_of_the_speed_has_its_value_at_this_speed() -> None:
+    model = hs.Model.from_toml(FALLING.replace('restitution = "e"', 'restitution = "e/(1 + speed)"'))
+    sol = hs.simulate(model, (0.0, 0.6), integrator="scipy-dop853")
+    value = 0.5 / (1.0 + (2 * 9.81) ** 0.5)
+    assert f"restitution e/(1 + speed) = {value:.6g}," in sol.explain(0).reason
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_an_impact_lists_what_it_touches_alone(e: float) -> None:
+    sol = hs.simulate(hs.Model.from_toml(FALLING), (0.0, 0.6), params={"e": e}, integrator="scipy-dop853")
+    why = sol.explain(next(event for event in sol.events if event.component == "p"))
+    assert why.candidates and all("f" not in candidate.modes for candidate in why.candidates)
+
+
+def test_a_reset_says_its_formula() -> None:
+    sol = hs.simulate("impact-oscillator", (0.0, 5.0), integrator="scipy-dop853")
+    assert "(= -e*v)" in sol.explain(0).reason
