@@ -1,4 +1,4 @@
-"""What a run of a mechanical system gives back: a `Solution` in all but the tables."""
+"""What a run of a mechanical system gives back."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.packs import packed
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LOST
+from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.run import STATUS, new_room, new_state, reach_kernels
 from hybridsim.mechanics.trajectory import Pieces, instants, quantities
 from hybridsim.solution import Event, ModeInterval
@@ -23,7 +24,7 @@ _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
 _GUARDS = {-1: "", 0: "velocity", 1: "upper", 2: "lower"}
 
 
-class MechanicalSolution:
+class MechanicalSolution(ArraysResult):
     """The result of simulating a `MechanicalSystem`; ``sol(t)`` is the dense output, positions before velocities.
 
     Attributes
@@ -68,11 +69,6 @@ class MechanicalSolution:
         self._contact_of = run.built.contacts
 
     # -- trajectory -----------------------------------------------------------------------------------------
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the states, in the order of the rows of y."""
-        return (*self.model.names, *self.model.velocities)
 
     @cached_property
     def _pieces(self) -> Pieces:
@@ -174,7 +170,7 @@ class MechanicalSolution:
             contacts = [c.name for c in self.model.contacts]
             own = name.removeprefix("v_rel(").removesuffix(")")
             if own not in contacts:
-                known = [*self.names, *contacts, *(f"v_rel({c})" for c in contacts)]
+                known = [*self.names, *self.quantities]
                 raise UsageError(
                     f"{self.model.name} has no quantity {name!r}",
                     remedy=nearest(name, known, kind="quantities"),
@@ -184,6 +180,15 @@ class MechanicalSolution:
             both = self._quantities(times, right, self._pieces.states(times, right))
             values = both[0 if own == name else 1][:, column]
         return values[0] if np.ndim(given) == 0 else values
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what `output` knows beside the states: friction forces, relative velocities."""
+        contacts = [c.name for c in self.model.contacts]
+        return (*contacts, *(f"v_rel({c})" for c in contacts))
+
+    def _values(self, name: str, t: np.ndarray, right: bool) -> np.ndarray:
+        return self.output(name, t, "+" if right else "-")
 
     # -- events and modes -----------------------------------------------------------------------------------
 
@@ -214,12 +219,6 @@ class MechanicalSolution:
                 ModeInterval(_MODES[z], a, b) for z, a, b in zip(numbers, times[:-1], times[1:], strict=True)
             )
         return found
-
-    def _require_events(self) -> None:
-        if self._save == "nothing":
-            raise UsageError(
-                "the run was made with save='nothing', which keeps no events", remedy="save='events'"
-            )
 
     # -- how it went ----------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.stepped_kernels import BOUNCES, STEPS, SWEEPS, UNSETTLED
 from hybridsim.mechanics.stepped_plant import directions
 from hybridsim.solution import Event, ModeInterval
@@ -19,7 +20,7 @@ _CONTACT, _IMPACT = {0: "stick", 1: "slip+", -1: "slip-"}, {0: "closed", 1: "ope
 _WORKS = ("forcing", "damping", "friction", "bases", "impacts")
 
 
-class SteppedSolution:
+class SteppedSolution(ArraysResult):
     """The result of simulating a `MechanicalSystem` by ``moreau``; ``sol(t)`` is linear in the velocities of a step.
 
     Attributes
@@ -59,11 +60,6 @@ class SteppedSolution:
         self._parts = run.system.all_contacts
 
     # -- trajectory -----------------------------------------------------------------------------------------
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the states, in the order of the rows of y."""
-        return (*self.model.names, *self.model.velocities)
 
     @property
     def t_start(self) -> float:
@@ -153,11 +149,20 @@ class SteppedSolution:
             values = (directions(self.model)[[k]] @ (x[n:] if name in speeds else x[:n])).ravel()
             values = values - self._base(k, times) if name in speeds else values + self._run.plant.gap[k - nc]
         else:
-            known = [*self.names, *names, *speeds, *gaps]
+            known = [*self.names, *self.quantities]
             raise UsageError(
                 f"{self.model.name} has no quantity {name!r}", remedy=nearest(name, known, kind="quantities")
             )
         return values[0] if np.ndim(given) == 0 else values
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what `output` knows beside the states: forces, relative velocities, gaps."""
+        speeds = (f"v_rel({contact.name})" for contact in self.model.contacts)
+        return (*(p.name for p in self._parts), *speeds, *(f"gap({i.name})" for i in self.model.impacts))
+
+    def _values(self, name: str, t: np.ndarray, right: bool) -> np.ndarray:
+        return self.output(name, t)
 
     def _base(self, c: int, times: np.ndarray) -> np.ndarray:
         plant = self._run.plant
@@ -209,12 +214,6 @@ class SteppedSolution:
                 if b > a or len(numbers) == 1
             )
         return found
-
-    def _require_events(self) -> None:
-        if self._save == "nothing":
-            raise UsageError(
-                "the run was made with save='nothing', which keeps no events", remedy="save='events'"
-            )
 
     # -- how it went ----------------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
 from hybridsim.plot.orbit import draw_orbit
+from hybridsim.plot.pieces import refuse_arrays
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +31,7 @@ def friction_loop(
     t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
     axes : where to draw; a new figure if not given.
     """
+    refuse_arrays(solution)
     model = solution.model
     if output is None:
         names = [

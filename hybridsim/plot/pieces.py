@@ -5,13 +5,14 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.system import MechanicalSystem
 from hybridsim.model.units import units_of
 
 if TYPE_CHECKING:
@@ -42,6 +43,15 @@ class Window:
     t0: float
     t1: float
     note: str = ""
+
+
+def refuse_arrays(solution: Any) -> None:
+    """Refuse the result of a `MechanicalSystem`, which has no units, no period and no look of its own."""
+    if isinstance(solution.model, MechanicalSystem):
+        raise UsageError(
+            f"{type(solution).__name__} of {solution.model.name} is not drawn by this",
+            remedy="run to_model() of the system and draw that; or draw columns of sol.to_pandas() by its plot()",
+        )
 
 
 def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:

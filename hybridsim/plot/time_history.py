@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from hybridsim.errors import UsageError
 from hybridsim.model.units import time_unit, units_of
 from hybridsim.plot import style
-from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, unit_of, window_of
+from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, refuse_arrays, unit_of, window_of
 from hybridsim.plot.scale import label_axis
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def time_history(
     t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
     axes : where to draw: one for each quantity, one more if the model has components; new if not given.
     """
+    refuse_arrays(solution)
     model = solution.model
     names = list(units_of(model))[:_MOST_QUANTITIES] if quantities is None else list(quantities)
     units = [unit_of(solution, name) for name in names]

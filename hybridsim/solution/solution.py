@@ -11,13 +11,11 @@ import numpy as np
 
 from hybridsim.errors import UsageError, nearest
 from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.solution.in_tables import InTables
 from hybridsim.solution.summary import in_html, in_words
-from hybridsim.tables import Table, event_columns, event_frame
+from hybridsim.tables import Table
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
-
     from hybridsim.engine.chain import SegmentChain
     from hybridsim.engine.pieces import Segment
     from hybridsim.engine.trajectory import Trajectory
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
 _GOOD = ("finished", "terminated")
 
 
-class Solution:
+class Solution(InTables):
     """The result of `simulate`; ``sol(t)`` is the dense output.
 
     Attributes
@@ -438,36 +436,9 @@ class Solution:
     # -- tables ---------------------------------------------------------------------------------------------
 
     def table(self, points: int | None = None) -> Table:
-        """Times, states, outputs and modes in columns: what all the forms below are made of.
-
-        Parameters
-        ----------
-        points : how many equal steps of time to take, both ends included; without it ``sol.t``: the integrator's own
-            steps with each event time twice, on both its sides, or the grid of `simulate`.
-        """
         from hybridsim.solution.tabulated import tabulated
 
         return tabulated(self, points)
-
-    def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write the `table` as CSV."""
-        self.table(points).to_csv(path)
-
-    def to_npz(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write the `table` and the events for `numpy.load`: ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
-        self.table(points).to_npz(path, event_columns(self.events, self.names))
-
-    def to_pandas(self, points: int | None = None) -> pd.DataFrame:
-        """The `table` as a data frame over t; modes are categorical, units stand in its ``attrs``."""
-        return self.table(points).to_pandas()
-
-    def to_xarray(self, points: int | None = None) -> xr.Dataset:
-        """The `table` as a data set over t; modes are coordinates, each variable has its unit in its ``attrs``."""
-        return self.table(points).to_xarray()
-
-    def events_to_pandas(self) -> pd.DataFrame:
-        """The events as a data frame, one row each: t, kind, component, ..., the states before and after."""
-        return event_frame(self.events, self.names)
 
     def __repr__(self) -> str:
         return in_words(self)

@@ -14,10 +14,15 @@ if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution
 
 
+def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
+    """Times (points,) at equal steps, both ends included."""
+    if points < 2:
+        raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
+    return np.linspace(t0, t1, points)
+
+
 def tabulated(solution: Solution, points: int | None) -> Table:
     """The table of a solution; see `Solution.table`."""
-    if points is not None and points < 2:
-        raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
     model, own_steps = solution.model, points is None and solution._grid is None
     if own_steps:
         t, ends = solution.t, np.cumsum([len(g.s) for g in solution._segments], dtype=int)
@@ -26,7 +31,7 @@ def tabulated(solution: Solution, points: int | None) -> Table:
             (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(solution._segments, ends, strict=True)
         ]
     else:
-        t = solution.t if points is None else np.linspace(solution.t_start, solution.t_end, points)
+        t = solution.t if points is None else equal_steps(solution.t_start, solution.t_end, points)
         x, pieces = solution._pieces(t, "+") if len(t) else (np.zeros((0, len(solution.names))), [])
     names = [d.name for d in model.discrete]
     names += [q for q in solution._system.quantities if " in " not in q]
