@@ -127,7 +127,8 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
         off = np.abs(a - b) / (np.ptp(a, axis=1, keepdims=True) + 1e-300)
         off[~np.isfinite(off)] = 0.0
         row = int(off.max(axis=1).argmax()) if off.max() > 1e-6 else 0
-        seen = off[row] > 0.3 * off[row].max()
+        # where it is first seen beside the true motion, not where it has left the picture
+        seen = off[row] > 0.3 * min(off[row].max(), 1.0)
         centre = float(t[seen.argmax()]) if seen.any() and off.max() > 0 else first
     window = _window(first, last, centre, min(WIDTH * scene.unit, last - first))
     inside = _events(right, window)
