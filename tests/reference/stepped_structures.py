@@ -138,10 +138,13 @@ def one_of_all(
 
 
 @numba.njit(cache=True)
-def march(plan, q0, v0, end, samples, per):
-    """Positions and heat at equal times, (samples + 1, m + 1), and the number of steps whose forces did not settle."""
+def march(plan, q0, v0, end, samples, steps):
+    """Positions and heat at equal times, (samples + 1, m + 1), and the number of steps whose forces did not settle.
+
+    Inside a step the positions are on the two straight lines that it takes, the heat on one.
+    """
     m, E, A = plan.mass.shape[0], plan.kinds.shape[0], plan.machines.shape[0]
-    h = end / (samples * per)
+    h = end / steps
     left = np.diag(plan.mass) + 0.5 * h * plan.damping
     inverse = np.linalg.inv(left)
     right = np.diag(plan.mass) - 0.5 * h * plan.damping
@@ -152,16 +155,18 @@ def march(plan, q0, v0, end, samples, per):
     before = np.zeros(E)
     impulse, low, high, hold_low, hold_high = np.zeros(E), np.zeros(E), np.zeros(E), np.zeros(E), np.zeros(E)
     target, path, rows, active = np.zeros(E), np.zeros((E, m)), np.zeros((E, m)), np.zeros(E, dtype=np.bool_)
-    unsettled, now = 0, np.zeros(E, dtype=np.int64)
+    unsettled, place, now = 0, 1, np.zeros(E, dtype=np.int64)
+    cold = heat.copy()
     for j in range(E):
         if plan.kinds[j] != STOP:
             s = plan.offsets[j]
             for i in range(m):
                 s += plan.rows[j, i] * v[i] + plan.shifts[j, i] * q[i]
             before[j] = np.sign(s)
-    for step in range(samples * per):
+    for step in range(steps):
         t = (step + 0.5) * h
         middle = q + 0.5 * h * v
+        cold[:] = heat
         for k in range(A):
             on[k] = switched(plan.machines[k], on[k], middle, v)
         force = -(plan.stiffness @ middle)
@@ -299,12 +304,16 @@ def march(plan, q0, v0, end, samples, per):
             before[j] = now[j]
             if plan.kinds[j] == RELAY and not (plan.rows[j] * moves[j]).sum() < 0.0:
                 before[j] = np.sign((rows[j] * new).sum() - target[j])
-        q = middle + 0.5 * h * new
-        v = new
-        if (step + 1) % per == 0:
-            place = (step + 1) // per
-            out[place, :m] = q
+        after = middle + 0.5 * h * new
+        while place <= samples and place * steps <= (step + 1) * samples:
+            share = place * steps / samples - step  # of the step
+            if share <= 0.5:
+                out[place, :m] = q + 2.0 * share * (middle - q)
+            else:
+                out[place, :m] = middle + (2.0 * share - 1.0) * (after - middle)
             for k in range(A):
                 if plan.machines[k, 0] == THERMOSTAT:
-                    out[place, m] = heat[k]
+                    out[place, m] = cold[k] + share * (heat[k] - cold[k])
+            place += 1
+        q, v = after, new
     return out, unsettled

@@ -17,18 +17,15 @@ STATUSES = {
     "finished", "terminated", "nonunique", "inconsistent", "cascade", "accumulation", "step-failure", "limit",
 }  # fmt: skip  # of a run forward that nobody interrupts
 SAMPLES = 100
-STEPS = (
-    20,
-    43,
-    89,
-    173,
-    353,
-    709,
-)  # between samples; none a multiple of another, so that no instant is met by all
+# All prime: no instant but the start and the end is met by all, neither an event nor a sample, as what all do alike is
+# not in their differences. What happens in the first step of all is told apart by the last ones.
+STEPS = (2003, 4327, 8923, 17317, 35311, 70901, 142007, 284003, 568019)
 FACTOR = 3.0  # of what the error of a method of first order is by its own differences
-RESOLVED = 0.02  # of the motion
+AIM, RESOLVED = 0.005, 0.02  # of the motion: what is refined for, and what is good enough in the end
 FLOOR = 1e-7  # the tolerances of the runs, as they grow
 NUDGE, GROWTH = 1e-5, 300.0  # what makes a motion sensitive
+SAME = 1e-6  # a thousand times the tolerance: what two runs may differ by where the motion does not enlarge errors
+_FINE = 5  # of the numbers of steps, the one at which it is seen whether a motion is sensitive
 
 
 class Verdict(NamedTuple):
@@ -51,7 +48,8 @@ def all_draws(s: Structure, draws: int, seed: int) -> tuple[str, list[Verdict]]:
         names = ["dop853", "taylor"]
         if takes(model, s.draw(np.random.default_rng([seed, s.number, 0])), "exact"):
             names.append("exact")
-        return "", [one_draw(s, model, k, seed, names[k % len(names)]) for k in range(draws)]
+        pairs = [(names[k % len(names)], names[(k + 1) % len(names)]) for k in range(draws)]
+        return "", [one_draw(s, model, k, seed, *pair) for k, pair in enumerate(pairs)]
     except hs.ModelError as refusal:
         return str(refusal), []
 
@@ -65,21 +63,15 @@ def takes(model: hs.Model, draw: Draw, integrator: str) -> bool:
     return True
 
 
-def one_draw(s: Structure, model: hs.Model, number: int, seed: int, integrator: str) -> Verdict:
-    """Run a draw and judge it."""
+def one_draw(s: Structure, model: hs.Model, number: int, seed: int, integrator: str, other: str) -> Verdict:
+    """Run a draw and judge it, and hold it against another integrator, which may be wrong where this one is not."""
     draw = s.draw(np.random.default_rng([seed, s.number, number]))
-    options: dict[str, Any] = INTEGRATORS[integrator]
     try:
-        sol = hs.simulate(
-            model,
-            (0.0, END),
-            params=draw.params,
-            x0=draw.start,
-            integrator=integrator,
-            limits={"seconds": 30.0, "events": 50_000},
-            **options,
-        )
+        sol = run(model, draw, integrator)
         kind, detail = judged(s, draw, sol)
+        if kind == "agrees":
+            apart = distance(s, draw, sol, run(model, draw, other))
+            kind, detail = ("disagrees", f"{other}: {apart}") if apart else (kind, detail)
     except hs.ModelError:
         raise
     except Exception as error:  # of any kind: a run that raises is a verdict, and the other draws go on
@@ -87,6 +79,47 @@ def one_draw(s: Structure, model: hs.Model, number: int, seed: int, integrator: 
     return Verdict(
         number, integrator, sol.status, kind, detail, sol.message, len(sol.events), tuple(sol.warnings)
     )
+
+
+def run(model: hs.Model, draw: Draw, integrator: str) -> hs.Solution:
+    """The run of a draw by one of our integrators."""
+    options: dict[str, Any] = INTEGRATORS[integrator]
+    return hs.simulate(
+        model,
+        (0.0, END),
+        params=draw.params,
+        x0=draw.start,
+        integrator=integrator,
+        limits={"seconds": 30.0, "events": 50_000},
+        **options,
+    )
+
+
+def distance(s: Structure, draw: Draw, one: hs.Solution, other: hs.Solution) -> str:
+    """How two of our runs differ by more than a change of the start by `SAME` makes; empty where they do not."""
+    m, end = s.masses, min(float(one.t[-1]), float(other.t[-1]))
+    times = np.linspace(0.0, end, SAMPLES + 1)
+    off = grown(np.array([one(t)[: 2 * m : 2] - other(t)[: 2 * m : 2] for t in times]))
+    if (off > SAME).any():
+        wrong = off > SAME * np.maximum(growth_of(draw, end, m), 1.0)
+        if wrong.any():
+            return f"apart by {off[-1]:.2g}, from t = {times[wrong][0]:.4g} on"
+    if one.status != other.status and "limit" not in (one.status, other.status):
+        return f"{other.status} at t = {other.t[-1]:.6g}, where {one.status} at t = {one.t[-1]:.6g}"
+    return ""
+
+
+def growth_of(draw: Draw, end: float, width: int) -> np.ndarray:
+    """By how much the other method enlarges a small change of the start up to each time, the most of four."""
+    q, v = draw.positions
+    rng = np.random.default_rng(0)
+    plain, _ = march(draw.plan, q, v, end, SAMPLES, STEPS[_FINE])
+    growth = np.zeros(SAMPLES + 1)
+    for _ in range(4):
+        dq, dv = rng.choice([-1.0, 1.0], len(q)), rng.choice([-1.0, 1.0], len(v))
+        out, _ = march(draw.plan, q + NUDGE * dq, v + NUDGE * dv, end, SAMPLES, STEPS[_FINE])
+        growth = np.maximum(growth, grown((out - plain)[:, :width]) / NUDGE)
+    return growth
 
 
 def judged(s: Structure, draw: Draw, sol: hs.Solution) -> tuple[str, str]:
@@ -106,14 +139,15 @@ def judged(s: Structure, draw: Draw, sol: hs.Solution) -> tuple[str, str]:
     scale = max(float(np.abs(ours).max()), 0.1)
     runs: list[np.ndarray] = []
     detail = ""
-    for per in STEPS:
-        out, unsettled = march(draw.plan, *draw.positions, end, SAMPLES, per)
+    for steps in STEPS:
+        out, unsettled = march(draw.plan, *draw.positions, end, SAMPLES, steps)
         runs.append(out[:, :width])
         if len(runs) < 3:
             continue
         bound, off = bounds(runs), grown(runs[-1] - ours)
-        detail = f"off {off[-1]:.2g}, bound {bound[-1]:.2g} with {per * SAMPLES} steps, {unsettled} unsettled"
-        if (off <= bound).all() and bound[-1] <= FACTOR * RESOLVED * scale:
+        detail = f"off {off[-1]:.2g}, bound {bound[-1]:.2g} with {steps} steps, {unsettled} unsettled"
+        enough = RESOLVED if steps == STEPS[-1] else AIM
+        if (off <= bound).all() and bound[-1] <= FACTOR * enough * scale:
             return premature(s, draw, sol, runs[-1], bound) or ("agrees", detail)
     return unresolved(draw, end, runs, ours, scale, detail)
 
@@ -154,13 +188,7 @@ def unresolved(
     draw: Draw, end: float, runs: list[np.ndarray], ours: np.ndarray, scale: float, detail: str
 ) -> tuple[str, str]:
     """What a run is that does not agree to the end: sensitive, not to be decided, or wrong."""
-    q, v = draw.positions
-    rng = np.random.default_rng(0)
-    growth = np.zeros(SAMPLES + 1)
-    for _ in range(4):
-        dq, dv = rng.choice([-1.0, 1.0], len(q)), rng.choice([-1.0, 1.0], len(v))
-        out, _ = march(draw.plan, q + NUDGE * dq, v + NUDGE * dv, end, SAMPLES, STEPS[-1])
-        growth = np.maximum(growth, grown(out[:, : ours.shape[1]] - runs[-1]) / NUDGE)
+    growth = growth_of(draw, end, ours.shape[1])
     off, bound = grown(runs[-1] - ours), bounds(runs)
     is_sensitive = growth > GROWTH
     is_open = bound > FACTOR * RESOLVED * scale

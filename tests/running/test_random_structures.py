@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from reference.random_structures import END, structure
-from reference.structure_judge import all_draws, judged
+from reference.structure_judge import all_draws, distance, judged, run
 
 import hybridsim as hs
 
@@ -29,6 +29,8 @@ def test_the_judge_sees_a_run_of_other_numbers() -> None:
     other = {**draw.params, name: 0.9 * draw.params[name]}
     wrong = hs.simulate(model, (0.0, END), params=other, x0=draw.start, integrator="dop853")
     assert judged(s, draw, wrong)[0] == "disagrees"
+    assert not distance(s, draw, right, right)
+    assert "apart by" in distance(s, draw, right, wrong)
 
 
 @pytest.mark.parametrize(("number", "draw_number"), [(138, 8), (169, 20)])
@@ -40,3 +42,21 @@ def test_neighbours_without_a_motion_are_no_obstacle(number: int, draw_number: i
     sol = hs.simulate(model, (0.0, END), params=draw.params, x0=draw.start, integrator="exact")
     assert sol.status == "finished"
     assert judged(s, draw, sol)[0] == "agrees"
+
+
+@pytest.mark.parametrize(("number", "draw_number", "integrator"), [(132, 47, "exact"), (114, 15, "dop853")])
+def test_what_all_steppings_do_alike_is_no_error_of_ours(
+    number: int, draw_number: int, integrator: str
+) -> None:
+    """An event 1.5e-5 before a sample, and one 1e-4 after the start: less than most steps."""
+    s = structure(number, SEED)
+    draw = s.draw(np.random.default_rng([SEED, number, draw_number]))
+    assert judged(s, draw, run(hs.Model.from_toml(s.toml), draw, integrator))[0] == "agrees"
+
+
+def test_friction_that_rises_only_near_rest_is_met_by_series() -> None:
+    """Two integrators, of which one went through the rise of Stribeck's law in one step, and a monitor beside it."""
+    s = structure(188, SEED)
+    draw = s.draw(np.random.default_rng([SEED, 188, 41]))
+    model = hs.Model.from_toml(s.toml)
+    assert not distance(s, draw, run(model, draw, "taylor"), run(model, draw, "dop853"))
