@@ -206,9 +206,9 @@ def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
         return  # it decides by itself, and takes no derivative
     for power in velocity_powers(model):
         raise UsageError(
-            f"{method.name} cannot run {model.name}: '{power.text}' in {power.where} is a fractional power of the "
-            f"velocity of contact {power.contact}, which has no Taylor series where the contact sticks, so that stick "
-            "and slip cannot be told apart there",
+            f"{method.name} cannot run {model.name}: '{power.text}' in {power.where} is a root of the "
+            f"velocity of contact {power.contact}, or a power of it that is not written as a whole number: it has no "
+            "Taylor series where the contact sticks, so that stick and slip cannot be told apart there",
             place=power.place,
             remedy=f"{power.remedy}; or choose integrator='moreau', step=..., which takes no derivatives",
         )

@@ -275,6 +275,7 @@ def moreau_step(
     if has_impacts and not approach(functions[7], table, s, h, x, p, z, room):
         return _AMISS
     if not implicit_matrix(functions[0], theta, h, s, x, p, room, counts):
+        out[:] = math.nan
         return _UNSETTLED
     put(x, X)
     is_done = False

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VelocityPower:
-    """A root or a power whose exponent is no whole number, of what is zero where a contact sticks.
+    """A root or a power whose exponent is not written as a whole number, of what is zero where a contact sticks.
 
     Parameters
     ----------
@@ -125,14 +125,15 @@ def _judged(
 ) -> Iterator[VelocityPower]:
     for one in candidates:
         power = 0.5 if one.exponent is None else number_of(one.exponent, numbers, meanings.lookup)
-        if power is not None and power == round(power):
-            continue
+        is_whole = power is not None and power == round(power)
         for family, contact in one.families.items():
             if _vanishes(one.base, family, numbers, meanings):
-                is_signed = (
-                    not one.is_force and not one.is_conditional and meanings.family(one.base)[0] == family
-                )
-                remedy = _rounded(write(one.base), power, one.is_force)
+                is_signed = not (one.is_force or one.is_conditional or is_whole)
+                is_signed = is_signed and meanings.family(one.base)[0] == family
+                if is_whole:
+                    remedy = f"write the exponent as the number {power:g}"
+                else:
+                    remedy = _rounded(write(one.base), power, one.is_force)
                 yield VelocityPower(write(one.node), one.where, contact, is_signed, remedy, one.place)
                 break
 

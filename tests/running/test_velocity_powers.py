@@ -50,7 +50,7 @@ def test_a_law_is_refused_where_stick_is_decided_by_derivatives(integrator: str)
     "power", ["c*sqrt(v)", "c*abs(v)**0.3", "c*(v/2)**p", "c*(v**2)**0.75", "c*sqrt(max(v, 0))", "c*v**2.5"]
 )
 def test_in_any_form(power: str) -> None:
-    with pytest.raises(hs.UsageError, match="fractional power of the velocity of contact f"):
+    with pytest.raises(hs.UsageError, match="of the velocity of contact f, or a power of it"):
         hs.simulate(braked(power), (0.0, 3.0))
 
 
@@ -61,16 +61,24 @@ def test_what_has_a_series_is_taken(power: str) -> None:
     assert hs.simulate(braked(power, start=0.0), (0.0, 0.1), integrator="scipy-rk45").success
 
 
-def test_an_exponent_is_what_its_parameter_says() -> None:
-    model = hs.Model(
-        "braked",
-        [hs.State("v", 0, "sin(t) - c*abs(v)**p - f")],
-        {"c": 0.1, "p": 2},
-        contacts=[hs.Contact("f", "v", "1", "coulomb", {"mu": 0.5})],
+def pushed(drag: str) -> hs.Model:
+    contacts = [hs.Contact("f", "v", "1", "coulomb", {"mu": 0.5})]
+    return hs.Model(
+        "pushed", [hs.State("v", 0, f"sin(t) - c*{drag} - f")], {"c": 0.1, "p": 2}, contacts=contacts
     )
-    assert hs.simulate(model, (0.0, 0.1), integrator="scipy-rk45").success
-    with pytest.raises(hs.UsageError, match=r"'abs\(v\)\*\*p' in the rate of v"):
-        hs.simulate(model, (0.0, 0.1), params={"p": 1.5}, integrator="scipy-rk45")
+
+
+@pytest.mark.parametrize("base", ["v", "abs(v)"])
+def test_a_whole_exponent_under_a_name_is_to_be_written_out(base: str) -> None:
+    with pytest.raises(hs.UsageError, match="write the exponent as the number 2"):
+        hs.simulate(pushed(f"{base}**p"), (0.0, 2.0), integrator="scipy-rk45")
+    assert hs.simulate(pushed(f"{base}**2"), (0.0, 2.0), integrator="scipy-rk45").success
+
+
+def test_a_default_of_a_law_is_a_number() -> None:
+    model = braked("c*v**p")
+    with pytest.raises(hs.UsageError, match=r"'v\*\*1.5'"):
+        hs.simulate(model, (0.0, 0.1), integrator="scipy-rk45")
 
 
 def test_time_stepping_takes_them_as_they_are() -> None:
