@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,8 @@ from types import FrameType
 from typing import Any
 
 from hybridsim.cli.output import complain
+
+_SOON = 0.05  # seconds until an interruption that was lost is repeated
 
 
 class Session:
@@ -47,9 +51,27 @@ class Session:
         ]
         for number in ours:
             signal.signal(number, self._interrupt)
+        unraisable, over = sys.unraisablehook, threading.Event()
+
+        def repeat() -> None:
+            if not over.is_set():
+                _thread.interrupt_main(signal.Signals(self.interrupted_code - 128))
+
+        def raise_again(lost: sys.UnraisableHookArgs) -> None:
+            # What is raised where the compiler calls back goes no further, so it is raised once more after that.
+            if isinstance(lost.exc_value, KeyboardInterrupt) and ours and not over.is_set():
+                again = threading.Timer(_SOON, repeat)
+                again.daemon = True
+                again.start()
+            else:
+                unraisable(lost)
+
+        sys.unraisablehook = raise_again
         try:
             yield
         finally:
+            over.set()
+            sys.unraisablehook = unraisable
             for number in ours:
                 signal.signal(number, usual[number])
 

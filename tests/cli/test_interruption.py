@@ -57,6 +57,27 @@ def interrupted(
     return process.returncode, "".join(seen)
 
 
+# Ctrl-C where C code calls back, as the compiler does: Python drops what is raised there, with a traceback.
+_CALLED_BACK = """
+import ctypes, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from hybridsim.cli.session import Session
+session = Session()
+with session.listening():
+    try:
+        ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
+        for _ in range(1000):
+            time.sleep(0.01)
+    except KeyboardInterrupt:
+        print("interrupted", session.interrupted_code)
+"""
+
+
+def test_what_hits_the_compiler_is_not_lost() -> None:
+    done = subprocess.run([sys.executable, "-c", _CALLED_BACK], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("interrupted 130\n", "")
+
+
 def test_run_keeps_what_was_computed(tmp_path: Path) -> None:
     argv = ("run", "dfcs", "--t-end", "10000T", "--integrator", "scipy-dop853", "--csv", "out.csv")
     code, messages = interrupted(tmp_path, *argv)
