@@ -1,25 +1,28 @@
 """Accumulation: events that follow each other ever faster, like the terms of a geometric series.
 
-The events of one turn may be several, at distances of their own: a motion between two relays passes one, then the
-other. So each interval is held against the one a few before it.
+Each component has its own. The events of one turn may be several, at distances of their own: a motion between two
+relays crosses one from either side. So each interval is held against the one a few before it.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.checkpoint import Pace
+from hybridsim.engine.checkpoint import BEGINNING, Pace
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.system import Automaton
 from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
 _TERMS = 10
-_MOST = 4  # events of one turn: two relays on either of their sides
+_MOST = 4  # events of one turn
+_SEVERAL = 32  # components among whose events each one is followed
+NOBODY = -1  # as the component of events that are of none: resets of monitors
+_KEPT = _TERMS + 2 * _MOST  # intervals
 _AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
 _FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
@@ -57,7 +60,7 @@ def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: fl
     return int(longest)
 
 
-def turn_of(gaps: list[float], count: int, same: float) -> tuple[int, float]:
+def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
     """Events of a turn, and the factor by which the last `count` intervals and a turn's shrink; (0, 1) if they do not.
 
     same : how well the factor must repeat.
@@ -75,114 +78,199 @@ def turn_of(gaps: list[float], count: int, same: float) -> tuple[int, float]:
     return 0, 1.0
 
 
+class Limit(NamedTuple):
+    """Where the events of some components accumulate, and how long the last of them before it took."""
+
+    time: float
+    components: tuple[int, ...]
+    passed: float
+
+
 class Accumulation:
-    """Watches the intervals between events of one run."""
+    """Watches the intervals between events of one run, of each component for itself."""
 
     def __init__(self, resolution: float = 0.0, shortest: float = 0.0) -> None:
         # a rest of the series shorter than this is the end of it, whatever rounding says
         self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
-        self.last: Instant | None = None
-        self.intervals: deque[float] = deque(maxlen=_TERMS + 2 * _MOST)
-        self.longest = 0.0  # interval since which they shrink
-        self.forecast: tuple[float, float] | None = (
-            None  # limit of the series so far, and how far ahead it was
-        )
+        self.paces: dict[int, Pace] = {}
+        self._under_way: set[int] = set()
 
-    def is_under_way(self) -> bool:
-        """Whether the last intervals shrink by one factor: what comes is to be watched event by event."""
-        return turn_of(list(self.intervals), _FEW + 1, 2.0 * SAME_FACTOR)[0] > 0
+    def is_under_way(self, now: float) -> bool:
+        """Whether the last intervals of a component shrink by one factor: what comes is to be watched one by one."""
+        for c in sorted(self._under_way):
+            limit, rest = self._ahead(self.paces[c])
+            if now > limit + rest + _END * math.ulp(now):  # it has broken off
+                self._under_way.discard(c)
+        return bool(self._under_way)
 
     def reach(self) -> float:
         """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
-        return _AHEAD * max(list(self.intervals)[-_MOST:]) if self.is_under_way() else math.inf
+        return min(
+            (_AHEAD * max(self.paces[c].intervals[-_MOST:]) for c in self._under_way), default=math.inf
+        )
 
-    def last_intervals(self, count: int) -> float:
-        """What the last intervals add up to."""
-        return sum(list(self.intervals)[-count:])
-
-    def pace(self) -> Pace:
-        """What is known so far."""
-        return Pace(self.last, tuple(self.intervals), self.longest, self.forecast)
-
-    def go_on(self, pace: Pace) -> None:
+    def go_on(self, paces: dict[int, Pace]) -> None:
         """Take up what was known."""
-        self.last, intervals, self.longest, self.forecast = pace
-        self.intervals.clear()
-        self.intervals.extend(intervals)
+        self.paces = dict(paces)
+        self._under_way = {c for c, pace in paces.items() if _next_turn(pace)[0]}
 
-    def begin_anew(self) -> None:
-        """Forget the intervals: what came before has been dealt with."""
-        self.last, self.longest, self.forecast = None, 0.0, None
-        self.intervals.clear()
+    def forget(self, components: tuple[int, ...]) -> None:
+        """Begin anew with these: what came before has been dealt with."""
+        for c in components:
+            self.paces.pop(c, None)
+            self._under_way.discard(c)
 
-    def limit_of_all(self, instants: np.ndarray) -> float | None:
-        """Note events (E, 2) in a row; the limit time as soon as there is one, else None."""
-        if len(instants) <= _TERMS + 2 * _MOST + 1:
-            return self._one_by_one(instants)
-        if self.last is None:
-            self.last, instants = Instant(*instants[0].tolist()), instants[1:]
-        gaps, work = np.array(self.intervals), np.empty((2, _MOST))
-        if longest_fall(gaps, self.last.high, self.last.low, instants, self.shortest, work) >= _TERMS:
-            return self._one_by_one(instants)  # worth a closer look
-        tail = instants[-_TERMS - 2 * _MOST - 1 :]
+    def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
+        """Note events (E, 2) in a row, each of one component (E,); the limit as soon as there is one, else None."""
+        count = len(instants)
+        if count <= _KEPT + 1:
+            return self._one_by_one(instants, owners)
+        chosen = [np.arange(count)]
+        if (owners != owners[0]).any():
+            counts = np.bincount(owners)
+            among = np.flatnonzero(counts)
+            if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
+                among = np.flatnonzero(counts > _TERMS)
+                self.forget(tuple(set(self.paces).difference(among.tolist())))
+            chosen = [np.flatnonzero(owners == c) for c in among]
+        if not any(self._falls_often(instants[k], int(owners[k[0]])) for k in chosen):
+            for k in chosen:
+                self._keep_last(instants[k], int(owners[k[0]]))
+            return None
+        kept = np.sort(np.concatenate(chosen))
+        return self._one_by_one(instants[kept], owners[kept])  # worth a closer look
+
+    def _falls_often(self, instants: np.ndarray, component: int) -> bool:
+        pace = self.paces.get(component, BEGINNING)
+        last, rest = pace.last or Instant(*instants[0].tolist()), instants[0 if pace.last else 1 :]
+        work = np.empty((2, _MOST))
+        falls = longest_fall(np.array(pace.intervals), last.high, last.low, rest, self.shortest, work)
+        return falls >= _TERMS
+
+    def _keep_last(self, instants: np.ndarray, component: int) -> None:
+        """Note many events among which no series ends."""
+        pace = self.paces.get(component, BEGINNING)
+        tail = instants[-_KEPT - 1 :]
         steps = tail[1:] - tail[:-1]
-        self.intervals.extend(np.abs(steps[:, 0] + steps[:, 1]).tolist())
-        self.last = Instant(*instants[-1].tolist())
-        return None
+        gaps = np.abs(steps[:, 0] + steps[:, 1]).tolist()
+        if len(gaps) < _KEPT and pace.last:
+            gaps = [*pace.intervals, abs(Instant(*instants[0].tolist()).minus(pace.last)), *gaps]
+        pace = Pace(Instant(*instants[-1].tolist()), tuple(gaps[-_KEPT:]), pace.longest)
+        self._note(component, pace)
 
-    def _one_by_one(self, instants: np.ndarray) -> float | None:
-        for high, low in instants.tolist():
-            limit = self.limit(Instant(high, low))
+    def _one_by_one(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
+        for (high, low), c in zip(instants.tolist(), owners.tolist(), strict=True):
+            limit = self.limit(Instant(high, low), (c,))
             if limit is not None:
                 return limit
         return None
 
-    def limit(self, instant: Instant) -> float | None:
-        """Note an event; the limit time once the rest of the series is below the resolution, else None."""
-        if self.last is not None:
-            self.intervals.append(abs(instant.minus(self.last)))
-        self.last = instant
-        gaps = list(self.intervals)
+    def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
+        """Note an event of these components; the limit once the rest of a series is below the resolution, else None."""
+        times = {c: self._limit_of(instant, c) for c in components}
+        ended = [(time, c) for c, time in times.items() if time is not None]
+        return self._shared(*min(ended)) if ended else None
+
+    def expected(self, instant: Instant) -> Limit | None:
+        """The limit of a series so far in whose rest an instant lies that is not in step with it."""
+        for c in sorted(self._under_way):
+            time = _expected(self.paces[c], instant)
+            if time is not None:
+                return self._shared(time, c)
+        return None
+
+    def _shared(self, time: float, first: int) -> Limit:
+        """The limit with all components whose series lead to it."""
+        among = {first}
+        for c in self._under_way:
+            forecast = self.paces[c].forecast
+            if forecast is not None and abs(forecast[0] - time) <= max(forecast[1], _END * math.ulp(time)):
+                among.add(c)
+        passed = max(sum(self.paces[c].intervals[-2:]) for c in among)
+        return Limit(time, tuple(sorted(among)), passed)
+
+    def _note(self, component: int, pace: Pace) -> None:
+        self.paces[component] = pace
+        if _next_turn(pace)[0]:
+            self._under_way.add(component)
+        else:
+            self._under_way.discard(component)
+
+    def _ahead(self, pace: Pace) -> tuple[float, float]:
+        """The limit of a series under way by its last intervals, and how far ahead of its last event it is."""
+        turn, factor = _next_turn(pace)
+        rest = sum(pace.intervals[-turn:]) * factor / (1.0 - factor)
+        assert pace.last is not None
+        return float(pace.last) + rest, rest
+
+    def _limit_of(self, instant: Instant, component: int) -> float | None:
+        before = self.paces.get(component, BEGINNING)
+        gaps = before.intervals
+        if before.last is not None:
+            gaps = (*gaps, abs(instant.minus(before.last)))[-_KEPT:]
+        pace = Pace(instant, gaps, before.longest)
+        self._note(component, pace)
         if len(gaps) <= _TERMS:
             return None
         if max(gaps[-_TERMS - 1 :]) <= max(self.shortest, _ULPS * math.ulp(float(instant))):
             return float(instant)
         if min(gaps) <= 0.0:
             return None
-        turn, factor = turn_of(gaps, _FEW + 1, 2.0 * SAME_FACTOR)
-        if turn:
-            self.longest = max(self.longest, *gaps)
-            rest = sum(gaps[-turn:]) * factor / (1.0 - factor)
-            self.forecast = (float(float(instant) + rest), rest)
+        if component in self._under_way:
+            limit, rest = self._ahead(pace)
+            steadiest = _steadier(before, limit, math.ulp(limit))
+            self.paces[component] = pace._replace(
+                longest=max(before.longest, *gaps), forecast=(limit, rest), steadiest=steadiest
+            )
             is_steady = turn_of(gaps, _TERMS, SAME_FACTOR)[0] > 0
             end = max(self.resolution, _END * math.ulp(float(instant)))
-            return self.forecast[0] if is_steady and rest <= end else None
-        self.longest = max(gaps) if gaps[-1] >= gaps[-2] else max(self.longest, *gaps)
-        is_far = self.forecast is not None and self.forecast[1] <= _FAR_DOWN * self.longest
-        limit = self.expected(instant) if is_far else None
-        self.forecast = None
-        return limit
-
-    def expected(self, instant: Instant) -> float | None:
-        """The limit of the series so far, where an instant that is not in step with it lies within its rest."""
-        if self.forecast is None:
-            return None
-        limit, rest = self.forecast
-        return limit if abs(float(instant) - limit) <= rest else None
+            return steadiest[2] if is_steady and rest <= end else None
+        longest = max(gaps) if gaps[-1] >= gaps[-2] else max(before.longest, *gaps)
+        self.paces[component] = pace._replace(longest=longest)
+        is_far = before.forecast is not None and before.forecast[1] <= _FAR_DOWN * longest
+        return _expected(before, instant) if is_far else None
 
 
-def accumulated(limit: float, changed: list[Automaton]) -> str:
-    """What a run says that ends where events of these components accumulate."""
-    names = ", ".join(dict.fromkeys(a.name for a in changed))
+def _next_turn(pace: Pace) -> tuple[int, float]:
+    return turn_of(pace.intervals, _FEW + 1, 2.0 * SAME_FACTOR)
+
+
+def _expected(pace: Pace, instant: Instant) -> float | None:
+    """The limit of the series, where an instant that is not in step with it lies within its rest."""
+    if pace.forecast is None:
+        return None
+    limit, rest = pace.forecast
+    if abs(float(instant) - limit) > rest:
+        return None
+    return pace.steadiest[2] if pace.steadiest else limit
+
+
+def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
+    """Which forecast of a series moved least to the next two: (by how much this one moved, how much that, which).
+
+    The first ones miss what the series is not geometric by; in the last ones rounding takes over, where the place at
+    which events happen is not at zero.
+    """
+    if before.forecast is None or before.steadiest is None:
+        return math.inf, math.inf, limit
+    moved = max(abs(limit - before.forecast[0]), least)
+    last, least_so_far, best = before.steadiest
+    spread = max(moved, last)
+    return (moved, spread, limit) if spread <= least_so_far else (moved, least_so_far, best)
+
+
+def accumulated(limit: Limit, automata: Sequence[Automaton]) -> str:
+    """What a run says that ends where events accumulate and nothing says what follows."""
+    changed = [automata[c] for c in limit.components if c != NOBODY]
+    names = ", ".join(a.name for a in changed) or "monitors with resets"
     holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
+    head = f"events accumulate at t = {limit.time!r}, of {names}"
+    if not changed:
+        return f"{head}: let a monitor end the run before"
     if not holding:
-        return (
-            f"events accumulate at t = {limit!r}, of {names}: declare the limit that they lead to, a mode of their "
-            "component"
-        )
-    modes = " and ".join(dict.fromkeys(holding))
+        return f"{head}: declare the limit that they lead to, a mode of their component"
     return (
-        f"events accumulate at t = {limit!r}, of {names}, and {modes} cannot be entered there: take a smaller rtol or "
-        "another integrator, or let a monitor end the run before"
+        f"{head}, and {' and '.join(holding)} cannot be entered there: take a smaller rtol or another integrator, or "
+        "let a monitor end the run before"
     )

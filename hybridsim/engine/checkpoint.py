@@ -11,12 +11,23 @@ from hybridsim.engine.timepair import Instant
 
 
 class Pace(NamedTuple):
-    """What the watch over accumulations knows: the last event, the intervals before it, its forecast."""
+    """How the events of one component follow each other, as the watch over accumulations knows it.
+
+    last : the last event.
+    intervals : before it.
+    longest : interval since which they shrink.
+    forecast : limit of the series so far, and how far ahead it is.
+    steadiest : by how much that limit moved last; the least that one moved, and that one.
+    """
 
     last: Instant | None
     intervals: tuple[float, ...]
     longest: float
-    forecast: tuple[float, float] | None
+    forecast: tuple[float, float] | None = None
+    steadiest: tuple[float, float, float] | None = None
+
+
+BEGINNING = Pace(None, (), 0.0)
 
 
 @dataclass(frozen=True)
@@ -28,13 +39,13 @@ class Checkpoint:
     instant : where it is.
     arrays : what holds there, by names that the loop gives them.
     settled : the last appointment that was kept.
-    pace : how events followed each other.
+    paces : how the events of each component followed each other.
     segments, occurrences : how many the run has recorded since; they are recorded anew.
     """
 
     instant: Instant
     arrays: dict[str, np.ndarray]
     settled: Instant | None
-    pace: Pace
+    paces: dict[int, Pace]
     segments: int = 0
     occurrences: int = 0

@@ -24,6 +24,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
 
 _SEGMENTS = 1024  # room for one call
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 class ExactLeaper:
@@ -72,7 +73,7 @@ class ExactLeaper:
         self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
         found = tables_of(self.system, tapes.modes, p, self.horizon)
         if found is None:
-            return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)))
+            return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         tables, spare = found
         as_packed = packed(state)
         try:
@@ -88,14 +89,13 @@ class ExactLeaper:
         )  # fmt: skip
         record.counters.kernel_time += perf_counter() - began
         spare.append((work, room))
-        instants = self._commit(tables, Record(*(r[:count] for r in rows)), state[2], clock, record)
+        instants, owners = self._commit(tables, Record(*(r[:count] for r in rows)), state[2], clock, record)
         x, x_error, z, p, sides, orders, floors = state
         self.shelf.surround(z)
-        none = np.zeros(0, dtype=np.int64)
-        after = Outcome(x, p, z, sides, orders, none, none, x_error, floors, np.zeros(0), continuous=False)
+        after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
         goes_on = code == FULL or (count > 0 and len(self.shelf.tapes.modes) != len(tapes.modes))
         end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
-        return Landing(Instant(*clock.tolist()), after, end, instants)
+        return Landing(Instant(*clock.tolist()), after, end, instants, owners)
 
     def _scratch(self, tables: LinearTables) -> tuple[Any, Any]:
         """Room for events, and scratch arrays of the kernel."""
@@ -132,12 +132,12 @@ class ExactLeaper:
         z_after: np.ndarray,
         clock: np.ndarray,
         record: Trajectory,
-    ) -> np.ndarray:
-        """Leave what was written to the trajectory; the instants (E, 2) of its events."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Leave what was written to the trajectory; the instants (E, 2) of its events, and whose they are."""
         ends, origins, numbers, modes, vectors, coordinates, fired, jumps = rows
         count = len(ends)
         if not count:
-            return np.empty((0, 2))
+            return np.empty((0, 2)), _NONE
         system, counters = self.system, record.counters
         record.segments.add(
             ClosedFormBlock(system, tables, numbers, ends, coordinates, origins, modes, vectors, jumps)
@@ -151,4 +151,4 @@ class ExactLeaper:
             crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events, 1:])
             counters.events += len(crossings)
             record.occurrences.add(crossings)
-        return instants
+        return instants, system.owner[fired[:events]]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsim.engine.jets import UNIT
+from hybridsim.engine.accumulation import Limit
 from hybridsim.engine.outcome import Change, Outcome, Situation
+from hybridsim.engine.rest_impulses import stopped
 from hybridsim.engine.settle import Settling
-from hybridsim.engine.system import Series, System
+from hybridsim.engine.system import System
 
 LIMIT = "limit"  # as the guard of the changes that are made where events accumulate
 _REACH = (
@@ -15,19 +16,63 @@ _REACH = (
 )
 
 
-def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: float) -> Outcome | None:
+def behind(limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float) -> Outcome | None:
+    """What holds from a limit on, at local time s: along surfaces, in contacts, or as declared; None if nothing."""
+    found = _gathered(system, outcome, p, s, s + limit.passed)
+    return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
+
+
+def _gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: float) -> Outcome | None:
     """What holds at the limit, at local time s, of crossings or impacts; None if it is none of what can be held.
 
     It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
-    contacts whose gaps and their rates come to zero in it. The state is put onto them, by less than the motion moves
-    meanwhile; the decision is that of any event (`hybridsim.engine.settle`).
+    contacts whose gaps and their rates come to zero in it. They are held from here on: on the average, bounces that
+    follow each other ever faster carry the load that a closed contact carries, and crossings to and fro slide. The
+    decision is that of any event (`hybridsim.engine.settle`).
     """
     near = _within_reach(system, outcome, p, left)
     if len(near) < (1 if any(system.is_unilateral[near]) else 2):
         return None
     z = outcome.z.copy()
     z[near] = [system.automata[c].hold for c in near]
-    x = system.project(s, outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z), p, z)
+    start = system.project(0.0, _without_bounces(system, outcome, p, near), p, z)
+    found = _held_at(system, outcome, p, s, near, _moved(system, start, p, z, s), z)
+    if found is not None and _passed_by(system, outcome, found, near):
+        found = _held_at(system, outcome, p, 0.0, near, start, z)  # now, so that none of the others is missed
+    return found
+
+
+def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
+    """The state after impulses that end the motion of these contacts, and leave those that are closed so."""
+    series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
+    places = [
+        k
+        for k, c in enumerate(system.surface_of)
+        if system.is_unilateral[c] and (c in near or outcome.z[c] == system.automata[c].hold)
+    ]
+    if not places:
+        return outcome.x
+    rates = np.where(np.isin([system.surface_of[k] for k in places], near), series.surfaces[places, 1], 0.0)
+    slopes, changes, _ = system.impulses(0.0, outcome.x, p, outcome.z)
+    return stopped(outcome.x, rates, slopes[places], changes[places])
+
+
+def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s: float) -> np.ndarray:
+    """The state at local time s from x, in one step of the classical Runge-Kutta method: s is short."""
+    a = system.flow(0.0, x, p, z)
+    b = system.flow(0.5 * s, x + 0.5 * s * a, p, z)
+    c = system.flow(0.5 * s, x + 0.5 * s * b, p, z)
+    d = system.flow(s, x + s * c, p, z)
+    return system.project(s, x + s / 6.0 * (a + 2.0 * b + 2.0 * c + d), p, z)
+
+
+def _held_at(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
+) -> Outcome | None:
+    """What is decided at local time s, where x is on these surfaces; None unless they stay held, contacts apart."""
+    if not np.isfinite(x).all():
+        return None
+    z = z.copy()
     z[near] = -1  # no mode yet: the decision takes them as they are at a start
     at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
@@ -42,16 +87,23 @@ def gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: fl
     return found
 
 
-def at_declared_limit(
-    system: System, outcome: Outcome, p: np.ndarray, s: float, changed: list[int]
+def _passed_by(system: System, outcome: Outcome, found: Outcome, near: list[int]) -> bool:
+    """Whether a guard of another component would have fired on the way to the limit."""
+    same = (found.z == outcome.z) & ~np.isin(np.arange(len(found.z)), near)
+    both = system.active(found.z) & system.active(outcome.z) & same[system.owner]
+    return bool((found.sides * outcome.sides < 0)[both].any())
+
+
+def _at_declared_limit(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
 ) -> Outcome | None:
     """What holds at the limit, at local time s, of transitions of these components; None where none says what."""
-    entered = [c for c in changed if system.automata[c].limit >= 0]
+    entered = [c for c in changed if c >= 0 and system.automata[c].limit >= 0]
     if not entered:
         return None
     z = outcome.z.copy()
     z[entered] = [system.automata[c].limit for c in entered]
-    x = outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z)
+    x = outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z)  # a few roundings of the time ahead
     at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
     found.changes = [
@@ -61,38 +113,20 @@ def at_declared_limit(
     return found
 
 
+def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
+    """The contacts that an event has closed."""
+    automata = system.automata
+    return tuple(
+        c.component
+        for c in outcome.changes
+        if automata[c.component].is_unilateral and c.target == automata[c.component].hold
+    )
+
+
 def holds_several(system: System, outcome: Outcome) -> bool:
     """Whether an event ends with several switching surfaces held that were not held before it."""
     changed = [(system.automata[c.component], c.target) for c in outcome.changes]
     return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
-
-
-def hidden_flight(system: System, outcome: Outcome, p: np.ndarray) -> float | None:
-    """How long a contact that has just bounced stays open, if so low that rounding hides its gap; else None.
-
-    Impacts that follow are not to be told from rest: no gap can be found to close that was never seen to open. With
-    little restitution that comes before there are enough of them to be recognised as a series.
-    """
-    automata = system.automata
-    bounced = {
-        c.component
-        for c in outcome.changes
-        if automata[c.component].is_unilateral and automata[c.component].hold not in (c.source, c.target)
-    }
-    if not bounced:
-        return None
-    errors = outcome.x_error + 4.0 * UNIT * np.abs(outcome.x)
-    series = system.series(0.0, outcome.x, p, outcome.z, errors, 0.0)
-    assert isinstance(series, Series)  # models with impacts are made from expressions
-    flights = []
-    for k, c in enumerate(system.surface_of):
-        if c in bounced:
-            (_, rate, curve), bound = series.surfaces[k, :3], series.surface_bounds[k, 0]
-            if (
-                curve < 0.0 < rate and rate**2 <= -4.0 * curve * bound
-            ):  # the square is 4 |curve| times the height
-                flights.append(-rate / curve)
-    return max(flights, default=None)
 
 
 @np.errstate(over="ignore")  # what is too large to tell is within reach

@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.impulse import MOST, Answer, Blow, answers, count
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Change
+from hybridsim.engine.rest_impulses import stopped
 from hybridsim.model.impact import ROUNDING
 
 if TYPE_CHECKING:
@@ -211,6 +212,9 @@ class _Collision:
         at.x, at.x_error = x, np.where(moved, error, UNIT * np.abs(x))
         # a rate that cannot be told from zero any more is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
+        if is_lost.any():
+            ends = answer.zero | is_lost
+            at.x = stopped(at.x, np.where(is_lost, answer.after, 0.0)[ends], slopes[ends], changes[ends])
         for i, c in enumerate(members):
             automaton, is_zero = automata[c], bool(answer.zero[i] or is_lost[i])
             settling.on_surface[c] = is_zero

@@ -177,7 +177,7 @@ class Leaper(ABC):
         except IndexError:
             work, room = work_space(self.system), self._room()
             reach_settling(self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, as_packed, work)
-        instants = []
+        instants, owners = [np.empty((0, 2))], [_NONE]
         while True:
             rows, began = packed(self._rows()), perf_counter()
             code, steps, count = self._go(to, clock, as_packed, work, room, rows)
@@ -188,7 +188,9 @@ class Leaper(ABC):
                 self.steps, is_too_long = self.steps * _GROWTH, False
             is_full = code == FULL and not is_too_long
             if count:
-                instants.append(self._commit(steps, count, state[2], clock, record))
+                found = self._commit(steps, count, state[2], clock, record)
+                instants.append(found[0])
+                owners.append(found[1])
             if is_full:
                 self._renew()
             known = len(self.shelf.tapes.modes)
@@ -199,9 +201,7 @@ class Leaper(ABC):
         x, x_error, z, p, sides, orders, floors = state
         after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
-        return Landing(
-            Instant(*clock.tolist()), after, end, instants[0] if len(instants) == 1 else _joined(instants)
-        )
+        return Landing(Instant(*clock.tolist()), after, end, np.concatenate(instants), np.concatenate(owners))
 
     def _rows(self) -> Record:
         """The rows that the next call writes to."""
@@ -211,8 +211,8 @@ class Leaper(ABC):
 
     def _commit(
         self, steps: int, count: int, z: np.ndarray, clock: np.ndarray, record: Trajectory
-    ) -> np.ndarray:
-        """Leave what one call has written to the trajectory; the instants (E, 2) of its events.
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Leave what one call has written to the trajectory; the instants (E, 2) of its events, and whose they are.
 
         z and clock hold after the last segment, the E-th where an event ended it.
         """
@@ -242,11 +242,7 @@ class Leaper(ABC):
             crossings = Crossings(system, instants, fired[ended], modes[ended], modes[after], jumps[ended])
             counters.events += len(crossings)
             record.occurrences.add(crossings)
-        return instants
-
-
-def _joined(instants: list[np.ndarray]) -> np.ndarray:
-    return np.concatenate([np.empty((0, 2)), *instants])
+        return instants, system.owner[fired[ended]]
 
 
 class TaylorLeaper(Leaper):

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.accumulation import Accumulation, accumulated
+from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.backward import cross_backward, has_no_past, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
-from hybridsim.engine.gathering import at_declared_limit, gathered, hidden_flight, holds_several
+from hybridsim.engine.gathering import behind, closed_now, holds_several
+from hybridsim.engine.hidden_bounces import Bounced, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
@@ -56,7 +57,7 @@ class ModeLoop:
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray
         self.accumulation = Accumulation()
-        self.last_limit = math.nan
+        self.last_limits: dict[int, float] = {}  # by component
         self.notices = Notices(system, method, task, self.record)
         self.leaper = self._leaper()
         self._told = progress
@@ -111,7 +112,7 @@ class ModeLoop:
             self._mark(step_size)
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
-            if self.leaper is not None and not self.accumulation.is_under_way():
+            if self.leaper is not None and not self.accumulation.is_under_way(float(self.origin)):
                 arrived, stop = self._leap(self.leaper, target, appointment)
                 if arrived or stop:
                     if not stop:
@@ -144,7 +145,9 @@ class ModeLoop:
         arrays |= {"continuous": np.array(outcome.continuous), "step_size": np.array(size)}
         if self.leaper is not None:
             arrays["place"] = self.leaper.place
-        self.record.mark(Checkpoint(self.origin, arrays, self.timetable.settled, self.accumulation.pace()))
+        self.record.mark(
+            Checkpoint(self.origin, arrays, self.timetable.settled, dict(self.accumulation.paces))
+        )
 
     def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
         """Take a noted state up; the step size to begin with."""
@@ -152,7 +155,7 @@ class ModeLoop:
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)
-        self.accumulation.go_on(checkpoint.pace)
+        self.accumulation.go_on(checkpoint.paces)
         state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
         self.outcome = Outcome(**state, continuous=bool(arrays["continuous"]))
         self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
@@ -172,7 +175,7 @@ class ModeLoop:
                 self.adopted = Instant(*landing.instants[-1].tolist())
             if not arrived or self.adopted == self.origin:
                 self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
-            if self._accumulated(landing.instants):
+            if self._ends_at(self.accumulation.limit_of_all(landing.instants, landing.owners)):
                 return arrived, True
             if landing.end != PAUSED:
                 break
@@ -279,7 +282,7 @@ class ModeLoop:
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
-            stop = None if limit is None else self._gathered(limit, self.accumulation.last_intervals(2))
+            stop = None if limit is None else self._gathered(limit)
             if stop is not None:
                 return stop
             outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
@@ -293,7 +296,7 @@ class ModeLoop:
             outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
-        return self._accumulated(np.array([instant]))
+        return self._accumulated(Bounced(instant, arrival.x, self.outcome.x))
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
@@ -352,50 +355,47 @@ class ModeLoop:
         settling.jumped = surfaces_jump(system, instant, at, self.forward)
         return settling.run((), resets)
 
-    def _accumulated(self, instants: np.ndarray) -> bool:
-        """Whether events (E, 2) follow each other ever faster; then the run ends, saying where that leads."""
-        automata = self.system.automata
-        if any(
-            automata[c.component].is_unilateral and c.target == automata[c.component].hold
-            for c in self.outcome.changes
-        ):
-            self.accumulation.begin_anew()  # a contact that has closed bounces no more
+    def _accumulated(self, event: Bounced) -> bool:
+        """Whether events follow each other ever faster; then the run ends, saying where that leads."""
+        closed = closed_now(self.system, self.outcome)
+        self.accumulation.forget(closed)  # a contact that has closed bounces no more
+        changed = {c.component for c in self.outcome.changes}.difference(closed)
+        if closed and not changed:
             return False
-        flight = hidden_flight(self.system, self.outcome, self.p)
-        if (
-            flight is not None
-            and (stop := self._gathered(float(self.origin.plus(flight)), flight)) is not None
-        ):
+        hidden = limit_of_hidden(self.system, self.outcome, self.p, event, self.record)
+        stop = None if hidden is None else self._gathered(hidden)
+        if stop is not None:
             return stop
-        limit = self.accumulation.limit_of_all(instants)
-        stop = None if limit is None else self._gathered(limit, self.accumulation.last_intervals(2))
+        return self._ends_at(self.accumulation.limit(event.instant, tuple(sorted(changed)) or (NOBODY,)))
+
+    def _ends_at(self, limit: Limit | None) -> bool:
+        """Whether the run ends at this limit of events, if it is one; it does where there is nothing that goes on."""
+        stop = False if limit is None else self._gathered(limit)
         if limit is None or stop is not None:
             return bool(stop)
         self.record.status = "accumulation"
-        self.record.message = accumulated(limit, [automata[c.component] for c in self.outcome.changes])
+        self.record.message = accumulated(limit, self.system.automata)
         return True
 
-    def _gathered(self, limit: float, passed: float) -> bool | None:
+    def _gathered(self, limit: Limit) -> bool | None:
         """Go on behind a limit: along surfaces, in contacts, or as it is declared; whether the run stops there.
 
-        None where there is nothing that goes on. passed : how long the last events before the limit took.
+        None where there is nothing that goes on.
         """
-        if not self.forward or limit == self.last_limit:  # a limit that leads back into its own series
+        is_again = any(self.last_limits.get(c) == limit.time for c in limit.components)
+        if not self.forward or is_again:  # it leads back into its own series
             return None
         appointment = self.timetable.next(self.origin, self.forward)
         target = appointment.instant if appointment else self.end
         room = target.minus(self.origin)
-        ahead = min(max(Instant(limit).minus(self.origin), 0.0), room)  # what is due until then is due
+        ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # what is due until then is due
         before = self.outcome
-        found = gathered(self.system, before, self.p, ahead, ahead + passed)
-        if found is None:
-            changed = sorted({c.component for c in before.changes})
-            found = at_declared_limit(self.system, before, self.p, ahead, changed)
-        if found is None:
+        if (found := behind(limit, self.system, before, self.p, ahead)) is None:
             return None
         self.notices.accumulated([self.system.automata[c.component].name for c in found.changes])
-        self.accumulation.begin_anew()
-        self.last_limit = limit
+        ended = {*limit.components, *(c.component for c in found.changes)}
+        self.accumulation.forget(tuple(ended))
+        self.last_limits.update(dict.fromkeys(ended, limit.time))
         found = self._apply_crossed(found, ahead, before.monitor_sides, ())
         instant = target if ahead == room else self.origin.plus(ahead)
         stop = self._adopt(instant, found, before.x, (), (), before.monitor_sides)

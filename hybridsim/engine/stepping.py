@@ -180,13 +180,15 @@ class Landing(NamedTuple):
     """Where a leap ended: the origin of the next segment, what holds there, and why it ended.
 
     ARRIVED at its target; PAUSED for want of room, to be taken up where it ended; BEFORE_SOMETHING that is not
-    ordinary. instants (E, 2) are those of the events on the way.
+    ordinary. instants (E, 2) are those of the events on the way, owners (E,) the components whose
+    guards they are.
     """
 
     origin: Instant
     outcome: Outcome
     end: int
     instants: np.ndarray
+    owners: np.ndarray
 
 
 class Leaps(Protocol):

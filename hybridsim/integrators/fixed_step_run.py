@@ -138,7 +138,7 @@ class FixedStepRun:
         while self.origin != self.end:
             arrays = {name: np.array(getattr(self, name)) for name in _STATE}
             self.record.mark(
-                Checkpoint(self.origin, arrays, self.timetable.settled, self.accumulation.pace())
+                Checkpoint(self.origin, arrays, self.timetable.settled, dict(self.accumulation.paces))
             )
             appointment = self.timetable.next(self.origin, forward=True)
             if self._stretch(appointment, appointment.instant if appointment else self.end):
@@ -152,7 +152,7 @@ class FixedStepRun:
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)
-        self.accumulation.go_on(checkpoint.pace)
+        self.accumulation.go_on(checkpoint.paces)
         state = {name: checkpoint.arrays[name].copy() for name in _STATE}
         self.x, self.z, self.discrete, self.scale, self.fresh = (state[name] for name in _STATE[:-1])
         self.turned = bool(state["turned"])
@@ -371,10 +371,11 @@ class FixedStepRun:
         self._crossed_in_jump(instant, sides, np.sign(self._monitors(0.0, self.x, self._vector())), monitors)
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
-        limit = self.accumulation.limit(instant) if outcome.changes else None
+        changed = tuple(sorted({c.component for c in outcome.changes}))
+        limit = self.accumulation.limit(instant, changed)
         if limit is not None:
             record.status = "accumulation"
-            record.message = accumulated(limit, [system.automata[c.component] for c in outcome.changes])
+            record.message = accumulated(limit, system.automata)
         return record.status != "finished"
 
     def _crossed_in_jump(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybridsim.solution.run import Run
     from hybridsim.solution.solution import Solution
 
-FORMAT, VERSION = "hybridsim solution", 1
+FORMAT, VERSION = "hybridsim solution", 2
 _HEADER = "header"
 
 
@@ -76,7 +76,8 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
         arrays |= {f"checkpoint/{name}": array for name, array in checkpoint.arrays.items()}
         header["checkpoint"] = {
             "names": list(checkpoint.arrays),
-            **{n: getattr(checkpoint, n) for n in ("instant", "settled", "pace", "segments", "occurrences")},
+            **{n: getattr(checkpoint, n) for n in ("instant", "settled", "segments", "occurrences")},
+            "paces": list(checkpoint.paces.items()),
         }
     arrays[_HEADER] = np.frombuffer(
         json.dumps(header, default=int).encode(), dtype=np.uint8
@@ -197,13 +198,21 @@ def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkp
     from hybridsim.engine.checkpoint import Checkpoint, Pace
     from hybridsim.engine.timepair import Instant
 
-    last, intervals, longest, forecast = header["pace"]
-    pace = Pace(last and Instant(*last), tuple(intervals), longest, forecast and tuple(forecast))
+    paces = {
+        c: Pace(
+            last and Instant(*last),
+            tuple(intervals),
+            longest,
+            forecast and tuple(forecast),
+            steadiest and tuple(steadiest),
+        )
+        for c, (last, intervals, longest, forecast, steadiest) in header["paces"]
+    }
     return Checkpoint(
         Instant(*header["instant"]),
         {name: arrays[f"checkpoint/{name}"] for name in header["names"]},
         header["settled"] and Instant(*header["settled"]),
-        pace,
+        paces,
         header["segments"],
         header["occurrences"],
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.accumulation import Accumulation, accumulated
+from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.blocks import OccurrenceList, SegmentList
 from hybridsim.engine.chain import Chain
 from hybridsim.engine.crossings import Crossings
@@ -211,14 +211,14 @@ def test_events_out_of_arrays(run: hs.Solution) -> None:
 # -- many instants at once ------------------------------------------------------------------------------------------
 
 
-def limits(instants: np.ndarray, cuts: list[int], resolution: float) -> tuple[float | None, bool]:
-    """What an accumulation says of instants that come in pieces."""
+def limits(instants: np.ndarray, cuts: list[int], resolution: float) -> tuple[Limit | None, bool]:
+    """What an accumulation says of instants of one component that come in pieces."""
     watch = Accumulation(resolution)
     for piece in np.split(instants, cuts):
-        limit = watch.limit_of_all(piece)
+        limit = watch.limit_of_all(piece, np.zeros(len(piece), dtype=np.int64))
         if limit is not None:
-            return limit, watch.is_under_way()
-    return None, watch.is_under_way()
+            return limit, watch.is_under_way(float(piece[-1, 0]))
+    return None, watch.is_under_way(float(instants[-1, 0]))
 
 
 @pytest.mark.parametrize("kind", ["even", "random", "series", "series late", "close"])
@@ -242,13 +242,33 @@ def test_instants_at_once_or_one_by_one(kind: str) -> None:
             assert limits(instants, list(range(size, len(gaps), size)), 1e-6) == one_by_one
 
 
+@pytest.mark.parametrize("at_once", [1, 9, 30, 400])
+def test_series_of_several_components_are_told_apart(at_once: int) -> None:
+    """Two series with one limit, and a clock that ticks on; sums of the series as in closed form."""
+    series = {0: 2.0 - 0.5 ** np.arange(60), 1: 2.0 - 0.7 ** np.arange(90), 2: np.arange(0.0, 2.0, 0.03)}
+    times = np.concatenate(list(series.values()))
+    owners = np.repeat(list(series), [len(part) for part in series.values()])
+    order = np.argsort(times, kind="stable")
+    instants, watch = np.stack([times[order], np.zeros(len(times))], axis=1), Accumulation(1e-6)
+    found = []
+    for k in range(0, len(times), at_once):
+        limit = watch.limit_of_all(instants[k : k + at_once], owners[order][k : k + at_once])
+        if limit is not None:
+            found.append(limit)
+            break
+    assert [limit.components for limit in found] == [(0, 1)]
+    assert found[0].time == pytest.approx(2.0, abs=1e-12)
+
+
 def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
     def automaton(name: str, hold: int) -> Automaton:
         return Automaton(name, ("open", "closed"), ((), ()), ((), ()), ((), ()), ((), ()), 0, -1, hold)
 
-    assert accumulated(2.5, [automaton("p", -1)]).endswith(
+    automata = [automaton("p", -1), automaton("q", 1), automaton("r", 1)]
+    assert accumulated(Limit(2.5, (0,), 0.1), automata).endswith(
         "t = 2.5, of p: declare the limit that they lead to, a mode of their component"
     )
-    held = accumulated(2.5, [automaton("p", 1), automaton("p", 1), automaton("q", 1)])
-    assert "of p, q" in held
-    assert "p.closed and q.closed cannot be entered there" in held and "declare" not in held
+    held = accumulated(Limit(2.5, (1, 2), 0.1), automata)
+    assert "of q, r" in held
+    assert "q.closed and r.closed cannot be entered there" in held and "declare" not in held
+    assert "of monitors with resets: let a monitor" in accumulated(Limit(2.5, (NOBODY,), 0.1), automata)
