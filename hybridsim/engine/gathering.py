@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import Limit
 from hybridsim.engine.outcome import Change, Outcome, Situation
-from hybridsim.engine.rest_impulses import stopped
+from hybridsim.engine.rest_impulses import stopped, with_friction
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 
@@ -16,14 +16,21 @@ _REACH = (
 )
 
 
-def behind(limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float) -> Outcome | None:
-    """What holds from a limit on, at local time s: along surfaces, in contacts, or as declared; None if nothing."""
+def behind(
+    limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
+) -> tuple[float, Outcome] | None:
+    """What holds from a limit at local time s on: along surfaces, in contacts, or as declared; None if nothing.
+
+    With the local time from which it holds: now, where something else comes before the limit.
+    """
     found = _gathered(system, outcome, p, s, s + limit.passed)
     return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
 
 
-def _gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: float) -> Outcome | None:
-    """What holds at the limit, at local time s, of crossings or impacts; None if it is none of what can be held.
+def _gathered(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, left: float
+) -> tuple[float, Outcome] | None:
+    """At the limit of crossings or impacts; None if it is none of what can be held.
 
     It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
     contacts whose gaps and their rates come to zero in it. They are held from here on: on the average, bounces that
@@ -36,25 +43,33 @@ def _gathered(system: System, outcome: Outcome, p: np.ndarray, s: float, left: f
     z = outcome.z.copy()
     z[near] = [system.automata[c].hold for c in near]
     start = system.project(0.0, _without_bounces(system, outcome, p, near), p, z)
-    found = _held_at(system, outcome, p, s, near, _moved(system, start, p, z, s), z)
-    if found is not None and _passed_by(system, outcome, found, near):
-        found = _held_at(system, outcome, p, 0.0, near, start, z)  # now, so that none of the others is missed
-    return found
+    x = _moved(system, start, p, z, s)
+    if _passed_by(system, outcome, p, s, tuple(near), x):
+        s, x = 0.0, start
+    found = _held_at(system, outcome, p, s, near, x, z)
+    return None if found is None else (s, found)
 
 
 def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
     """The state after impulses that end the motion of these contacts, and leave those that are closed so."""
-    series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
-    places = [
-        k
-        for k, c in enumerate(system.surface_of)
-        if system.is_unilateral[c] and (c in near or outcome.z[c] == system.automata[c].hold)
-    ]
-    if not places:
+    automata, modes, of = system.automata, outcome.z, system.surface_of
+    if not system.is_unilateral[near].any():
         return outcome.x
-    rates = np.where(np.isin([system.surface_of[k] for k in places], near), series.surfaces[places, 1], 0.0)
-    slopes, changes, _ = system.impulses(0.0, outcome.x, p, outcome.z)
-    return stopped(outcome.x, rates, slopes[places], changes[places])
+    series = system.series(0.0, outcome.x, p, modes, outcome.x_error, 0.0)
+    slopes, changes, loads = system.impulses(0.0, outcome.x, p, modes)
+    slip = [
+        0
+        if system.is_unilateral[c]
+        else int(modes[c] == automata[c].above) - int(modes[c] == automata[c].below)
+        for c in of
+    ]
+    ends = [
+        k
+        for k, c in enumerate(of)
+        if (system.is_unilateral[c] or loads[:, k].any()) and (c in near or modes[c] == automata[c].hold)
+    ]
+    rates = np.where(np.isin([of[k] for k in ends], near), series.surfaces[ends, 1], 0.0)
+    return stopped(outcome.x, rates, slopes[ends], with_friction(changes, loads, np.array(slip))[ends])
 
 
 def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s: float) -> np.ndarray:
@@ -87,30 +102,35 @@ def _held_at(
     return found
 
 
-def _passed_by(system: System, outcome: Outcome, found: Outcome, near: list[int]) -> bool:
-    """Whether a guard of another component would have fired on the way to the limit."""
-    same = (found.z == outcome.z) & ~np.isin(np.arange(len(found.z)), near)
-    both = system.active(found.z) & system.active(outcome.z) & same[system.owner]
-    return bool((found.sides * outcome.sides < 0)[both].any())
+def _passed_by(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, apart: tuple[int, ...], x: np.ndarray
+) -> bool:
+    """Whether a guard of another component would have fired on the way to the limit, where the state is x."""
+    z = outcome.z
+    others = system.active(z) & ~np.isin(system.owner, apart)
+    values = system.rows("guards", system.guard_count, np.array([s]), x[None], p, z)[0]
+    return bool((values[others & (outcome.sides > 0)] < 0.0).any())
 
 
 def _at_declared_limit(
     system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
-) -> Outcome | None:
-    """What holds at the limit, at local time s, of transitions of these components; None where none says what."""
-    entered = [c for c in changed if c >= 0 and system.automata[c].limit >= 0]
+) -> tuple[float, Outcome] | None:
+    """At the limit of transitions of these components; None where none says what holds there."""
+    entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
     if not entered:
         return None
     z = outcome.z.copy()
-    z[entered] = [system.automata[c].limit for c in entered]
-    x = outcome.x + s * system.flow(0.0, outcome.x, p, outcome.z)  # a few roundings of the time ahead
+    z[list(entered)] = [system.automata[c].limit for c in entered]
+    x = _moved(system, outcome.x, p, outcome.z, s)
+    if not np.isfinite(x).all() or _passed_by(system, outcome, p, s, entered, x):
+        s, x = 0.0, outcome.x
     at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
     found.changes = [
         Change(c, LIMIT, int(outcome.z[c]), system.automata[c].limit, x, found.x) for c in entered
     ] + found.changes
     found.continuous = False
-    return found
+    return s, found
 
 
 def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:

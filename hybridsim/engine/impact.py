@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.engine.impulse import MOST, Answer, Blow, answers, count
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Change
-from hybridsim.engine.rest_impulses import stopped
+from hybridsim.engine.rest_impulses import stopped, with_friction
 from hybridsim.model.impact import ROUNDING
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ class _Collision:
             motion = ", ".join(f"{value:.6g}" for value in before)
             status = "nonunique" if found else "inconsistent"
             return status, f"an impact of {names} with the rates {motion} has {what}"
-        self._apply(members, found[0], slopes[rows], changes[rows])
+        self._apply(members, found[0], slopes[rows], changes[rows], loads[:, rows][:, :, rows])
         if found[0].reduced:
             self.settling.warnings.append(
                 f"an impact of {names} would gain energy by Newton's law: it rebounds less"
@@ -194,7 +194,9 @@ class _Collision:
         rows = [self.place[c] for c in rubbing]
         return [0.0 if abs(values[k, 0]) <= bounds[k, 0] else float(values[k, 0]) for k in rows]
 
-    def _apply(self, members: list[int], answer: Answer, slopes: np.ndarray, changes: np.ndarray) -> None:
+    def _apply(
+        self, members: list[int], answer: Answer, slopes: np.ndarray, changes: np.ndarray, loads: np.ndarray
+    ) -> None:
         at, automata, settling = self.at, self.system.automata, self.settling
         normal = [c for c in members if automata[c].is_unilateral]
         shares = answer.impulses[:, None] * changes
@@ -214,7 +216,10 @@ class _Collision:
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
         if is_lost.any():
             ends = answer.zero | is_lost
-            at.x = stopped(at.x, np.where(is_lost, answer.after, 0.0)[ends], slopes[ends], changes[ends])
+            slip = np.where(ends, 0.0, np.sign(answer.after))
+            slip[: len(normal)] = 0.0
+            among = with_friction(changes, loads, slip)
+            at.x = stopped(at.x, np.where(is_lost, answer.after, 0.0)[ends], slopes[ends], among[ends])
         for i, c in enumerate(members):
             automaton, is_zero = automata[c], bool(answer.zero[i] or is_lost[i])
             settling.on_surface[c] = is_zero

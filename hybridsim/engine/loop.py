@@ -13,15 +13,16 @@ from hybridsim.engine.backward import cross_backward, has_no_past, held
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import behind, closed_now, holds_several
-from hybridsim.engine.hidden_bounces import Bounced, limit_of_hidden
+from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
-from hybridsim.engine.segment import Arrival, SegmentRun, Sighting
+from hybridsim.engine.segment import Arrival, SegmentRun
 from hybridsim.engine.settle import Settling
+from hybridsim.engine.sightings import seen_on_the_way
 from hybridsim.engine.start import settled_start
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
@@ -175,7 +176,12 @@ class ModeLoop:
                 self.adopted = Instant(*landing.instants[-1].tolist())
             if not arrived or self.adopted == self.origin:
                 self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
-            if self._ends_at(self.accumulation.limit_of_all(landing.instants, landing.owners)):
+            limit = self.accumulation.limit_of_all(landing.instants, landing.owners)
+            if limit is None and len(landing.owners) and not self.system.has_surface[landing.owners[-1]]:
+                limit = limit_of_hidden(
+                    self.system, self.outcome, last_bounces(self.system, self.record), self.record
+                )
+            if self._ends_at(limit):
                 return arrived, True
             if landing.end != PAUSED:
                 break
@@ -225,32 +231,10 @@ class ModeLoop:
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
-        passed = [(seen.s, self._sighting(seen)) for seen in run.sightings]
-        declared = (g for g in run.grazings if not self.system.is_corner[self.system.owner[g[0]]])
-        passed += [(grazing[1], self._grazing(run, *grazing)) for grazing in declared]
-        record.occurrences.extend(occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0])))
+        record.occurrences.extend(seen_on_the_way(self.system, self.origin, run, record))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
             record.warn(f"monitor {name} is not a number on a part of the run: no crossing is seen there")
-
-    def _sighting(self, seen: Sighting) -> Occurrence:
-        name = self.system.monitor_names[seen.number]
-        return Occurrence(
-            self.origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x
-        )
-
-    def _grazing(self, run: SegmentRun, guard: int, s: float, distance: float) -> Occurrence:
-        c = int(self.system.owner[guard])
-        automaton, number = self.system.automata[c], int(run.flow.z[c])
-        mode, name = (
-            automaton.modes[number],
-            automaton.guard_names[number][automaton.guards[number].index(guard)],
-        )
-        x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
-        self.record.warn(
-            f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
-        )
-        return Occurrence(self.origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)
 
     # -- events ---------------------------------------------------------------------------------------------
 
@@ -296,7 +280,7 @@ class ModeLoop:
             outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
-        return self._accumulated(Bounced(instant, arrival.x, self.outcome.x))
+        return self._accumulated(instant, arrival.x)
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
@@ -355,18 +339,17 @@ class ModeLoop:
         settling.jumped = surfaces_jump(system, instant, at, self.forward)
         return settling.run((), resets)
 
-    def _accumulated(self, event: Bounced) -> bool:
+    def _accumulated(self, instant: Instant, x_minus: np.ndarray) -> bool:
         """Whether events follow each other ever faster; then the run ends, saying where that leads."""
         closed = closed_now(self.system, self.outcome)
         self.accumulation.forget(closed)  # a contact that has closed bounces no more
         changed = {c.component for c in self.outcome.changes}.difference(closed)
         if closed and not changed:
             return False
-        hidden = limit_of_hidden(self.system, self.outcome, self.p, event, self.record)
-        stop = None if hidden is None else self._gathered(hidden)
-        if stop is not None:
-            return stop
-        return self._ends_at(self.accumulation.limit(event.instant, tuple(sorted(changed)) or (NOBODY,)))
+        limit = self.accumulation.limit(instant, tuple(sorted(changed)) or (NOBODY,))
+        bounces = bounces_of(self.outcome, instant, x_minus)
+        hidden = limit_of_hidden(self.system, self.outcome, bounces, self.record)
+        return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:
         """Whether the run ends at this limit of events, if it is one; it does where there is nothing that goes on."""
@@ -390,8 +373,9 @@ class ModeLoop:
         room = target.minus(self.origin)
         ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # what is due until then is due
         before = self.outcome
-        if (found := behind(limit, self.system, before, self.p, ahead)) is None:
+        if (after := behind(limit, self.system, before, self.p, ahead)) is None:
             return None
+        ahead, found = after
         self.notices.accumulated([self.system.automata[c.component].name for c in found.changes])
         ended = {*limit.components, *(c.component for c in found.changes)}
         self.accumulation.forget(tuple(ended))

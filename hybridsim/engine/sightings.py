@@ -1,0 +1,38 @@
+"""What a segment passed without ending there: monitors that only record, and guards that it nearly grazed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.pieces import Occurrence
+from hybridsim.engine.segment import SegmentRun, Sighting
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+from hybridsim.engine.trajectory import Trajectory
+
+
+def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
+    """In the order of time; the record is warned of near-grazings."""
+    passed = [(seen.s, _sighting(system, origin, seen)) for seen in run.sightings]
+    declared = (g for g in run.grazings if not system.is_corner[system.owner[g[0]]])
+    passed += [(s, _grazing(system, origin, run, guard, s, record)) for guard, s, _ in declared]
+    return [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
+
+
+def _sighting(system: System, origin: Instant, seen: Sighting) -> Occurrence:
+    name = system.monitor_names[seen.number]
+    return Occurrence(origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x)
+
+
+def _grazing(
+    system: System, origin: Instant, run: SegmentRun, guard: int, s: float, record: Trajectory
+) -> Occurrence:
+    c = int(system.owner[guard])
+    automaton, number = system.automata[c], int(run.flow.z[c])
+    mode = automaton.modes[number]
+    name = automaton.guard_names[number][automaton.guards[number].index(guard)]
+    x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
+    record.warn(
+        f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
+    )
+    return Occurrence(origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)

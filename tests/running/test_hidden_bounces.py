@@ -1,0 +1,150 @@
+"""Bounces end where they should, when rounding hides the last of them: limits, momenta and friction in closed form.
+
+A ball dropped from 0.2 onto a floor, at g = 10, falls for 0.2 and rests at 0.2 (1 + e)/(1 - e).
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import hybridsim as hs
+
+METHODS = ["exact", "taylor", "dop853", "tsit5", "scipy-dop853"]
+
+
+def limit(e: float) -> float:
+    """When the ball rests."""
+    return 0.2 * (1 + e) / (1 - e)
+
+
+def dropped(floor: str, e: float, start: float, speed: float = 0.0) -> hs.Model:
+    """A ball above a floor, by the law of impacts."""
+    states = [hs.State("h", start, "w"), hs.State("w", speed, "-10 + p")]
+    return hs.Model("ball", states=states, impacts=[hs.Impact("p", gap=f"h - {floor}", restitution=e)])
+
+
+def closing(sol: hs.Solution, target: str = "closed") -> float:
+    """The time of the one event that leads there."""
+    assert sol.status == "finished", sol.message
+    (time,) = [event.t for event in sol.events if event.target == target]
+    return time
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("e", [0.02, 0.3, 0.5, 0.9])
+@pytest.mark.parametrize(("floor", "start", "speed"), [("1", 1.2, 0.0), ("100", 100.2, 0.0), ("t", 0.2, 1.0)])
+def test_a_floor_need_not_be_at_zero(
+    integrator: str, e: float, floor: str, start: float, speed: float
+) -> None:
+    sol = hs.simulate(dropped(floor, e, start, speed), (0, 2 * limit(e)), integrator=integrator)
+    assert closing(sol) == pytest.approx(limit(e), rel=1e-11)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "dop853"])
+def test_a_ball_that_loses_little_rests_as_well(integrator: str) -> None:
+    sol = hs.simulate(dropped("1", 0.99, 1.2), (0, 1.1 * limit(0.99)), integrator=integrator)
+    assert closing(sol) == pytest.approx(limit(0.99), rel=1e-11)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("first", ["base", "ball"])
+def test_momentum_is_that_of_the_forces(integrator: str, e: float, first: str) -> None:
+    """A ball of mass 1 on a free base of mass 3: the weight of the ball is all that acts from outside."""
+    base = [hs.State("b", 1, "u"), hs.State("u", 0, "-p/3")]
+    ball = [hs.State("h", 1.2, "w"), hs.State("w", 0, "-10 + p")]
+    states = base + ball if first == "base" else ball + base
+    model = hs.Model("two", states=states, impacts=[hs.Impact("p", gap="h - b", restitution=e)])
+    end = 2 * limit(e)
+    sol = hs.simulate(model, (0, end), integrator=integrator)
+    assert closing(sol) == pytest.approx(limit(e), rel=1e-11)
+    last = dict(zip([state.name for state in states], sol(end), strict=True))
+    assert 3 * last["u"] + last["w"] == pytest.approx(-10 * end, rel=1e-13)
+    assert (3 * last["b"] + last["h"]) / 4 == pytest.approx(1.05 - 10 * end**2 / 8, rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_friction_loses_what_the_weight_lets_it(integrator: str) -> None:
+    """Through bounces and rest alike: mu g t of the sliding speed in the mean, which is exact once it rests."""
+    contact = hs.Contact("f", velocity="v", law="coulomb", arguments={"mu": 0.1}, normal="p")
+    model = dropped("1", 0.5, 1.2)
+    sliding = [*model.states, hs.State("x", 0, "v"), hs.State("v", 9, "-f")]
+    model = hs.Model("slides", states=sliding, contacts=[contact], impacts=model.impacts)
+    sol = hs.simulate(model, (0, 1.2), integrator=integrator)
+    assert sol(1.2)[3] == pytest.approx(9 - 0.1 * 10 * 1.2, rel=1e-13)
+
+
+def by_transitions(e: float, floor: float, name: str = "ball", start: float = 0.2) -> hs.Component:
+    """The ball as an automaton, with a limit."""
+    back = {f"h_{name}": floor, f"w_{name}": f"-{e}*w_{name}"}
+    stop = hs.Choice("rest", reset={f"h_{name}": floor, f"w_{name}": 0})
+    guard = hs.Guard("floor", f"h_{name} - {floor}", hs.Choice("flight", reset=back))
+    modes = [hs.Mode("flight", guard, set={f"g_{name}": 10}), hs.Mode("rest", set={f"g_{name}": 0})]
+    return hs.Component(name, modes, initial="flight", limit=stop)
+
+
+def falling(components: dict[hs.Component, float]) -> hs.Model:
+    """Balls by transitions, from these heights."""
+    states = []
+    for component, height in components.items():
+        name = component.name
+        states += [hs.State(f"h_{name}", height, f"w_{name}"), hs.State(f"w_{name}", 0, f"-g_{name}")]
+    return hs.Model("balls", states=states, components=list(components))
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize(("e", "floor"), [(0.01, 1), (0.3, 1), (0.3, 100), (0.5, 100), (0.8, 100), (0.95, 1)])
+def test_resets_on_a_floor_that_is_not_at_zero_end(integrator: str, e: float, floor: int) -> None:
+    sol = hs.simulate(
+        falling({by_transitions(e, floor): floor + 0.2}), (0, 2 * limit(e)), integrator=integrator
+    )
+    assert closing(sol, "rest") == pytest.approx(limit(e), rel=1e-9)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("pair", [(0.5, 0.5), (0.5, 0.25), (0.5, 0.7), (0.6, 0.9)])
+def test_series_that_end_at_one_instant(integrator: str, pair: tuple[float, float]) -> None:
+    """From heights of 5 (L (1 - e)/(1 + e))**2 both rest at L."""
+    end = 0.6
+    heights = {
+        by_transitions(e, 0, name): 5 * (end * (1 - e) / (1 + e)) ** 2
+        for e, name in zip(pair, ("a", "b"), strict=True)
+    }
+    sol = hs.simulate(falling(heights), (0, 2), integrator=integrator)
+    assert sol.status == "finished", sol.message
+    times = {event.component: event.t for event in sol.events if event.target == "rest"}
+    assert times == {"a": pytest.approx(end, rel=1e-11), "b": pytest.approx(end, rel=1e-11)}
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_two_balls_have_a_limit_each(integrator: str) -> None:
+    states = [hs.State("a", 1.2, "u"), hs.State("u", 0, "-10 + p")]
+    states += [hs.State("b", 1.2, "w"), hs.State("w", 0, "-10 + q")]
+    impacts = [hs.Impact("p", gap="a - 1", restitution=0.5), hs.Impact("q", gap="b - 1", restitution=0.8)]
+    sol = hs.simulate(hs.Model("two", states=states, impacts=impacts), (0, 3), integrator=integrator)
+    times = {event.component: event.t for event in sol.events if event.target == "closed"}
+    assert times == {"p": pytest.approx(limit(0.5), rel=1e-11), "q": pytest.approx(limit(0.8), rel=1e-11)}
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+@pytest.mark.parametrize("before", [1e-9, 1e-8, 1e-7])
+def test_what_happens_among_the_hidden_bounces_is_not_missed(integrator: str, before: float) -> None:
+    due = limit(0.9) - before
+    relay = hs.Component(
+        "relay", [hs.Mode("off", hs.Guard("due", f"{due!r} - y", "on")), hs.Mode("on")], initial="off"
+    )
+    ball = dropped("1", 0.9, 1.2)
+    model = hs.Model(
+        "both", states=[*ball.states, hs.State("y", 0, 1)], components=[relay], impacts=ball.impacts
+    )
+    assert closing(hs.simulate(model, (0, 8), integrator=integrator), "on") == pytest.approx(due, rel=1e-14)
+
+
+def test_without_a_limit_the_run_ends_there() -> None:
+    model = falling({by_transitions(0.5, 100): 100.2})
+    component = model.components[0]
+    endless = hs.Component(component.name, component.modes, initial="flight")
+    sol = hs.simulate(hs.Model("ball", states=model.states, components=[endless]), (0, 5))
+    assert sol.status == "accumulation"
+    assert "of ball: declare the limit" in sol.message
+    assert sol.t_end == pytest.approx(limit(0.5), abs=1e-6)
