@@ -68,8 +68,12 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
         for k, c in enumerate(of)
         if (system.is_unilateral[c] or loads[:, k].any()) and (c in near or modes[c] == automata[c].hold)
     ]
-    rates = np.where(np.isin([of[k] for k in ends], near), series.surfaces[ends, 1], 0.0)
-    return stopped(outcome.x, rates, slopes[ends], with_friction(changes, loads, np.array(slip))[ends])
+    moving = [
+        series.surfaces[k, 1 if system.is_unilateral[of[k]] else 0] if of[k] in near else 0.0 for k in ends
+    ]
+    return stopped(
+        outcome.x, np.array(moving), slopes[ends], with_friction(changes, loads, np.array(slip))[ends]
+    )
 
 
 def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s: float) -> np.ndarray:
@@ -84,7 +88,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s: float
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """What is decided at local time s, where x is on these surfaces; None unless they stay held, contacts apart."""
+    """What is decided at local time s, where x is on these surfaces; None unless switching surfaces stay held."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()
@@ -92,7 +96,7 @@ def _held_at(
     at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
     if found.status or any(
-        found.z[c] != system.automata[c].hold for c in near if not system.is_unilateral[c]
+        found.z[c] != system.automata[c].hold for c in near if system.automata[c].is_unique
     ):
         return None
     found.changes = [
@@ -151,16 +155,18 @@ def holds_several(system: System, outcome: Outcome) -> bool:
 
 @np.errstate(over="ignore")  # what is too large to tell is within reach
 def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) -> list[int]:
+    """The contacts and surfaces that come to zero in this time; friction only with a contact, which may load it."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
-    found = []
+    found: list[int] = []
+    rubbing: list[int] = []
     for k, c in enumerate(system.surface_of):
         automaton = system.automata[c]
-        if not (automaton.is_unique or automaton.is_unilateral) or outcome.z[c] == automaton.hold:
+        if outcome.z[c] == automaton.hold:
             continue
         (value, rate, curve), bounds = series.surfaces[k, :3], series.surface_bounds[k, :3]
         is_near = abs(value) <= _REACH * (abs(rate) + abs(curve) * left) * left + bounds[0]
         if automaton.is_unilateral:
             is_near = is_near and abs(rate) <= 2.0 * _REACH * abs(curve) * left + bounds[1]
         if is_near:
-            found.append(c)
-    return found
+            (found if automaton.is_unilateral or automaton.is_unique else rubbing).append(c)
+    return found + rubbing if any(system.is_unilateral[found]) else found

@@ -181,7 +181,8 @@ class _Collision:
             motion = ", ".join(f"{value:.6g}" for value in before)
             status = "nonunique" if found else "inconsistent"
             return status, f"an impact of {names} with the rates {motion} has {what}"
-        self._apply(members, found[0], slopes[rows], changes[rows], loads[:, rows][:, :, rows])
+        among = (slopes[rows], changes[rows], loads[:, rows][:, :, rows])
+        self._apply(members, found[0], restitution, *among)
         if found[0].reduced:
             self.settling.warnings.append(
                 f"an impact of {names} would gain energy by Newton's law: it rebounds less"
@@ -195,7 +196,13 @@ class _Collision:
         return [0.0 if abs(values[k, 0]) <= bounds[k, 0] else float(values[k, 0]) for k in rows]
 
     def _apply(
-        self, members: list[int], answer: Answer, slopes: np.ndarray, changes: np.ndarray, loads: np.ndarray
+        self,
+        members: list[int],
+        answer: Answer,
+        restitution: np.ndarray,
+        slopes: np.ndarray,
+        changes: np.ndarray,
+        loads: np.ndarray,
     ) -> None:
         at, automata, settling = self.at, self.system.automata, self.settling
         normal = [c for c in members if automata[c].is_unilateral]
@@ -214,6 +221,8 @@ class _Collision:
         at.x, at.x_error = x, np.where(moved, error, UNIT * np.abs(x))
         # a rate that cannot be told from zero any more is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
+        if len(normal) == 1 and 0.0 < restitution[0] < 1.0:
+            is_lost[0] = False  # it bounces: where that ends is found from its bounces (`hidden_bounces`)
         if is_lost.any():
             ends = answer.zero | is_lost
             slip = np.where(ends, 0.0, np.sign(answer.after))

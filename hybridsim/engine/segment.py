@@ -116,13 +116,17 @@ class SegmentRun:
             if not np.isfinite(step.x1).all():
                 raise StepFailure(f"the state is not finite at local time {step.s1!r}")
             self.last_step = abs(step.s1 - step.s0)
-            self.scale = np.maximum(self.scale, np.abs(step.x1))
+            whole, known = step.s1, self.scale
+            self.scale = np.maximum(known, np.abs(step.x1))
             if step.roots is None:
                 step, arrival = self._examine(stepper, step)
             else:
                 arrival = self._take_roots(step)
             if self.entries:
                 step, arrival = self._look_for_entries(step, arrival)
+            if step.s1 != whole:  # it may be a small part of the step, at whose end the states are far larger
+                parts = np.array([step.s0, 0.5 * (step.s0 + step.s1), step.s1])
+                self.scale = np.maximum(known, np.abs(step.dense(parts)).max(axis=0))
             self.knots.append(step.s1)
             self.states.append(step.x1)
             self.interpolants.append(step.dense)
