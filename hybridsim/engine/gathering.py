@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import Limit
 from hybridsim.engine.outcome import Change, Outcome, Situation
-from hybridsim.engine.rest_impulses import stopped, with_friction
+from hybridsim.engine.rest_impulses import loading, stopped
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 
@@ -57,7 +57,7 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
         return outcome.x
     series = system.series(0.0, outcome.x, p, modes, outcome.x_error, 0.0)
     slopes, changes, loads = system.impulses(0.0, outcome.x, p, modes)
-    slip = [
+    sliding = [
         0
         if system.is_unilateral[c]
         else int(modes[c] == automata[c].above) - int(modes[c] == automata[c].below)
@@ -72,7 +72,7 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
         series.surfaces[k, 1 if system.is_unilateral[of[k]] else 0] if of[k] in near else 0.0 for k in ends
     ]
     return stopped(
-        outcome.x, np.array(moving), slopes[ends], with_friction(changes, loads, np.array(slip))[ends]
+        outcome.x, np.array(moving), slopes[ends], loading(changes, loads, np.array(sliding))[ends]
     )
 
 

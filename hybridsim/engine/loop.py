@@ -280,7 +280,7 @@ class ModeLoop:
             outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
-        return self._accumulated(instant, arrival.x)
+        return self._accumulated(instant, arrival.x, arrival.fired)
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
@@ -339,16 +339,19 @@ class ModeLoop:
         settling.jumped = surfaces_jump(system, instant, at, self.forward)
         return settling.run((), resets)
 
-    def _accumulated(self, instant: Instant, x_minus: np.ndarray) -> bool:
+    def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
         """Whether events follow each other ever faster; then the run ends, saying where that leads."""
         closed = closed_now(self.system, self.outcome)
         self.accumulation.forget(closed)  # a contact that has closed bounces no more
         changed = {c.component for c in self.outcome.changes}.difference(closed)
         if closed and not changed:
             return False
-        limit = self.accumulation.limit(instant, tuple(sorted(changed)) or (NOBODY,))
+        changed = changed or {int(self.system.owner[g]) for g in fired} or {NOBODY}
+        limit = self.accumulation.limit(instant, tuple(sorted(changed)))
         bounces = bounces_of(self.outcome, instant, x_minus)
         hidden = limit_of_hidden(self.system, self.outcome, bounces, self.record)
+        if hidden and limit is None and self.system.is_unilateral[list(hidden.components)].all():
+            return bool(self._gathered(hidden))  # where it may not close yet, it bounces on
         return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:

@@ -15,11 +15,11 @@ def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.nd
     return np.asarray(x + impulses @ changes)
 
 
-def with_friction(changes: np.ndarray, loads: np.ndarray, slip: np.ndarray) -> np.ndarray:
+def loading(changes: np.ndarray, loads: np.ndarray, sliding: np.ndarray) -> np.ndarray:
     """Changes (m, n) of the states by impulses together with the friction that these load.
 
-    loads (2, m, m): of friction by a load, forward and backward (`System.impulses`); slip (m,): 1, -1, or 0 for what
-    does not slide.
+    loads (2, m, m): of friction by a load, forward and backward (`System.impulses`); sliding (m,): 1, -1, or 0 for
+    what does not slide.
     """
-    shares = np.where(slip[:, None] > 0, loads[0], np.where(slip[:, None] < 0, -loads[1], 0.0))
+    shares = np.where(sliding[:, None] > 0, loads[0], np.where(sliding[:, None] < 0, -loads[1], 0.0))
     return np.asarray(changes + shares.T @ changes)

@@ -106,8 +106,11 @@ class SegmentRun:
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
         """Step to the first event, or to the bound."""
-        for g in self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]:
-            self._refuse_undefined(int(g), 0.0)  # its side was decided by nothing
+        undecided = self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]
+        if (
+            len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all()
+        ):  # rates are told of by the stepper
+            self._refuse_undefined(int(undecided[0]), 0.0)
         stepper = self._start(bound, first_step)
         self.counters.restarts += 1
         while True:

@@ -436,6 +436,7 @@ class Solution(InTables):
     # -- tables ---------------------------------------------------------------------------------------------
 
     def table(self, points: int | None = None) -> Table:
+        """Times, states, outputs and modes in columns, at ``sol.t`` or at so many equal steps of time."""
         from hybridsim.solution.tabulated import tabulated
 
         return tabulated(self, points)
