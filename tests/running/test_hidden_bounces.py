@@ -74,6 +74,22 @@ def test_friction_loses_what_the_weight_lets_it(integrator: str) -> None:
     assert sol(1.2)[3] == pytest.approx(9 - 0.1 * 10 * 1.2, rel=1e-13)
 
 
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("floor", ["0", "1"])
+def test_friction_comes_to_rest_with_the_bounces_that_load_it(integrator: str, floor: str) -> None:
+    """A pull of 1 slides the ball in each flight from rest, each impact stops it, and the weight holds it in the end."""
+    e, fall = 0.5, 0.2
+    contact = hs.Contact("f", velocity="v", law="coulomb", arguments={"mu": 0.3}, normal="p")
+    ball = dropped(floor, e, 0.2 + float(floor))
+    states = [*ball.states, hs.State("x", 0, "v"), hs.State("v", 0, "1 - f")]
+    model = hs.Model("pulled", states=states, contacts=[contact], impacts=ball.impacts)
+    sol = hs.simulate(model, (0, 2), integrator=integrator)
+    assert closing(sol) == pytest.approx(limit(e), rel=1e-11)
+    assert sol.modes["f"][-1].mode == "stick"
+    assert sol(2.0)[3] == 0.0
+    assert sol(2.0)[2] == pytest.approx(fall**2 / 2 * (1 + 4 * e**2 / (1 - e**2)), rel=1e-13)
+
+
 def by_transitions(e: float, floor: float, name: str = "ball", start: float = 0.2) -> hs.Component:
     """The ball as an automaton, with a limit."""
     back = {f"h_{name}": floor, f"w_{name}": f"-{e}*w_{name}"}
