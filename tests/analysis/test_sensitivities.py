@@ -93,3 +93,18 @@ def test_what_cannot_be_differentiated_is_refused() -> None:
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1), save="events"))
     with pytest.raises(UsageError, match="'nu'"):
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1)), ["nu"])
+
+
+def test_a_limit_that_rounding_hides_is_refused() -> None:
+    """On a floor at 1 the last bounces are not followed, and their derivatives are not known."""
+    guard = hs.Guard("floor", "h - 1", hs.Choice("flight", reset={"h": 1, "w": "-e*w"}))
+    modes = [hs.Mode("flight", guard, set={"g": 10}), hs.Mode("rest", set={"g": 0})]
+    stop = hs.Choice("rest", reset={"h": 1, "w": 0})
+    model = hs.Model(
+        "ball",
+        parameters=[hs.Parameter("e", 0.5)],
+        states=[hs.State("h", 1.2, "w"), hs.State("w", 0, "-g")],
+        components=[hs.Component("ball", modes, initial="flight", limit=stop)],
+    )
+    with pytest.raises(UsageError, match="not followed to rounding"):
+        hs.sensitivities(hs.simulate(model, (0, 1)))

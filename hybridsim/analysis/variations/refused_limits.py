@@ -33,7 +33,7 @@ def refuse_limits(solution: Solution) -> None:
                 raise UsageError(
                     f"the events that accumulate at t = {event.t!r} were not followed to rounding: derivatives are "
                     "not carried through them",
-                    remedy="choose taylor or dop853",
+                    remedy="take differences of runs",
                 )
         elif event.t > before:
             before = event.t
