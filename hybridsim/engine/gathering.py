@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from hybridsim.engine.accumulation import Limit
 from hybridsim.engine.outcome import Change, Outcome, Situation
-from hybridsim.engine.rest_impulses import loading, stopped
+from hybridsim.engine.rest_impulses import loaded, stopped
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 
 LIMIT = "limit"  # as the guard of the changes that are made where events accumulate
+_SURE = 2.0**-46  # how well the state at the limit has to be known
 _REACH = (
     2.0  # a surface this many times as far away as it may move in the time that is left is not the limit's
 )
@@ -21,7 +24,7 @@ def behind(
 ) -> tuple[float, Outcome] | None:
     """What holds from a limit at local time s on: along surfaces, in contacts, or as declared; None if nothing.
 
-    With the local time from which it holds: now, where something else comes before the limit.
+    With the local time from which it holds: now, where something else may come before the limit.
     """
     found = _gathered(system, outcome, p, s, s + limit.passed)
     return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
@@ -43,8 +46,8 @@ def _gathered(
     z = outcome.z.copy()
     z[near] = [system.automata[c].hold for c in near]
     start = system.project(0.0, _without_bounces(system, outcome, p, near), p, z)
-    x = _moved(system, start, p, z, s)
-    if _passed_by(system, outcome, p, s, tuple(near), x):
+    x = _at_the_end(system, start, p, z, s, near)
+    if x is None:
         s, x = 0.0, start
     found = _held_at(system, outcome, p, s, near, x, z)
     return None if found is None else (s, found)
@@ -71,18 +74,17 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
     moving = [
         series.surfaces[k, 1 if system.is_unilateral[of[k]] else 0] if of[k] in near else 0.0 for k in ends
     ]
-    return stopped(
-        outcome.x, np.array(moving), slopes[ends], loading(changes, loads, np.array(sliding))[ends]
-    )
+    return stopped(outcome.x, np.array(moving), slopes[ends], loaded(changes, loads, np.array(sliding))[ends])
 
 
-def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s: float) -> np.ndarray:
-    """The state at local time s from x, in one step of the classical Runge-Kutta method: s is short."""
-    a = system.flow(0.0, x, p, z)
-    b = system.flow(0.5 * s, x + 0.5 * s * a, p, z)
-    c = system.flow(0.5 * s, x + 0.5 * s * b, p, z)
-    d = system.flow(s, x + s * c, p, z)
-    return system.project(s, x + s / 6.0 * (a + 2.0 * b + 2.0 * c + d), p, z)
+def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: float, s: float) -> np.ndarray:
+    """The state at local time s from x at s0, in one step of the classical Runge-Kutta method."""
+    h, middle = s - s0, 0.5 * (s0 + s)
+    a = system.flow(s0, x, p, z)
+    b = system.flow(middle, x + 0.5 * h * a, p, z)
+    c = system.flow(middle, x + 0.5 * h * b, p, z)
+    d = system.flow(s, x + h * c, p, z)
+    return system.project(s, x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), p, z)
 
 
 def _held_at(
@@ -106,14 +108,22 @@ def _held_at(
     return found
 
 
-def _passed_by(
-    system: System, outcome: Outcome, p: np.ndarray, s: float, apart: tuple[int, ...], x: np.ndarray
-) -> bool:
-    """Whether a guard of another component would have fired on the way to the limit, where the state is x."""
-    z = outcome.z
-    others = system.active(z) & ~np.isin(system.owner, apart)
-    values = system.rows("guards", system.guard_count, np.array([s]), x[None], p, z)[0]
-    return bool((values[others & (outcome.sides > 0)] < 0.0).any())
+def _at_the_end(
+    system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
+) -> np.ndarray | None:
+    """The state at local time s; None where that is not sure to rounding, or something else may happen before."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        whole = _moved(system, start, p, z, 0.0, s)
+        halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)
+        if not (np.abs(whole - halves) <= _SURE * (np.abs(start) + np.abs(halves))).all():
+            return None
+        series = system.series(0.0, start, p, z, np.zeros(system.n), 0.0)
+        held = [system.automata[c].hold for c in system.surface_of]
+        guards = series.guards[system.active(z) & ~np.isin(system.owner, list(apart))]
+        free = [k for k, c in enumerate(system.surface_of) if c not in apart and z[c] != held[k]]
+        values = np.concatenate([guards, series.surfaces[free]])
+        away = np.abs(values[:, 0]) > _REACH * np.abs(values[:, 1:]) @ s ** np.arange(1.0, values.shape[1])
+    return halves if away.all() else None
 
 
 def _at_declared_limit(
@@ -125,8 +135,8 @@ def _at_declared_limit(
         return None
     z = outcome.z.copy()
     z[list(entered)] = [system.automata[c].limit for c in entered]
-    x = _moved(system, outcome.x, p, outcome.z, s)
-    if not np.isfinite(x).all() or _passed_by(system, outcome, p, s, entered, x):
+    x = _at_the_end(system, outcome.x, p, outcome.z, s, entered)
+    if x is None:
         s, x = 0.0, outcome.x
     at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
@@ -155,7 +165,7 @@ def holds_several(system: System, outcome: Outcome) -> bool:
 
 @np.errstate(over="ignore")  # what is too large to tell is within reach
 def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) -> list[int]:
-    """The contacts and surfaces that come to zero in this time; friction only with a contact, which may load it."""
+    """The contacts and surfaces that come to zero in this time, and friction that they load or move."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found: list[int] = []
     rubbing: list[int] = []
@@ -168,5 +178,10 @@ def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) 
         if automaton.is_unilateral:
             is_near = is_near and abs(rate) <= 2.0 * _REACH * abs(curve) * left + bounds[1]
         if is_near:
-            (found if automaton.is_unilateral or automaton.is_unique else rubbing).append(c)
-    return found + rubbing if any(system.is_unilateral[found]) else found
+            (found if automaton.is_unilateral or automaton.is_unique else rubbing).append(k)
+    acting = [k for k in found if system.is_unilateral[system.surface_of[k]]]
+    if acting and rubbing:
+        slopes, changes, loads = system.impulses(0.0, outcome.x, p, outcome.z)
+        moved = slopes @ changes[acting].T
+        found += [k for k in rubbing if moved[k].any() or loads[:, k, acting].any()]
+    return [system.surface_of[k] for k in found]

@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.engine.impulse import MOST, Answer, Blow, answers, count
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Change
-from hybridsim.engine.rest_impulses import loading, stopped
+from hybridsim.engine.rest_impulses import loaded, stopped
 from hybridsim.model.impact import ROUNDING
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ class _Collision:
             ends = answer.zero | is_lost
             sliding = np.where(ends, 0.0, np.sign(answer.after))
             sliding[: len(normal)] = 0.0
-            among = loading(changes, loads, sliding)
+            among = loaded(changes, loads, sliding)
             at.x = stopped(at.x, np.where(is_lost, answer.after, 0.0)[ends], slopes[ends], among[ends])
         for i, c in enumerate(members):
             automaton, is_zero = automata[c], bool(answer.zero[i] or is_lost[i])

@@ -15,7 +15,7 @@ def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.nd
     return np.asarray(x + impulses @ changes)
 
 
-def loading(changes: np.ndarray, loads: np.ndarray, sliding: np.ndarray) -> np.ndarray:
+def loaded(changes: np.ndarray, loads: np.ndarray, sliding: np.ndarray) -> np.ndarray:
     """Changes (m, n) of the states by impulses together with the friction that these load.
 
     loads (2, m, m): of friction by a load, forward and backward (`System.impulses`); sliding (m,): 1, -1, or 0 for

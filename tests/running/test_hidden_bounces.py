@@ -77,7 +77,7 @@ def test_friction_loses_what_the_weight_lets_it(integrator: str) -> None:
 @pytest.mark.parametrize("integrator", METHODS)
 @pytest.mark.parametrize("floor", ["0", "1"])
 def test_friction_comes_to_rest_with_the_bounces_that_load_it(integrator: str, floor: str) -> None:
-    """A pull of 1 slides the ball in each flight from rest, each impact stops it, and the weight holds it in the end."""
+    """A pull of 1 slides the ball in each flight from rest, each impact stops it, the weight holds it in the end."""
     e, fall = 0.5, 0.2
     contact = hs.Contact("f", velocity="v", law="coulomb", arguments={"mu": 0.3}, normal="p")
     ball = dropped(floor, e, 0.2 + float(floor))
@@ -154,6 +154,46 @@ def test_what_happens_among_the_hidden_bounces_is_not_missed(integrator: str, be
         "both", states=[*ball.states, hs.State("y", 0, 1)], components=[relay], impacts=ball.impacts
     )
     assert closing(hs.simulate(model, (0, 8), integrator=integrator), "on") == pytest.approx(due, rel=1e-14)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+@pytest.mark.parametrize(("floor", "before"), [("1", 1e-7), ("10000", 1e-5), ("1000000", 2e-4)])
+def test_a_body_that_turns_among_the_hidden_bounces_turns_when_it_does(
+    integrator: str, floor: str, before: float
+) -> None:
+    """Beside the ball a body slides with -5 - 1 until it turns, then with -5 + 1."""
+    turn = limit(0.9) - before
+    ball = dropped(floor, 0.9, float(floor) + 0.2)
+    contact = hs.Contact("f", velocity="v", law="coulomb", arguments={"mu": 0.1}, normal="10")
+    states = [*ball.states, hs.State("v", 6 * turn, "-5 - f")]
+    model = hs.Model("both", states=states, contacts=[contact], impacts=ball.impacts)
+    sol = hs.simulate(model, (0, 4), integrator=integrator)
+    assert closing(sol, "slip-") == pytest.approx(turn, rel=1e-12)
+    assert sol(4.0)[2] == pytest.approx(-4 * (4 - turn), rel=1e-11)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_a_short_dip_among_the_hidden_bounces_is_not_missed(integrator: str) -> None:
+    due = limit(0.9) - 1e-4
+    guard = hs.Guard("due", f"((y - {due!r})/1e-5)**2 - 1", "on")
+    relay = hs.Component("relay", [hs.Mode("off", guard), hs.Mode("on")], initial="off")
+    ball = dropped("1000000", 0.9, 1000000.2)
+    model = hs.Model(
+        "both", states=[*ball.states, hs.State("y", 0, 1)], components=[relay], impacts=ball.impacts
+    )
+    sol = hs.simulate(model, (0, 4), integrator=integrator)
+    assert closing(sol, "on") == pytest.approx(due - 1e-5, rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor"])
+def test_a_fast_oscillator_beside_hidden_bounces_keeps_its_size(integrator: str) -> None:
+    ball = dropped("1", 0.9, 1 + 2e-5)
+    states = [*ball.states, hs.State("x", 1, "1e6*y"), hs.State("y", 0, "-1e6*x")]
+    model = hs.Model("both", states=states, impacts=ball.impacts)
+    sol = hs.simulate(model, (0, 0.0399), integrator=integrator, rtol=1e-12, save="events")
+    assert sol.events[-1].target == "closed"
+    x, y = sol.y[2:, -1]
+    assert x**2 + y**2 == pytest.approx(1, abs=1e-9)
 
 
 def test_without_a_limit_the_run_ends_there() -> None:
