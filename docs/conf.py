@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+from typing import Any
+
 import hybridsim
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+import figures
 
 project, author = "hybridsim", "The hybridsim developers"
 project_copyright = "The hybridsim developers"
@@ -35,3 +42,12 @@ html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
 }
+
+
+def setup(app: Any) -> None:
+    """Say at the foot of each page with figures of which sources they are."""
+
+    def add(app: Any, name: str, source: list[str]) -> None:
+        source[0] += figures.footer(f"{name}.md")
+
+    app.connect("source-read", add)

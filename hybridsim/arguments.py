@@ -230,9 +230,9 @@ def run_limits(limits: Any) -> Limits:
 
     from hybridsim.engine.limits import UNLIMITED, Limits
 
-    names = [f.name for f in fields(Limits)]
     if limits is None:
         return UNLIMITED
+    names = [f.name for f in fields(Limits)]
     if not isinstance(limits, Mapping):
         raise UsageError(
             f"limits is {limits!r}",

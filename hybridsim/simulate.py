@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
 from hybridsim import arguments
-from hybridsim.errors import UsageError
 from hybridsim.mechanics.system import MechanicalSystem
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
-    from hybridsim.engine.python_code import PythonCode
-    from hybridsim.engine.system import System
-    from hybridsim.integrators.base import Integrator
     from hybridsim.mechanics.solution import MechanicalSolution
     from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.solution import Solution
@@ -135,109 +128,27 @@ def simulate(
             model, t_span, x0=x0, integrator=integrator, rtol=rtol, atol=atol, max_step=max_step, t_eval=t_eval,
             save=save, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
         )  # fmt: skip
-    model = arguments.chosen_model(model, params)
-    x0_states, model = arguments.start_values(model, x0)
-    span = arguments.time_span(t_span)
-    callback = arguments.callback(progress)
-    from hybridsim.engine.driving import refuse_driving
-    from hybridsim.engine.jit import announce_compilation
-    from hybridsim.engine.python_code import PythonCode
-    from hybridsim.engine.recent import system_of
-    from hybridsim.engine.stepping import Tolerances
-    from hybridsim.engine.trajectory import Task
-    from hybridsim.integrators.automatic import choose
-    from hybridsim.integrators.registry import make_integrator
-    from hybridsim.solution.run import Run
+    from hybridsim.preparation import prepared
 
-    announce_compilation()
-    name = arguments.integrator_name(integrator)
-    began = time.perf_counter()
-    system, reason = system_of(model), ""
-    modes = arguments.initial_modes(system, z0)
-    if name == "auto":
-        start, relative = system.start_state(x0_states), arguments.relative_tolerance(rtol)
-        name, reason = choose(system, start, modes, span, relative)
-    method = make_integrator(name, options, KEYWORDS)
-    arguments.refuse_unused(method, rtol=rtol, atol=atol)
-    if isinstance(system.code, PythonCode):
-        _check_functions(method, system, system.code, system.start_state(x0_states), span[0])
-    _refuse_velocity_powers(method, model)
-    for function in system.hot_functions():
-        system.address(function)
-    method.prepare(system)
-    compile_time = time.perf_counter() - began
-    _refuse_lacking(method, model, system, span)
-    start = system.start_state(x0_states)
-    relative = arguments.relative_tolerance(rtol)
-    tolerances = Tolerances(
-        relative,
-        arguments.absolute_tolerances(model, atol, relative, start),
-        arguments.step_bound(max_step, "max_step"),
-        None if first_step is None else arguments.step_bound(first_step, "first_step"),
+    model = arguments.chosen_model(model, params)
+    told = arguments.callback(progress)
+    run, compile_time = prepared(
+        model,
+        t_span,
+        x0,
+        z0,
+        integrator,
+        rtol,
+        atol,
+        max_step,
+        first_step,
+        t_eval,
+        save,
+        limits,
+        options,
+        KEYWORDS,
     )
-    keep = arguments.kept(save, system)
-    grid = arguments.time_grid(t_eval, span, keep, save)
-    task = Task(*span, start, modes, tolerances, system.discrete_start, keep, arguments.run_limits(limits))
-    refuse_driving(system, span[0], start, task.discrete, modes)
-    return Run(model, system, method, task, grid, save, reason).carried_out(callback, compile_time)
+    return run.carried_out(told, compile_time)
 
 
 KEYWORDS = tuple(simulate.__kwdefaults__ or ())
-
-
-def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
-    """Refuse what cannot run a model of Python functions, and functions that return something else than they should."""
-    from hybridsim.engine.timepair import Instant
-
-    reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or choose dop853"
-    if code.refused and not method.name.startswith("scipy-"):
-        reason, remedy = code.refused_in_words, "choose scipy-dop853, which calls them from Python"
-    if reason:
-        raise UsageError(f"{method.name} cannot run {system.model.name}: {reason}", remedy=remedy)
-    code.check(x0, system.vector(Instant(t0), system.discrete_start))
-
-
-def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
-    """Refuse to decide between stick and slip by derivatives that are not there."""
-    from hybridsim.integrators.base import Integrator
-    from hybridsim.model.velocity_powers import velocity_powers
-
-    if type(method).run is not Integrator.run:
-        return  # it decides by itself, and takes no derivative
-    for power in velocity_powers(model):
-        raise UsageError(
-            f"{method.name} cannot run {model.name}: '{power.text}' in {power.where} is a root of the "
-            f"velocity of contact {power.contact}, or a power of it that is not written as a whole number: it has no "
-            "Taylor series where the contact sticks, so that stick and slip cannot be told apart there",
-            place=power.place,
-            remedy=f"{power.remedy}; or choose integrator='moreau', step=..., which takes no derivatives",
-        )
-
-
-def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:
-    from hybridsim.integrators.registry import list_integrators
-
-    needs = {
-        "contacts": any(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata),
-        "impacts": any(a.is_unilateral for a in system.automata),
-        "sliding": any(a.is_unique for a in system.automata),
-        "transitions": any(not a.has_surface for a in system.automata),
-        "monitors": bool(model.monitors),
-        "scheduled": bool(model.schedules or model.inputs),
-        "backward": span[1] < span[0],
-        "corners": "corners" in method.lacks and system.has_corners,
-    }
-    needed = [capability for capability, is_needed in needs.items() if is_needed]
-    for capability in needed:
-        if capability in method.lacks:
-            # what is not linear is not known here, and would be refused next
-            able = [one.name for one in list_integrators() if not {"nonlinear", *needed} & one.lacks.keys()]
-            such = (
-                f"choose one that can, such as {', '.join(able[:3])}"
-                if able
-                else "no integrator takes all of it"
-            )
-            raise UsageError(
-                f"{method.name} cannot run {model.name}: {method.lacks[capability]}",
-                remedy=f"{such} (hs.list_integrators() says what each lacks)",
-            )

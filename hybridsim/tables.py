@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError
+from hybridsim.files import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ class Table:
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write it as CSV: t, quantities with all their digits, modes."""
-        with open(path, "w", newline="", encoding="utf-8") as file:
+        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["t", *self.columns, *map(mode_title, self.modes)])
             numbers = [self.t, *self.columns.values()]
@@ -62,7 +63,7 @@ class Table:
         arrays |= {f"events/{name}": values for name, values in events.items()}
         about = {**self.about, "units": dict(self.units)}
         # numpy.savez takes names as keywords, and a state may be called `file`
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        with whole_file(path) as partly, zipfile.ZipFile(partly, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, values in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
                     np.lib.format.write_array(file, np.ascontiguousarray(values), allow_pickle=False)

@@ -159,16 +159,30 @@ the largest speed relative to what is rubbed on.
 
 ## What to choose
 
+This holds for the two systems measured here, a body on a spring with Coulomb friction that is driven harmonically, and
+a block on a belt, whose friction falls with the speed. It is no rule for others: a body that drifts, static friction
+with a drop to a kinetic one, or several contacts may need a narrower zone than the table allows; run with half of it
+and compare. Impacts are not the subject of this page.
+
 | method | zone, as a share of the largest speed | steps per period, at least | beyond |
 | --- | --- | --- | --- |
-| `rk4-dichotomy`, velocity zeroed | eps_v 1e-6 to 0.5 %; to 8 % if it sticks | 250 | early stops; early reversals |
-| `rk4-dichotomy`, velocity kept | eps_v 1e-6 to 0.1 % | 250 | the body creeps through its sticks |
+| `rk4-dichotomy`, velocity zeroed | eps_v 0.0001 % to 0.5 %; to 8 % if it sticks | 250 | early stops; early reversals |
+| `rk4-dichotomy`, velocity kept | eps_v 0.0001 % to 0.1 % | 250 | the body creeps through its sticks |
 | `rk4-sign` | none | 200 to more than 10^4 | chatter; no step is safe beforehand |
 | RK4 with mu N tanh(v/v0) | v0 at most 0.05 % | h < 2.785 m v0/(mu N): 5000 to 50 000 here | creep; chatter |
 | RK4 with Karnopp's dead band | v0 at most 1 % | 50 | early stops, late starts |
 
+At a largest speed of 0.1 m/s a share of 0.5 % is eps_v = 5e-4 m/s: options take speeds in the model's own unit.
+
+    hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
+        --option stick_velocity=zero --option steps_per_period=500
+
+`stick_velocity=kept` is the other row. `model.regularized("tanh", v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)`
+are the regularised laws, for `rk4-sign` or any other integrator. tanh is refused where static friction is above the
+kinetic one: a force that goes through zero has no peak at rest.
+
 The largest speed is not known beforehand, and is small where a zone does most harm: just above the threshold of
-motion. Run Run once, read the largest speed, and compare. Near the threshold (F0/N = 0.54) tanh takes 0.1 % or
+motion. Run once, read the largest speed, and compare. Near the threshold (F0/N = 0.54) tanh takes 0.1 % or
 less, which RK4 needs 26 000 steps a period for, or more, to be stable.
 `exact`, `taylor` and `dop853` have neither choice.
 

@@ -17,6 +17,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 # From the ground up. A module may import from its own floor and from the ones before it.
 FLOORS = (
     "errors",
+    "files",
     "expr",
     "model",
     "engine",
@@ -26,6 +27,7 @@ FLOORS = (
     "notebook",
     "arguments",
     "solution",
+    "preparation",
     "mechanics",
     "simulate",
     "ivp",
@@ -50,8 +52,8 @@ LIBRARIES = {
         "tables",
         "solution",
         "arguments",
+        "preparation",
         "mechanics",
-        "simulate",
         "ivp",
         "analysis",
         "testing",

@@ -109,13 +109,19 @@ def test_the_page_on_many_contacts_runs_and_is_short(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     shown = blocks(ROOT / "docs" / "how-to" / "many-contacts.md", "python")
-    assert [len(code.splitlines()) < 30 for code in shown] == [True, True]
+    assert [len(code.splitlines()) < 30 for code in shown] == [True, True, True]
     script = tmp_path / "shown.py"
     script.write_text("\n".join(shown), encoding="utf-8")
     runpy.run_path(str(script))
     said = re.findall(r"^print\(.*\)  # (.+)$", "\n".join(shown), re.MULTILINE)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 3
+    assert len(said) == 4
+    first = tmp_path / "first.py"
+    first.write_text(
+        shown[0] + 'hs.simulate(system.to_model(), (0, 1), integrator="dop853")', encoding="utf-8"
+    )
+    with pytest.raises(hs.ModelError, match="not independent"):  # as the page says of its first example
+        runpy.run_path(str(first))
 
 
 def test_a_long_run_goes_on(tmp_path: Path) -> None:
@@ -150,3 +156,17 @@ def test_the_page_on_sweeps_runs_on_threads_processes_and_a_cluster(tmp_path: Pa
     threads, processes, cluster = done.stdout.splitlines()
     assert threads.startswith("threads") and threads.endswith("(4, 2) True")
     assert (processes, cluster) == ("ProcessPoolExecutor (2) True", "ClientExecutor (2) True")
+
+
+def test_every_study_says_what_makes_its_figures() -> None:
+    """Each page of a study is in the table, each script that a command names is there, each page gets its foot."""
+    figures = runpy.run_path(str(ROOT / "scripts" / "figures.py"))
+    table = figures["table"]()
+    studies = {f"studies/{page.name}" for page in (ROOT / "docs" / "studies").glob("*.md")}
+    assert studies - {"studies/index.md"} <= set(table)
+    assert all((ROOT / "docs" / page).is_file() for page in table)
+    scripts = re.findall(r"(?:studies|scripts)/\w+\.py", str(table))
+    assert len(scripts) > 20
+    assert all((ROOT / script).is_file() for script in scripts)
+    assert "studies/speed.py" in figures["footer"]("studies/speed.md")
+    assert figures["footer"]("index.md") == ""

@@ -12,6 +12,7 @@ from typing import Any
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.rows import QUANTITIES, Reading, Row
 from hybridsim.analysis.table import table
+from hybridsim.files import whole_file, write_text
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class Comparison:
     def to_csv(self, path: str | Path) -> None:
         """Write one line a row; times in the model's unit, wall times in seconds."""
         records = self.records()
-        with open(path, "w", newline="", encoding="utf-8") as file:
+        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(records[0]) if records else [])
             writer.writeheader()
             for record in records:
@@ -133,7 +134,7 @@ class Comparison:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
         text = json.dumps(self.to_dict(), indent=2, default=str)
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8")
+            write_text(path, text + "\n")
         return text
 
     def _record(self, row: Row) -> dict[str, Any]:

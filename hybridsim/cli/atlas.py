@@ -12,6 +12,7 @@ from hybridsim.cli.output import complain, print_json, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
+from hybridsim.files import cannot_write, write_text
 
 if TYPE_CHECKING:
     from hybridsim.testing.atlas import Atlas
@@ -39,7 +40,7 @@ def add_to(commands: Any) -> None:
         "--integrators",
         metavar="A,B",
         type=values.names,
-        help="these only, with the variants of each (default: all)",
+        help="these only, with the variants of each; 'rk4 tanh' and 'rk4 karnopp' by name (default: all)",
     )
     parser.add_argument(
         "--quick", action="store_true", help="only the loosest setting of each study: gross failures"
@@ -77,17 +78,19 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         )
         if result.interrupted and not result.scenes:
             raise KeyboardInterrupt
-        fault = None
+        fault: UsageError | None = None
         try:
             _write(result, folder, session, progress)
         except OSError as failed:  # some places say that they may be written, and are not
+            fault = cannot_write(folder, failed)
+        except UsageError as failed:
             fault = failed
     if args.json:
         print_json(result.to_plain())
     else:
         print(result.table())
     if fault is not None:
-        raise UsageError(f"--out: {folder}: {fault.strerror}", remedy="choose a place that you may write to")
+        raise fault
     if result.interrupted:
         complain(f"interrupted after {len(result.scenes)} of {len(scenes)} scenes")
         return session.interrupted_code
@@ -100,7 +103,7 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
     from hybridsim.testing.atlas import pages
 
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "atlas.json").write_text(result.to_json(), encoding="utf-8")
+    write_text(folder / "atlas.json", result.to_json())
     session.wrote(folder / "atlas.json")
     if result.interrupted:
         return
@@ -108,7 +111,7 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
     session.wrote(folder / "matrix.png")
     drawn = _pictures(result, folder, progress)
     for name, text in pages(result, drawn).items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
         session.wrote(folder / name)
 
 

@@ -6,6 +6,7 @@ asked to end (SIGTERM), 141 the reader of the output went away. Data goes to std
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
@@ -32,7 +33,8 @@ from hybridsim.cli import (
 from hybridsim.cli.output import complain
 from hybridsim.cli.parser import Parser
 from hybridsim.cli.session import Session
-from hybridsim.errors import HybridsimError
+from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.files import cannot_write
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -53,6 +55,7 @@ COMMANDS: tuple[ModuleType, ...] = (
 )
 
 PIPE_CLOSED = 141  # 128 + SIGPIPE
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 
 
 def build_parser() -> Parser:
@@ -102,6 +105,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             complain("out of memory; try a shorter --t-end or a looser --rtol")
             return HybridsimError.exit_code
         except Exception as bug:  # the last line of defence: whatever arrives here is a bug of ours
+            if isinstance(bug, OSError) and bug.errno in _NO_ROOM:
+                complain(str(cannot_write(bug.filename or "the output", bug)))
+                return UsageError.exit_code
             if session.interrupted:  # unless Ctrl-C hit compiled code, which has errors of its own for it
                 return _interrupted(session)
             if not _show_traceback_if_wanted():

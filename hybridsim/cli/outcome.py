@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 from collections import Counter
+from collections.abc import Container
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
 from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import complain, print_json, require_writable
+from hybridsim.cli.output import complain, print_json, require_apart, require_writable
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError, UsageError
 
@@ -67,6 +68,12 @@ def check_arguments(args: argparse.Namespace) -> None:
         require_writable(args.npz, "--npz", (".npz",))
     if args.save:
         require_writable(args.save, "--save", (".hsol",))
+    others = {"the model's own file": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
+    for option in ("plot", "csv", "npz", "save"):
+        path = getattr(args, option)
+        if path:
+            require_apart(path, f"--{option}", others)
+            others |= {f"what --{option} writes": path}
     if args.points is not None and not (args.csv or args.npz):
         raise UsageError("--points without --csv or --npz", remedy="say where the table is to be written")
     if args.points == 1:
@@ -83,8 +90,8 @@ def limits(args: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def deliver(solution: Solution, args: argparse.Namespace, session: Session) -> int:
-    """Print the summary, write the files; 1 where the simulation did not succeed."""
+def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:
+    """Print the summary, write the files; 1 where the simulation did not succeed. Warnings `told` are not repeated."""
     explanations = [solution.explain(number) for number in args.explain]
     if args.json:
         print_json(
@@ -92,7 +99,7 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session) -> i
         )
     else:
         print("\n".join([*_summary(solution), *map(str, explanations)]))
-    for warning in solution.warnings:
+    for warning in (one for one in solution.warnings if one not in told):
         complain(f"warning: {warning}")
     if solution.t.size:  # else it stopped before the first step, and there is nothing to write
         _write(solution, args, session)

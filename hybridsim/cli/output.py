@@ -6,11 +6,14 @@ import json
 import math
 import os
 import sys
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from hybridsim.errors import UsageError
+
+TRIAL = ".hybridsim-"  # how the name of a folder begins that is made, and removed, to see whether it can be
 
 
 def complain(message: str) -> None:
@@ -61,10 +64,26 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(f"{option}: there is no folder {folder}", remedy="create it first, or name another")
-    if not os.access(path if path.exists() else folder, os.W_OK):
+    if not (os.access(path, os.W_OK) if path.exists() else _takes_files(folder)):
         raise UsageError(
             f"{option}: {path} may not be written", remedy="choose a place that you may write to"
         )
+
+
+def require_apart(path: Path, option: str, others: Mapping[str, Path]) -> None:
+    """Refuse to write over a file that the command reads, or that another of its options writes."""
+    for what, other in others.items():
+        if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
+            raise UsageError(f"{option}: {path} is {what}", remedy="name another file")
+
+
+def _takes_files(folder: Path) -> bool:
+    """Whether files can be made in a folder; some say that they may be written, and are not."""
+    try:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=TRIAL):
+            return True
+    except OSError:
+        return False
 
 
 def require_folder(path: Path, option: str) -> None:
@@ -77,7 +96,7 @@ def require_folder(path: Path, option: str) -> None:
         raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="name a folder") from None
     if not nearest.is_dir():
         raise UsageError(f"{option}: {nearest} is a file", remedy="name a folder")
-    if not os.access(nearest, os.W_OK):
+    if not _takes_files(nearest):
         raise UsageError(
             f"{option}: {nearest} may not be written", remedy="choose a place that you may write to"
         )

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from hybridsim.cli import options, outcome, values
+from hybridsim.cli.output import complain
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
@@ -58,7 +59,11 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     t_end = values.end_time(model, args.t_end)
 
     import hybridsim
+    from hybridsim.model.hygiene import jumps_of
 
+    cautions = [caution.sentence for caution in jumps_of(model)]
+    for caution in cautions:  # now, and not after a run that may crawl
+        complain(f"warning: {caution}")
     with Progress(session) as progress, session.stopping_gently():
         solution = hybridsim.simulate(
             model,
@@ -68,7 +73,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             progress=progress,
             **settings,
         )
-    return outcome.deliver(solution, args, session)
+    return outcome.deliver(solution, args, session, told=cautions)
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from hybridsim.cli import options
 from hybridsim.cli.output import print_json, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
+from hybridsim.files import write_text
 
 if TYPE_CHECKING:
     from hybridsim.analysis.study import Study
@@ -71,11 +72,9 @@ def _write(study: Study, name: str, folder: Path, images: Path, session: Session
 
     folder.mkdir(parents=True, exist_ok=True)
     images.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.json").write_text(study.to_json(), encoding="utf-8")
+    write_text(folder / f"{name}.json", study.to_json())
     session.wrote(folder / f"{name}.json")
-    (folder / f"{name}.md").write_text(
-        page(study, lambda title: _link(title, name, folder, images)), encoding="utf-8"
-    )
+    write_text(folder / f"{name}.md", page(study, lambda title: _link(title, name, folder, images)))
     session.wrote(folder / f"{name}.md")
     for title, draw in pictures(study).items():
         save(draw(), images / f"{name}-{title}.png")

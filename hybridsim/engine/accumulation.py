@@ -27,6 +27,8 @@ _AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
 _FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
 SAME_FACTOR = 1e-3
+# A series whose intervals shrink by less may as well be a motion that settles, such as an oscillation at resonance.
+CLOSING_IN = 0.995
 # A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
 _FAR_DOWN = 1e-6
 # Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
@@ -36,13 +38,24 @@ _END = 1024.0
 
 
 @kernel
-def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: float, work: Any) -> int:
-    """How many times in a row an interval is shorter than the one a turn before it, or next to nothing.
+def may_end(
+    gaps: Any,
+    high: float,
+    low: float,
+    instants: Any,
+    shortest: float,
+    resolution: float,
+    work: Any,
+    last: Any,
+) -> bool:
+    """Whether a series of intervals goes on at the last event, or may have come to its end before.
 
+    In a series an interval is shorter than the one a turn before it, or next to nothing, many times in a row. It is not
+    at its end as long as the next interval alone, by the factor of the last ones, is more than what ends it.
     gaps (k,): intervals up to the instant (high, low), after which the instants (E, 2) follow. work (2, events of a
-    turn at most) is written to.
+    turn at most) is written to, and last (m,): the last intervals of all.
     """
-    longest, known = 0.0, gaps.shape[0]
+    longest, known, ended = 0.0, gaps.shape[0], False
     before, falls = work[0], work[1]  # the last intervals; falls in a row, for turns of 1, 2, ... events
     before[:], falls[:] = math.inf, 0.0
     for i in range(known + instants.shape[0]):
@@ -51,13 +64,22 @@ def longest_fall(gaps: Any, high: float, low: float, instants: Any, shortest: fl
         else:
             gap = abs((instants[i - known, 0] - high) + (instants[i - known, 1] - low))
             high, low = instants[i - known, 0], instants[i - known, 1]
+        longest = max(longest, gap)
         is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(high))
+        end = max(resolution, _END * 2.0**-52 * abs(high), _FAR_DOWN * longest)
         for turn in range(min(i + 1, _MOST)):
-            is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * before[(i - turn - 1) % _MOST]
+            earlier = before[(i - turn - 1) % _MOST]
+            is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * earlier
             falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
-            longest = max(longest, falls[turn])
+            if falls[turn] >= _TERMS and i >= known:
+                ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
         before[i % _MOST] = gap
-    return int(longest)
+        place = i - known - instants.shape[0] + last.shape[0]
+        if place >= 0:
+            last[place] = gap
+    for turn in range(_MOST):
+        ended = ended or falls[turn] >= _TERMS
+    return ended
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
@@ -89,7 +111,8 @@ class Limit(NamedTuple):
 class Accumulation:
     """Watches the intervals between events of one run, of each component for itself."""
 
-    def __init__(self, resolution: float = 0.0, shortest: float = 0.0) -> None:
+    def __init__(self, resolution: float = 0.0, shortest: float = 0.0, forward: bool = True) -> None:
+        self._sign = 1.0 if forward else -1.0
         # a rest of the series shorter than this is the end of it, whatever rounding says
         self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
@@ -97,18 +120,24 @@ class Accumulation:
         self._under_way: set[int] = set()
 
     def is_under_way(self, now: float) -> bool:
-        """Whether the last intervals of a component shrink by one factor: what comes is to be watched one by one."""
+        """Whether the last intervals of a component shrink by one factor."""
         for c in sorted(self._under_way):
             limit, rest = self._ahead(self.paces[c])
-            if now > limit + rest + _END * math.ulp(now):  # it has broken off
+            if self._sign * (now - limit) > rest + _END * math.ulp(now):  # it has broken off
                 self._under_way.discard(c)
         return bool(self._under_way)
 
-    def reach(self) -> float:
-        """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
-        return min(
-            (_AHEAD * max(self.paces[c].intervals[-_MOST:]) for c in self._under_way), default=math.inf
+    def is_closing_in(self, now: float) -> bool:
+        """Whether one of these shrinks so fast that its events are to be settled one by one."""
+        return self.is_under_way(now) and any(
+            _next_turn(self.paces[c])[1] < CLOSING_IN for c in self._under_way
         )
+
+    def reach(self, now: float) -> float:
+        """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
+        if not self.is_under_way(now):
+            return math.inf
+        return min(_AHEAD * max(self.paces[c].intervals[-_MOST:]) for c in self._under_way)
 
     def go_on(self, paces: dict[int, Pace]) -> None:
         """Take up what was known."""
@@ -126,38 +155,34 @@ class Accumulation:
         count = len(instants)
         if count <= _KEPT + 1:
             return self._one_by_one(instants, owners)
-        chosen = [np.arange(count)]
-        if (owners != owners[0]).any():
-            counts = np.bincount(owners)
+        counts = np.bincount(owners)
+        chosen: list[Any] = [slice(None)]
+        if counts[owners[0]] < count:
             among = np.flatnonzero(counts)
             if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
                 among = np.flatnonzero(counts > _TERMS)
                 self.forget(tuple(set(self.paces).difference(among.tolist())))
             chosen = [np.flatnonzero(owners == c) for c in among]
-        if not any(self._falls_often(instants[k], int(owners[k[0]])) for k in chosen):
-            for k in chosen:
-                self._keep_last(instants[k], int(owners[k[0]]))
-            return None
-        kept = np.sort(np.concatenate(chosen))
-        return self._one_by_one(instants[kept], owners[kept])  # worth a closer look
+        paces = []
+        for k in chosen:
+            component = int(owners[k][0])
+            may_have_ended, pace = self._paced(instants[k], component)
+            if may_have_ended:  # worth a closer look
+                kept = np.sort(np.concatenate([np.arange(count)[k] for k in chosen]))
+                return self._one_by_one(instants[kept], owners[kept])
+            paces.append((component, pace))
+        for component, pace in paces:
+            self._note(component, pace)
+        return None
 
-    def _falls_often(self, instants: np.ndarray, component: int) -> bool:
+    def _paced(self, instants: np.ndarray, component: int) -> tuple[bool, Pace]:
+        """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
         pace = self.paces.get(component, BEGINNING)
-        last, rest = pace.last or Instant(*instants[0].tolist()), instants[0 if pace.last else 1 :]
-        work = np.empty((2, _MOST))
-        falls = longest_fall(np.array(pace.intervals), last.high, last.low, rest, self.shortest, work)
-        return falls >= _TERMS
-
-    def _keep_last(self, instants: np.ndarray, component: int) -> None:
-        """Note many events among which no series ends."""
-        pace = self.paces.get(component, BEGINNING)
-        tail = instants[-_KEPT - 1 :]
-        steps = tail[1:] - tail[:-1]
-        gaps = np.abs(steps[:, 0] + steps[:, 1]).tolist()
-        if len(gaps) < _KEPT and pace.last:
-            gaps = [*pace.intervals, abs(Instant(*instants[0].tolist()).minus(pace.last)), *gaps]
-        pace = Pace(Instant(*instants[-1].tolist()), tuple(gaps[-_KEPT:]), pace.longest)
-        self._note(component, pace)
+        first, rest = (pace.last, instants) if pace.last else (Instant(*instants[0].tolist()), instants[1:])
+        known, last = np.array(pace.intervals), np.empty(min(_KEPT, len(pace.intervals) + len(rest)))
+        work, least = np.empty((2, _MOST)), (self.shortest, self.resolution)
+        ended = may_end(known, first.high, first.low, rest, *least, work, last)
+        return ended, Pace(Instant(*instants[-1].tolist()), tuple(last.tolist()), pace.longest)
 
     def _one_by_one(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
         for (high, low), c in zip(instants.tolist(), owners.tolist(), strict=True):
@@ -169,8 +194,8 @@ class Accumulation:
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
         """Note an event of these components; the limit once the rest of a series is below the resolution, else None."""
         times = {c: self._limit_of(instant, c) for c in components}
-        ended = [(time, c) for c, time in times.items() if time is not None]
-        return self._shared(*min(ended)) if ended else None
+        ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
+        return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
         """The limit of a series so far in whose rest an instant lies that is not in step with it."""
@@ -202,7 +227,7 @@ class Accumulation:
         turn, factor = _next_turn(pace)
         rest = sum(pace.intervals[-turn:]) * factor / (1.0 - factor)
         assert pace.last is not None
-        return float(pace.last) + rest, rest
+        return float(pace.last) + self._sign * rest, rest
 
     def _limit_of(self, instant: Instant, component: int) -> float | None:
         before = self.paces.get(component, BEGINNING)
@@ -260,7 +285,7 @@ def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, f
     return (moved, spread, limit) if spread <= least_so_far else (moved, least_so_far, best)
 
 
-def accumulated(limit: Limit, automata: Sequence[Automaton]) -> str:
+def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> str:
     """What a run says that ends where events accumulate and nothing says what follows."""
     changed = [automata[c] for c in limit.components if c != NOBODY]
     names = ", ".join(a.name for a in changed) or "monitors with resets"
@@ -270,7 +295,12 @@ def accumulated(limit: Limit, automata: Sequence[Automaton]) -> str:
         return f"{head}: let a monitor end the run before"
     if not holding:
         return f"{head}: declare the limit that they lead to, a mode of their component"
+    other = (
+        "a smaller rtol or another integrator"
+        if has_rtol
+        else "a shorter step or an integrator of higher order"
+    )
     return (
-        f"{head}, and {' and '.join(holding)} cannot be entered there: take a smaller rtol or another integrator, or "
-        "let a monitor end the run before"
+        f"{head}, and {' and '.join(holding)} cannot be entered there: take {other}, or let a monitor end the run "
+        "before"
     )

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from hybridsim.engine.pieces import Occurrence, Segment
+from hybridsim.engine.pieces import Occurrence, Segment, end_point
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -58,6 +58,12 @@ class SegmentBlock(Block[Segment], Protocol):
         Held states are on their constraints. All in one compiled call: there may be thousands.
         """
 
+    def at_end(self) -> Segment:
+        """The end of the last one, as a segment of no length, in arrays of its own."""
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Knots (m + 1,), states where the steps begin (m or more, n), run-time vector and modes of one of them."""
+
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The run's own steps: numbers of segments (m,) ascending, local times (m,), states (m, n); ends included."""
 
@@ -74,6 +80,9 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component, and of one kind if that is given."""
+
+    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Instants (k, 2) and states x-, x+ (k, 2, n) of those that are transitions, from that number on."""
 
     def since(self, first: int) -> OccurrenceBlock:
         """The same without the items before the first one."""
@@ -123,6 +132,16 @@ class SegmentList(list[Segment]):
             )
         return out
 
+    def at_end(self) -> Segment:
+        """The end of the last one."""
+        last = self[-1]
+        return end_point(last.end, last.z, last.p, last.x[-1])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Knots, states, run-time vector and modes of one of them."""
+        segment = self[i]
+        return segment.s, segment.x, segment.p, segment.z
+
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Numbers of segments, local times, states of all steps."""
         index = np.repeat(np.arange(len(self)), [len(segment.s) for segment in self])
@@ -150,6 +169,13 @@ class OccurrenceList(list[Occurrence]):
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component and kind."""
         return np.array([o.component == component and kind in (None, o.kind) for o in self], dtype=np.bool_)
+
+    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Instants and states of those that are transitions, from that number on."""
+        chosen = [o for o in self[first:] if o.kind == "transition"]
+        if not chosen:
+            return np.empty((0, 2)), np.empty((0, 2, 0))
+        return np.array([o.instant for o in chosen]), np.array([(o.x_minus, o.x_plus) for o in chosen])
 
     def since(self, first: int) -> OccurrenceList:
         """Those from the first on."""

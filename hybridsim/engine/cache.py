@@ -11,6 +11,8 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+from hybridsim.files import cannot_write
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FLOORS = ("engine", "integrators", "mechanics")  # the floors that define kernels
 
@@ -48,9 +50,13 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write in one move, so that another process never reads half a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    os.replace(temporary, path)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(temporary, path)
+    except OSError as fault:
+        os.remove(temporary)
+        raise cannot_write(path, fault) from fault
 
 
 @cache

@@ -25,19 +25,20 @@ class Chain(Sequence[Item]):
     ----------
     loose : makes an empty list for items that come one by one; it is a block as well.
     window : how long back, in the unit of t, items are kept: what is older is forgotten as newer blocks come. The last
-        block stays in any case; with None nothing is kept at all.
+        block stays in any case; with None nothing is kept at all but the `least`.
+    least : so many of the last items are kept however old they are.
     """
 
-    def __init__(self, loose: Callable[[], Any], window: float | None = math.inf) -> None:
+    def __init__(self, loose: Callable[[], Any], window: float | None = math.inf, least: int = 0) -> None:
         self.blocks: list[Any] = []
-        self._loose, self.window = loose, window
+        self._loose, self.window, self._least = loose, window, least
         self.forgotten = 0  # blocks
 
     def append(self, item: Item) -> None:
         """One more item."""
-        if self.window is None:
+        if self.window is None and not self._least:
             return
-        limit = math.inf if self.window == math.inf else _LOOSE
+        limit = math.inf if self.window == math.inf else max(_LOOSE, self._least // 4)
         last = self.blocks[-1] if self.blocks else None
         if not isinstance(last, list) or len(last) >= limit:
             self.blocks.append(last := self._loose())
@@ -51,18 +52,27 @@ class Chain(Sequence[Item]):
 
     def add(self, block: Block[Item]) -> None:
         """A whole block."""
-        if self.window is not None and len(block):
+        if (self.window is not None or self._least) and len(block):
             self.blocks.append(block)
             self._forget()
 
     def _forget(self) -> None:
         """Let go of the blocks that lie further back than the window."""
-        if self.window is None or self.window == math.inf:
+        if self.window == math.inf or len(self.blocks) == 1:
             return
-        now = self.blocks[-1].until
-        while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > self.window:
+        now, window, spare = self.blocks[-1].until, self.window or 0.0, len(self) - self._least
+        while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > window:
+            spare -= len(self.blocks[0])
+            if spare < 0:
+                return
             del self.blocks[0]
             self.forgotten += 1
+
+    def keep_only(self, item: Item) -> None:
+        """This item in place of all."""
+        last = self._loose()
+        last.append(item)
+        self.blocks = [last]
 
     def drop(self, count: int) -> None:
         """Let go of the first items."""

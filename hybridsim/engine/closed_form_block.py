@@ -12,7 +12,7 @@ import numpy as np
 from hybridsim.engine.jit import call, kernel
 from hybridsim.engine.linear_kernels import moved, states_of
 from hybridsim.engine.linear_tables import LinearTables
-from hybridsim.engine.pieces import Segment
+from hybridsim.engine.pieces import Segment, end_point
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -96,6 +96,14 @@ class ClosedFormBlock(Sequence[Segment]):
         )
         return out
 
+    def at_end(self) -> Segment:
+        """The end of the last segment."""
+        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 1])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Start and end, states there, run-time vector and modes of a segment."""
+        return np.array([0.0, self.ends[i]]), self.jumps[i, :2], self.vectors[i], self.modes[i]
+
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Numbers of segments, local times and states at start and end of each segment."""
         index = np.repeat(np.arange(len(self)), 2)
@@ -115,6 +123,5 @@ class ClosedFormBlock(Sequence[Segment]):
             return self.states(np.full(len(s), i), np.asarray(s, dtype=float))
 
         high, low = self.origins[i].tolist()
-        return Segment(
-            Instant(high, low), self.modes[i], self.vectors[i], self.spans[i], self.jumps[i, :2], dense
-        )
+        s, x, p, z = self.steps_of(i)
+        return Segment(Instant(high, low), z, p, s, x, dense)

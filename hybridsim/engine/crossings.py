@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,13 +17,22 @@ if TYPE_CHECKING:
 
 
 @kernel
-def _taking_part(fired: Any, before: Any, after: Any, owner: Any, has_surface: Any) -> int:
-    """How many changes of mode there are, and resets that change none."""
-    count = 0
+def _taking_part(
+    fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, places: Any
+) -> tuple[int, bool]:
+    """How many changes of mode there are, and resets that change none; whether there is one at each event.
+
+    places (2, m): of which event and component each is, as far as there is room.
+    """
+    count, is_plain = 0, True
     for e in range(fired.shape[0]):
         for c in range(before.shape[1]):
-            count += before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c])
-    return count
+            if before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c]):
+                if count < places.shape[1]:
+                    places[0, count], places[1, count] = e, c
+                count += 1
+        is_plain = is_plain and count == e + 1
+    return count, is_plain
 
 
 class Crossings(Sequence[Occurrence]):
@@ -50,19 +58,21 @@ class Crossings(Sequence[Occurrence]):
         self._system, self._instants, self._fired = system, instants, fired
         self._before, self._after, self._states = before, after, states
         self._first = 0
-        self._count = int(_taking_part(fired, before, after, system.owner, system.has_surface))
+        places = np.empty((2, len(fired)), dtype=np.int64)
+        found = _taking_part(fired, before, after, system.owner, system.has_surface, places)
+        self._count, self._is_plain = found
+        if self._count > len(fired):
+            places = np.empty((2, self._count), dtype=np.int64)
+            _taking_part(fired, before, after, system.owner, system.has_surface, places)
+        self._all_places = places[:, : self._count]
 
     def __len__(self) -> int:
         return self._count - self._first
 
-    @cached_property
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Event and component of each occurrence."""
-        owners = self._system.owner[self._fired]
-        taking_part = self._before != self._after
-        taking_part[np.arange(len(owners)), owners] |= ~self._system.has_surface[owners]
-        events, components = np.nonzero(taking_part)
-        return events[self._first :], components[self._first :]
+    @property
+    def _places(self) -> np.ndarray:
+        """Event and component (2, occurrences) of each occurrence."""
+        return self._all_places[:, self._first :]
 
     @property
     def until(self) -> Instant:
@@ -72,7 +82,8 @@ class Crossings(Sequence[Occurrence]):
     @property
     def times(self) -> np.ndarray:
         """Times rounded to doubles."""
-        return (self._instants[:, 0] + self._instants[:, 1])[self._places[0]]
+        times = self._instants[:, 0] + self._instants[:, 1]
+        return times[self._first :] if self._is_plain else times[self._places[0]]
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component; all are transitions, or changes of a corner's side."""
@@ -81,32 +92,61 @@ class Crossings(Sequence[Occurrence]):
             return np.zeros(len(self), dtype=np.bool_)
         return self._places[1] == names.index(component)
 
+    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Instants and states of those that are transitions, from that number on."""
+        has_corners = len(self._system.declared) < len(self._system.automata)
+        if self._is_plain and not has_corners:
+            return self._instants[self._first + first :], self._states[self._first + first :]
+        events, components = self._places[:, first:]
+        if has_corners:
+            events = events[~self._system.is_corner[components]]
+        return self._instants[events], self._states[events]
+
     def since(self, first: int) -> Crossings:
         """Those from the first on."""
         later = copy(self)
-        vars(later).pop("_places", None)
         later._first += first
         return later
 
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return list(self._made(i))
-        k = range(len(self))[i]
-        return next(self._made(slice(k, k + 1)))
+        e, c = self._places[:, range(len(self))[i]].tolist()
+        fired, source, target = int(self._fired[e]), int(self._before[e, c]), int(self._after[e, c])
+        x_minus, x_plus = self._states[e]
+        return self._occurrence(c, fired, source, target, self._instants[e].tolist(), x_minus, x_plus)
 
     def __iter__(self) -> Iterator[Occurrence]:
         return self._made(slice(None))
 
     def _made(self, chosen: slice) -> Iterator[Occurrence]:
-        automata, owner = self._system.automata, self._system.owner.tolist()
         e, c = (places[chosen] for places in self._places)
-        changes = zip(
-            self._fired[e].tolist(), self._before[e, c].tolist(), self._after[e, c].tolist(), strict=True
+        rows = zip(
+            c.tolist(),
+            self._fired[e].tolist(),
+            self._before[e, c].tolist(),
+            self._after[e, c].tolist(),
+            self._instants[e].tolist(),
+            self._states[e],
+            strict=True,
         )
-        rows = zip(c.tolist(), changes, self._instants[e].tolist(), self._states[e], strict=True)
-        for component, (fired, source, target), (high, low), (x_minus, x_plus) in rows:
-            automaton, guard = automata[component], ""
-            if component == owner[fired]:
-                guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
-            names = (automaton.name, guard, automaton.modes[source], automaton.modes[target])
-            yield Occurrence(Instant(high, low), automaton.kind, *names, -1, x_minus, x_plus)
+        for component, fired, source, target, instant, (x_minus, x_plus) in rows:
+            yield self._occurrence(component, fired, source, target, instant, x_minus, x_plus)
+
+    def _occurrence(
+        self,
+        component: int,
+        fired: int,
+        source: int,
+        target: int,
+        instant: list[float],
+        x_minus: np.ndarray,
+        x_plus: np.ndarray,
+    ) -> Occurrence:
+        automaton, guard, modes = self._system.automata[component], "", self._system.automata[component].modes
+        if component == self._system.owner[fired]:
+            guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
+        at = Instant(*instant)
+        return Occurrence(
+            at, automaton.kind, automaton.name, guard, modes[source], modes[target], -1, x_minus, x_plus
+        )

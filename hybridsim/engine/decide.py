@@ -7,6 +7,8 @@ and the Python driver share these functions.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -171,7 +173,12 @@ def decree_orders(
                 decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero, gaps[c])
 
 
-def joint_candidates(sizes: list[int]) -> np.ndarray:
-    """All combinations of modes of a cluster, one row each."""
+def joint_candidates(sizes: Iterable[int]) -> np.ndarray:
+    """All combinations of modes of a cluster, one row each; not to be written to."""
+    return _joint(tuple(sizes))
+
+
+@cache
+def _joint(sizes: tuple[int, ...]) -> np.ndarray:
     grid = np.indices(sizes).reshape(len(sizes), -1).T
     return np.ascontiguousarray(grid, dtype=np.int64)

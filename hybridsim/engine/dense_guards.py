@@ -9,13 +9,17 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import inlined, kernel
-from hybridsim.engine.leap import earliest_exit, holds
-from hybridsim.engine.taylor import advance, reach
+from hybridsim.engine.leap import earliest_exit
+from hybridsim.engine.steps_ahead import keeps_up, sum_at
+from hybridsim.engine.taylor import advance, reach, sum_sizes, tabulate
 
 _SHORTER = 0.25
 _LONGER = 4.0
 _ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to all that is summed for it
 _SHORTEST = 2.0**-40  # of a step: a stretch on which a guard's series says nothing
+_MOST_STRETCHES = (
+    4096  # of a step: near a point without a value they get so short that there is no end of them
+)
 
 
 @kernel
@@ -96,9 +100,14 @@ def first_linear_guard(
                 V[watched[i], j] = polynomials[i, j]
             for j in range(degree + 1, degree + 3):  # nothing is left out: so much for the error of a series
                 V[watched[i], j] = 0.0
+        tabulate(d, degree + 2, room.powers)
+        watched = watched[:count]
+        for i in range(count):
+            room.totals[i] = sum_sizes(V, watched[i], degree + 2, room.powers)
         outcome, g, at = earliest_exit(
-            tapes, k, degree + 2, d, sides, orders, floors, V, room.a, room.b, room.stack
-        )
+            tapes, k, degree + 2, d, sides, orders, floors, V, watched, room.powers, room.totals, room.a, room.b,
+            room.stack, room.bernstein,
+        )  # fmt: skip
     if outcome == NEVER:
         begin_positive(sides, orders, floors)
     return outcome, g, at
@@ -141,19 +150,23 @@ def first_guard(
     time, states, V, W = inputs.time[0], inputs.states, room.V, room.W
     none = states[:0]
     q = 0.0
-    while q < d:
+    for _ in range(_MOST_STRETCHES):
+        if not q < d:
+            return NEVER, -1, d
         shifted(room.polynomial, q, states, order, V)
         if time >= 0:
             V[time, 0], V[time, 1] = s + q, 1.0
         for j in range(order + 1):
             advance(rows, V, j)
         left = d - q
-        w = reach(V, none, watched, order, rtol, atol, min(left, likely_reach(V, watched, order, rtol)))
+        longest = min(left, likely_reach(V, watched, order, rtol))
+        w = reach(0, V, none, V, watched, order, rtol, atol, longest, room.powers, room.totals)
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes, k, order, w, room.sides, room.orders, room.floors, V, room.a, room.b, room.stack
-        )
+            tapes, k, order, w, room.sides, room.orders, room.floors, V, watched, room.powers, room.totals, room.a,
+            room.b, room.stack, room.bernstein,
+        )  # fmt: skip
         if outcome == OPEN:
             return OPEN, g, q + at
         while True:
@@ -161,9 +174,15 @@ def first_guard(
                 W[states[i], 0] = V[states[i], order]
                 for j in range(order - 1, -1, -1):
                     W[states[i], 0] = W[states[i], 0] * at + V[states[i], j]
-            if holds(
-                rows, (time, none, none), order, s + q, atol, atol, at, rtol, atol, watched, V, W
-            ):  # of states it is asked nothing
+            if time >= 0:
+                W[time, 0] = s + q + at
+            advance(rows, W, 0)
+            tabulate(at, order, room.powers)
+            values = room.values
+            for j in range(watched.shape[0]):
+                values[j] = W[watched[j], 0]
+                room.sums[j] = sum_at(V, watched[j], order, room.powers)
+            if keeps_up(V, watched, order, room.powers, rtol, values, room.sums):
                 break
             at, outcome = _SHORTER * at, NEVER
             if not at > _SHORTEST * d:
@@ -172,4 +191,4 @@ def first_guard(
             return FOUND, g, q + at
         q = d if at >= left else q + at
         begin_positive(room.sides, room.orders, room.floors)
-    return NEVER, -1, d
+    return (OPEN, -1, q) if q < d else (NEVER, -1, d)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.trajectory import Trajectory
 
 _GROWN = 1e6  # times the size at the start (or 1): worth saying where no step succeeds any more
+_SQUARED = 1e150  # norms are sums of squares
 _NEAR, _FARTHEST = 60, 1e-5  # halvings of a probe, which reaches this share of the time so far
 
 
@@ -54,7 +55,34 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         lost = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
         if len(lost):
             return _said(system, "just after,", [system.guard_title(int(g), z) for g in lost], x, z)
-    return ""
+    return _steep(system, s, x, p, z, rates, first, reach)
+
+
+def _steep(
+    system: System,
+    s: float,
+    x: np.ndarray,
+    p: np.ndarray,
+    z: np.ndarray,
+    rates: np.ndarray,
+    first: np.ndarray,
+    reach: float,
+) -> str:
+    """What has a value, and moves too fast or is too large for any step; empty where nothing does."""
+    found = [
+        f"{system.names[i]} = {x[i]:.3g} is too large to be squared"
+        for i in np.flatnonzero(np.abs(x) > _SQUARED)
+    ]
+    if found:
+        return ", ".join(found)
+    steep = np.flatnonzero(np.abs(rates) * reach > np.maximum(first, np.abs(x)))
+    found = [f"{system.names[i]} = {x[i]:.3g} has the rate {rates[i]:.3g}" for i in steep]
+    none = np.zeros(system.n)
+    guards = system.series(s, x, p, z, none, 0.0).guards
+    poles = system.active(z) & (np.abs(guards[:, 2]) * reach > np.abs(guards[:, 1]))
+    for g in np.flatnonzero(poles & (np.abs(guards[:, 1]) * reach > np.abs(guards[:, 0]))):
+        found.append(f"{system.guard_title(int(g), z)} = {guards[g, 0]:.3g} has the rate {guards[g, 1]:.3g}")
+    return f"{', '.join(found)}: there may be a pole" if found else ""
 
 
 def power_without_value(system: System, names: list[str], t: float, x: np.ndarray) -> str:

@@ -14,6 +14,7 @@ from hybridsim.engine.program import Assign, Item, Switch, needed
 from hybridsim.engine.program_names import user
 from hybridsim.engine.stepped_rows import stepped
 from hybridsim.engine.tape import TapeBuilder
+from hybridsim.engine.ties import told
 from hybridsim.expr.symbolic import derivative
 from hybridsim.model.rewriting import VARIABLE
 
@@ -140,17 +141,19 @@ class Emitter:
     def quantities(self) -> list[tuple[str, Any]]:
         """Every named quantity that is no state: inputs, definitions, variables of modes, outputs."""
         model, lowering = self.program.model, self.lowering
+        forces = told(lowering, lowering.ties)
         result: dict[str, Any] = {i.name: user(i.name) for i in model.inputs}
         result |= {n: user(n) for n, _ in model.definitions}
         for component in self.program.components:
             names = sorted({n for m in component.modes for n in m.set if not n.startswith(VARIABLE)})
             result |= {n: user(n) for n in names}
             if component.surface:
-                result[component.surface.unknown] = user(component.surface.unknown)
+                unknown = lowering.symbols[component.surface.unknown]
+                result[component.surface.unknown] = forces.get(unknown, unknown.name)
         for output in model.outputs:
-            result[output.name] = lowering.convert(output.expr)
+            result[output.name] = lowering.convert(output.expr).subs(forces, simultaneous=True)
             for place, e in output.modes.items():
-                result[f"{output.name} in {place}"] = lowering.convert(e)
+                result[f"{output.name} in {place}"] = lowering.convert(e).subs(forces, simultaneous=True)
         return list(result.items())
 
     def _jumps(self) -> list[tuple[str, Any]]:
@@ -304,6 +307,7 @@ class Emitter:
             "pins": program.pins,
             "projected": program.projected,
             "clusters": tuple(tuple(g) for g in program.clusters),
+            "ties": tuple((tie.gap, tie.along, tie.is_one) for tie in program.ties),
             "rates": len(program.rates),
             "linear": program.linear,
             "quantities": tuple(n for n, _ in self.quantities()),

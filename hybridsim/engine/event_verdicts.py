@@ -15,7 +15,7 @@ from hybridsim.engine.decide import (
 )
 from hybridsim.engine.event_work import find_modes
 from hybridsim.engine.jets import ORDER, run_series
-from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.jit import call, call_series, inlined, kernel
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
 
 UNKNOWN = -2  # in place of a verdict
@@ -29,15 +29,19 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
     """
     if is_linear(lin):
         return
-    values, bounds, V, E = work.values, work.bounds, work.V, work.E
+    judged, V, E = work.judged, work.V, work.E
+    if tapes.bounds[k] != 0:
+        call_series(tapes.bounds[k], at.s, at.s_error, x, x_error, at.p, judged)
+        return
+    tapes.lacked[k] += 1
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
     run_series(constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, V, E)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         r = tapes.guards[k, g]
-        for j in range(values.shape[1]):
-            values[g, j], bounds[g, j] = V[r, j], E[r, j]
+        for j in range(judged.shape[2]):
+            judged[0, g, j], judged[1, g, j] = V[r, j], E[r, j]
 
 
 @inlined
@@ -56,7 +60,7 @@ def guard_side(
     """
     if is_linear(lin):
         return linear_side(lin, k, g, decreed, x, x_error, work.w, work.w_error)
-    values, bounds = work.values[g], work.bounds[g]
+    values, bounds = work.judged[0, g], work.judged[1, g]
     side, order = side_after(values, bounds, decreed)
     return side, order, side == 0 and open_question(values, bounds, decreed)
 
@@ -66,7 +70,7 @@ def size_at(lin: Any, k: int, g: int, x: Any, x_error: Any, work: Any) -> tuple[
     """The value of a guard and its bound."""
     if is_linear(lin):
         return linear_coefficient(lin, k, g, 0, x, x_error, work.w, work.w_error)
-    return work.values[g, 0], work.bounds[g, 0]
+    return work.judged[0, g, 0], work.judged[1, g, 0]
 
 
 @inlined

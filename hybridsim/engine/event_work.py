@@ -37,7 +37,8 @@ class Before(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one event: series with bounds (registers, 4), guards' rows of them, what holds after it, candidates.
+    """Room for one event: series with bounds (registers, 4), judged (2, guards, 4): those of guards and their bounds,
+    what holds after it, candidates.
 
     functions (5,): those of `Functions`. reached (1,): address of the kernel that settles it. whole, real: what the
     places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes (n,) of the flow there.
@@ -61,8 +62,7 @@ class Work(NamedTuple):
     factors: np.ndarray
     w: np.ndarray
     w_error: np.ndarray
-    values: np.ndarray
-    bounds: np.ndarray
+    judged: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
     floors: np.ndarray
@@ -130,8 +130,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
             factors=np.zeros((2 * atoms, 2)),
             w=np.zeros(monomials),
             w_error=np.zeros(monomials),
-            values=np.empty((guards, ORDER + 1)),
-            bounds=np.empty((guards, ORDER + 1)),
+            judged=np.empty((2, guards, ORDER + 1)),
             sides=np.ones(guards, dtype=np.int64),
             orders=numbers(guards),
             floors=np.zeros(guards),

@@ -9,15 +9,17 @@ import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.exact_leap import Record, Room, exact_leap
+from hybridsim.engine.jit import Door
 from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
-from hybridsim.engine.packs import packed
-from hybridsim.engine.segment_end import State, reach_settling
+from hybridsim.engine.packs import Sheet, packed
+from hybridsim.engine.segment_end import reach_settling
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -25,6 +27,8 @@ from hybridsim.engine.trajectory import Trajectory
 
 _SEGMENTS = 1024  # room for one call
 _NONE = np.zeros(0, dtype=np.int64)
+
+_leap = Door(exact_leap)
 
 
 class ExactLeaper:
@@ -39,11 +43,7 @@ class ExactLeaper:
             functions_of(system),
         )
         layout = system.layout
-        self.places = (
-            np.asarray(system.rates),
-            layout.origin_at,
-            layout.phases_at,
-        )
+        self.places = (system.rates, layout.origin_at, layout.phases_at)
 
     @property
     def place(self) -> np.ndarray:
@@ -59,40 +59,30 @@ class ExactLeaper:
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
         self.shelf.surround(outcome.z)
-        clock, to = np.array([origin.high, origin.low]), np.array([target.high, target.low])
-        state = State(
-            outcome.x.copy(),
-            outcome.x_error.copy(),
-            outcome.z.copy(),
-            p.copy(),
-            outcome.sides.copy(),
-            outcome.orders.copy(),
-            outcome.guard_floors.copy(),
-        )
-        tapes = self.shelf.tapes
+        tapes, inputs = self.shelf.tapes, self.system.registers.inputs
         self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
         found = tables_of(self.system, tapes.modes, p, self.horizon)
         if found is None:
             return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         tables, spare = found
-        as_packed = packed(state)
         try:
-            work, room = spare.pop()
+            desk = spare.pop()
         except IndexError:
-            work, room = self._scratch(tables)
-            reach_settling(self.automata, tapes, self.system.registers.inputs, tables, as_packed, work)
-        rows = self._record(tables)
-        record_packed, began = packed(rows), perf_counter()
-        code, count = exact_leap(
-            self.functions, self.automata, tapes, self.system.registers.inputs, tables, self.places, self.longest,
-            to, clock, as_packed, work, room, record_packed,
+            desk = Desk.of(outcome, p, *self._scratch(tables))
+            reach_settling(self.automata, tapes, inputs, tables, desk.as_packed, desk.work)
+        desk.take_up(outcome, p)
+        sheet = self._sheet(tables)
+        clock, to, memory = np.array(origin), np.array(target), sheet.blank()
+        rows, began = sheet.packed(memory), perf_counter()
+        code, count = _leap(
+            self.functions, self.automata, tapes, inputs, tables, self.places, self.longest,
+            to, clock, desk.as_packed, desk.work, desk.room, rows,
         )  # fmt: skip
         record.counters.kernel_time += perf_counter() - began
-        spare.append((work, room))
-        instants, owners = self._commit(tables, Record(*(r[:count] for r in rows)), state[2], clock, record)
-        x, x_error, z, p, sides, orders, floors = state
-        self.shelf.surround(z)
-        after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
+        after = desk.outcome()
+        spare.append(desk)
+        instants, owners = self._commit(tables, sheet.rows(memory), count, after.z, clock, record)
+        self.shelf.surround(after.z)
         goes_on = code == FULL or (count > 0 and len(self.shelf.tapes.modes) != len(tapes.modes))
         end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
         return Landing(Instant(*clock.tolist()), after, end, instants, owners)
@@ -111,44 +101,68 @@ class ExactLeaper:
         )
         return work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1), packed(room)
 
-    def _record(self, tables: LinearTables) -> Record:
-        """Fresh arrays for the kernel to write to; the trajectory keeps them."""
-        n, count = self.system.n, len(self.system.automata)
-        return Record(
-            np.empty(_SEGMENTS),
-            np.empty((_SEGMENTS, 2)),
-            np.empty(_SEGMENTS, dtype=np.int64),
-            np.empty((_SEGMENTS, count), dtype=np.int64),
-            np.empty((_SEGMENTS, self.system.layout.size)),
-            np.empty((_SEGMENTS, tables.values.shape[1]), dtype=complex),
-            np.empty(_SEGMENTS, dtype=np.int64),
-            np.empty((_SEGMENTS, 3, n)),
-        )
+    def _sheet(self, tables: LinearTables) -> Sheet:
+        """What the kernel writes to; the trajectory keeps it, events longer than segments."""
+        widest, system = tables.values.shape[1], self.system
+
+        def made() -> Sheet:
+            return Sheet(
+                Record,
+                (
+                    (float, (_SEGMENTS,), 0),
+                    (
+                        float,
+                        (_SEGMENTS + 1, 2),
+                        1,
+                    ),  # one row more: where each begins and where the last one ends
+                    (np.int64, (_SEGMENTS,), 0),
+                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+                    (float, (_SEGMENTS, system.layout.size), 0),
+                    (complex, (_SEGMENTS, widest), 0),
+                    (np.int64, (_SEGMENTS,), 1),
+                    (float, (_SEGMENTS, 3, system.n), 1),
+                ),
+            )
+
+        sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
+        return sheet
 
     def _commit(
         self,
         tables: LinearTables,
         rows: Record,
+        count: int,
         z_after: np.ndarray,
         clock: np.ndarray,
         record: Trajectory,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Leave what was written to the trajectory; the instants (E, 2) of its events, and whose they are."""
+        """Leave so many segments to the trajectory; the instants (E, 2) of their events, and whose they are."""
         ends, origins, numbers, modes, vectors, coordinates, fired, jumps = rows
-        count = len(ends)
         if not count:
             return np.empty((0, 2)), _NONE
-        system, counters = self.system, record.counters
+        system, counters, begun = self.system, record.counters, slice(0, count)
+        origins[count], modes[count] = clock, z_after
         record.segments.add(
-            ClosedFormBlock(system, tables, numbers, ends, coordinates, origins, modes, vectors, jumps)
+            ClosedFormBlock(
+                system,
+                tables,
+                numbers[begun],
+                ends[begun],
+                coordinates[begun],
+                origins[begun],
+                modes[begun],
+                vectors[begun],
+                jumps[begun],
+            )
         )
         counters.steps += count
         counters.restarts += count
-        events = count if fired[-1] >= 0 else count - 1
-        instants = np.concatenate([origins[1:], clock[None]])[:events]
+        events = count if fired[count - 1] >= 0 else count - 1
+        instants, ended, after = origins[1 : events + 1], slice(0, events), slice(1, events + 1)
         if events:
-            after = np.concatenate([modes[1:], z_after[None]])[:events]
-            crossings = Crossings(system, instants, fired[:events], modes[:events], after, jumps[:events, 1:])
+            crossings = Crossings(
+                system, instants, fired[ended], modes[ended], modes[after], jumps[ended, 1:]
+            )
             counters.events += len(crossings)
             record.occurrences.add(crossings)
-        return instants, system.owner[fired[:events]]
+        return instants, system.owner[fired[ended]]

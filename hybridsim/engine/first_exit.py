@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import call_series, kernel, polynomial_kernel
 
 NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, a question of rounding
+POSITIVE, NEGATIVE, WITHIN, ONCE, MIXED = range(5)  # what is known of the signs of a piece
 _DEEPEST = 40  # halvings; a piece that narrow and still open is a touch
 _POLISH = 100  # iterations: bisection alone needs 53
-_NEAR = 1e-10  # relative change by Newton's method that leaves an error below rounding, even where the slope halves
+_NEAR = 1e-6  # relative change by Halley's method, of third order, from which on what is left of the error is told
 
 
 @kernel
@@ -23,23 +24,24 @@ def to_bernstein(a: Any, b: Any) -> None:
     """Bernstein coefficients b_j = sum_{k<=j} C(j, k)/C(n, k) a_k of sum_k a_k theta**k, n the degree."""
     n = a.shape[0] - 1
     b[0] = a[0]
-    binomial = 1.0
+    share = 1.0  # of one in C(n, k)
     for k in range(1, n + 1):
-        binomial *= (n - k + 1.0) / k
-        b[k] = a[k] / binomial
+        share *= k / (n - k + 1.0)
+        b[k] = a[k] * share
     for k in range(1, n + 1):  # from differences to values: sums over Pascal's triangle
         for j in range(n, k - 1, -1):  # backward, so that no sum waits for another
             b[j] += b[j - 1]
 
 
 @kernel
-def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[int, float]:
+def first_exit(a: Any, error: float, order: int, b: Any, stack: Any, code: int) -> tuple[int, float]:
     """Where p(theta) = sum_k a_k theta**k first goes negative on (0, 1].
 
     The first `order` coefficients are zero by decree and the next is positive; error bounds the distance of p from the
     function that it stands for. (NEVER, 1) where p stays above the bound; (FOUND, theta); (OPEN, theta) where it comes
     within the bound without a certain change of sign up to the next certain one, or at the end. b (m,), stack (64, m +
-    2): room for m coefficients, and for pieces with their left ends and widths.
+    2): room for m coefficients, and for pieces with their left ends and widths. code: address of a function that does
+    `to_bernstein` for that many coefficients (`hybridsim.engine.bernstein_code`), 0 for none.
     """
     m = a.shape[0] - order
     for i in range(m):
@@ -51,26 +53,28 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
         return NEVER, 1.0
     if order > 0:
         b[0] = max(b[0], 2.0 * error)  # positive by decree, whatever rounding made of it
-    to_bernstein(b[:m], stack[0, :m])
+    if code != 0:
+        call_series(code, 0.0, 0.0, b, b, b, stack)
+    else:
+        to_bernstein(b[:m], stack[0, :m])
     stack[0, m], stack[0, m + 1] = 0.0, 1.0
     top, touched, last = 1, -1.0, 0.0
     while top > 0:
         top -= 1
         left, width = stack[top, m], stack[top, m + 1]
-        low, high = math.inf, -math.inf
-        for i in range(m):
-            low, high = min(low, stack[top, i]), max(high, stack[top, i])
-        if low > error:
+        kind = signs_of(stack[top, :m], error)
+        if kind == POSITIVE:
             if touched >= 0.0:
                 return OPEN, touched
             last = left + width
             continue
-        if high < -error:
+        if kind == NEGATIVE:
             start = last if touched < 0.0 else touched
-            return FOUND, polished(a, order, min(last, start), left)
-        if touched < 0.0 and changes_once(stack[top, :m], error):
-            return FOUND, polished(a, order, left, left + width)
-        if width <= 2.0**-_DEEPEST or (low >= -error and high <= error):
+            return FOUND, polished(a, order, min(last, start), left, 0.5 * (min(last, start) + left))
+        if touched < 0.0 and kind == ONCE:
+            start = left + width * change_of_sign(stack[top, :m])
+            return FOUND, polished(a, order, left, left + width, start)
+        if width <= 2.0**-_DEEPEST or kind == WITHIN:
             if touched < 0.0:
                 touched = left
             continue
@@ -88,37 +92,81 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any) -> tuple[in
 
 
 @kernel
-def changes_once(b: Any, error: float) -> bool:
-    """Whether a piece certainly begins positive, ends negative and has one zero: its coefficients change sign once."""
-    if not (b[0] > error and b[b.shape[0] - 1] < -error):
-        return False
+def signs_of(b: Any, error: float) -> int:
+    """What the Bernstein coefficients of a piece tell of its signs.
+
+    POSITIVE, NEGATIVE: all of them are, beyond the error; WITHIN: none is beyond it. ONCE: it certainly begins
+    positive, ends negative and has one zero, since they change their sign once.
+    """
+    m = b.shape[0]
+    above = 0
+    while above < m and b[above] > error:
+        above += 1
+    if above == m:
+        return POSITIVE
+    if above == 0:
+        below, within = 0, 0
+        for i in range(m):
+            below += b[i] < -error
+            within += abs(b[i]) <= error
+        return NEGATIVE if below == m else WITHIN if within == m else MIXED
+    if not b[m - 1] < -error:
+        return MIXED
     changes = 0
-    for i in range(1, b.shape[0]):
-        if (b[i] < 0.0) != (b[i - 1] < 0.0):
-            changes += 1
-    return changes == 1
+    for i in range(above, m):
+        changes += (b[i] < 0.0) != (b[i - 1] < 0.0)
+    return ONCE if changes == 1 else MIXED
 
 
 @kernel
-def polished(a: Any, order: int, left: float, right: float) -> float:
-    """The zero of the deflated polynomial between a point where it is positive and one where it is negative."""
+def change_of_sign(b: Any) -> float:
+    """Where on [0, 1] the polygon of the Bernstein coefficients, which begins positive, changes its sign first."""
+    i = 1
+    while b[i] >= 0.0:
+        i += 1
+    return (i - 1 + b[i - 1] / (b[i - 1] - b[i])) / (b.shape[0] - 1)
+
+
+@polynomial_kernel
+def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
+    """The polynomial without its first `order` coefficients, its slope, and half its second derivative."""
     n = a.shape[0] - 1
-    theta = 0.5 * (left + right)
+    value, slope, curvature = a[n], 0.0, 0.0
+    for k in range(n - 1, order - 1, -1):
+        curvature = curvature * theta + slope
+        slope = slope * theta + value
+        value = value * theta + a[k]
+    return value, slope, curvature
+
+
+@kernel
+def polished(a: Any, order: int, left: float, right: float, start: float) -> float:
+    """The zero of the deflated polynomial between a point where it is positive and one where it is negative.
+
+    By Halley's method (W. Gander, American Mathematical Monthly 92 (1985) 131) from a guess between them, and by
+    bisection where it leads out.
+    """
+    theta = start
     for _ in range(_POLISH):
-        value, slope = a[n], 0.0
-        for k in range(n - 1, order - 1, -1):
-            slope = slope * theta + value
-            value = value * theta + a[k]
+        value, slope, curvature = _expanded(a, order, theta)
         if value > 0.0:
             left = theta
         elif value < 0.0:
             right = theta
         else:
             return theta
-        moved, near = theta - value / slope if slope != 0.0 else math.nan, _NEAR
-        if not left < moved < right:
-            moved, near = 0.5 * (left + right), 2.0**-53
-        if abs(moved - theta) <= near * theta or not left < moved < right:
-            return moved
+        change = value / slope if slope != 0.0 else math.nan
+        bend = change * curvature / slope  # the error that is left is about its square times the change
+        if bend < 0.5:
+            change /= 1.0 - bend
+        moved = theta - change
+        if left < moved < right:
+            change = abs(change)
+            if change <= _NEAR * theta and change * bend * bend <= 2.0**-53 * theta:
+                return moved
+        else:
+            moved = 0.5 * (left + right)
+            if abs(moved - theta) <= 2.0**-53 * theta or not left < moved < right:
+                return moved
         theta = moved
     return theta

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.blocks import SegmentList
 from hybridsim.engine.fixed_dense import StepDense
-from hybridsim.engine.pieces import Occurrence, Segment
+from hybridsim.engine.pieces import Occurrence, Segment, end_point
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -94,6 +94,16 @@ class StepSegments(Sequence[Segment]):
         rows = np.arange(len(index)) - np.repeat(starts - self._first, counts)
         return index, self._s[rows], self._x[rows]
 
+    def at_end(self) -> Segment:
+        """The end of the last one."""
+        last = int(self._last[-1])
+        return end_point(self.until, self._z[int(self._first[-1])], self._p, self._x[last])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Knots, states, run-time vector and modes of one of them."""
+        first, last = int(self._first[i]), int(self._last[i])
+        return self._s[first : last + 1], self._x[first : last + 1], self._p, self._z[first]
+
     def since(self, first: int) -> StepSegments:
         """Those from the first on."""
         later = copy(self)
@@ -103,9 +113,9 @@ class StepSegments(Sequence[Segment]):
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
-        first, last = int(self._first[i]), int(self._last[i])
-        s, x = self._s[first : last + 1].copy(), self._x[first : last + 1].copy()
-        dense = StepDense(self._system, self._p, self._z[first].copy(), s, x)
+        s, x, p, z = self.steps_of(i)
+        dense = StepDense(self._system, p, z.copy(), s.copy(), x.copy())
+        s, x = dense.s, dense.x
         return Segment(self._origin, dense.z, self._p, s, x, dense)
 
 
@@ -152,6 +162,12 @@ class StepOccurrences(Sequence[Occurrence]):
         if component not in names or kind not in (None, "transition"):
             return np.zeros(len(self), dtype=np.bool_)
         return self._components == names.index(component)
+
+    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Instants and states of those from that number on: nothing jumps."""
+        instants = [self._origin.plus(s) for s in self._s[first:].tolist()]
+        states = np.stack([self._x[first:]] * 2, axis=1)
+        return np.array(instants).reshape(-1, 2), states
 
     def since(self, first: int) -> StepOccurrences:
         """Those from the first on."""

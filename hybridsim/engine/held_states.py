@@ -114,8 +114,12 @@ class HeldStates:
         components = list(dict.fromkeys(c for c, _ in held))
         titles = dict.fromkeys(lowering.title(c, plural=True) for c in components)
         remedy = "merge contacts that share one relative velocity, and surfaces that are one"
-        if any(lowering.components[c].surface.is_unilateral for c in components):
+        kinds = [lowering.components[c].surface for c in components]
+        if any(surface.is_unilateral for surface in kinds):
             remedy += "; write gaps that are never zero together as mirror images (x and 1 - x), or as modes"
+        if not any(surface.unique for surface in kinds):
+            remedy += "; or declare the structure with its matrices, as an hs.MechanicalSystem, which takes "
+            remedy += "more contacts than are needed to hold it"
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
@@ -141,11 +145,17 @@ class HeldStates:
         if not open_:
             return taken if self._acyclic(taken) else None
         for i in choices[open_[0]]:
-            if all(self._exclude(open_[0][0], c) for (c, _), j in taken.items() if i == j):
+            if all(self._may_share(open_[0], d) for d, j in taken.items() if i == j):
                 result = self._match(open_[1:], choices, taken | {open_[0]: i})
                 if result is not None:
                     return result
         return None
+
+    def _may_share(self, one: Held, other: Held) -> bool:
+        """Whether two constraints never hold at once, or are one: the rate of a gap and a contact along it."""
+        rates = {one, other}
+        tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.ties)
+        return tied or self._exclude(one[0], other[0])
 
     def _exclude(self, c: int, d: int) -> bool:
         """Whether two gaps are never zero at once: one grows as the other shrinks, by as much."""

@@ -22,9 +22,8 @@ from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.system import Automaton, Series, System
 from hybridsim.engine.timepair import Instant
-from hybridsim.engine.trajectory import Trajectory
+from hybridsim.engine.trajectory import LOOKED_BACK_ON, Trajectory
 
-_FARTHEST = 4096  # events that are looked back on
 _STRIDE = 1.5  # ratio of the speeds of the bounces that are looked at
 _LEAST_LOSS = 1e-4  # of speed in a bounce; with less there are 10**4 of them and more to a digit
 _FEW = 2  # bounces that have to agree where it is no law of impacts that says what they are
@@ -156,7 +155,7 @@ def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterato
     """The bounces of a component before the last one, backward, until it rested."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
-    for o in islice(events, _FARTHEST):
+    for o in islice(events, LOOKED_BACK_ON):
         if o.component == automaton.name and o.instant != last.instant:
             bounce = _recorded(automaton, o)
             if automaton.hold in (bounce.source, bounce.target):

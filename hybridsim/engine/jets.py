@@ -54,29 +54,51 @@ ORDER = 3  # guards are judged by their derivatives up to the third
 
 
 @inlined
-def _product(V: Any, E: Any, a: int, b: int, k: int, first: int, last: int) -> tuple[float, float]:
-    """sum_{i=first}^{last} a_i b_{k-i} and its error bound."""
-    total, error = 0.0, 0.0
-    for i in range(first, last + 1):
-        term = V[a, i] * V[b, k - i]
-        total += term
-        error += abs(V[a, i]) * E[b, k - i] + E[a, i] * abs(V[b, k - i]) + UNIT * abs(term)
-        error += E[a, i] * E[b, k - i]
-        if i > first:
-            error += UNIT * abs(total)
+def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) -> tuple[float, float]:
+    """u a_i b_j + v a_j b_i and its error bound, for whole numbers u and v of which the products are rounded, too."""
+    first, second = u * V[a, i] * V[b, j], v * V[a, j] * V[b, i]
+    error = u * (abs(V[a, i]) * E[b, j] + E[a, i] * (abs(V[b, j]) + E[b, j]))
+    error += v * (abs(V[a, j]) * E[b, i] + E[a, j] * (abs(V[b, i]) + E[b, i]))
+    error += 2.0 * UNIT * (abs(first) + abs(second)) + UNIT * abs(first + second)
+    return first + second, error
+
+
+@inlined
+def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[float, float]:
+    """sum_{i=1}^{k-1} a_i b_{k-i}, or of i a_i b_{k-i}, and its error bound; summed as in `hybridsim.engine.taylor`."""
+    total, error, m = 0.0, 0.0, k // 2
+    if k > 0 and k % 2 == 0:
+        w = m if weighted else 1
+        total = w * V[a, m] * V[b, m]
+        error = w * (abs(V[a, m]) * E[b, m] + E[a, m] * (abs(V[b, m]) + E[b, m])) + 2.0 * UNIT * abs(total)
+    for i in range((k - 1) // 2, 0, -1):
+        u, v = (i, k - i) if weighted else (1, 1)
+        pair, e = _pair(V, E, a, b, i, k - i, float(u), float(v))
+        total += pair
+        error += e + UNIT * abs(total)
     return total, error
 
 
 @inlined
-def _weighted(V: Any, E: Any, a: int, b: int, k: int, last: int) -> tuple[float, float]:
-    """sum_{i=1}^{last} i a_i b_{k-i} and its error bound: the product a' b, times k."""
-    total, error = 0.0, 0.0
-    for i in range(1, last + 1):
-        term = i * V[a, i] * V[b, k - i]
-        total += term
-        error += i * (abs(V[a, i]) * E[b, k - i] + E[a, i] * (abs(V[b, k - i]) + E[b, k - i]))
-        error += 2.0 * UNIT * abs(term) + UNIT * abs(total)
-    return total, error
+def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
+    """sum_{i=0}^{k} a_i b_{k-i} and its error bound."""
+    if k == 0:
+        total = V[a, 0] * V[b, 0]
+        error = abs(V[a, 0]) * E[b, 0] + E[a, 0] * (abs(V[b, 0]) + E[b, 0]) + UNIT * abs(total)
+        return total, error
+    inner, e = _inner(V, E, a, b, k, False)
+    ends, d = _pair(V, E, a, b, 0, k, 1.0, 1.0)
+    total = inner + ends
+    return total, e + d + UNIT * abs(total)
+
+
+@inlined
+def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
+    """sum_{i=1}^{k} i a_i b_{k-i} and its error bound: the product a' b, times k."""
+    inner, error = _inner(V, E, a, b, k, True)
+    last = k * V[a, k] * V[b, 0]
+    error += k * (abs(V[a, k]) * E[b, 0] + E[a, k] * (abs(V[b, 0]) + E[b, 0])) + 2.0 * UNIT * abs(last)
+    return inner + last, error + UNIT * abs(inner + last)
 
 
 @kernel
@@ -111,6 +133,15 @@ def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b:
     value = numerator / divisor
     V[out, k] = value
     E[out, k] = (error + abs(value) * E[b, 0]) / abs(divisor) + UNIT * abs(value)
+
+
+@inlined
+def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: int) -> None:
+    """V[out, k] = factor (1 / b_0) with the bound of a quotient whose reciprocal is rounded, too."""
+    divisor = V[b, 0]
+    value = factor * (1.0 / divisor)
+    V[out, k] = value
+    E[out, k] = (error + abs(value) * E[b, 0]) / abs(divisor) + 2.0 * UNIT * abs(value)
 
 
 @kernel
@@ -156,36 +187,38 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
 @kernel
 def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Order k >= 1 of the operations that follow a differential equation."""
+    part = 1.0 / k
     if op == EXP:
-        y, e = _weighted(V, E, a, out, k, k)
-        _put(V, E, out, k, y / k, e / k + UNIT * abs(y))
+        y, e = _slope(V, E, a, out, k)
+        _put(V, E, out, k, y * part, (e + 2.0 * UNIT * abs(y)) * part)
     elif op == SINCOS:
-        s, e = _weighted(V, E, a, out + 1, k, k)
-        co, d = _weighted(V, E, a, out, k, k)
-        _put(V, E, out, k, s / k, e / k + UNIT * abs(s))
-        _put(V, E, out + 1, k, -co / k, d / k + UNIT * abs(co))
+        s, e = _slope(V, E, a, out + 1, k)
+        co, d = _slope(V, E, a, out, k)
+        _put(V, E, out, k, s * part, (e + 2.0 * UNIT * abs(s)) * part)
+        _put(V, E, out + 1, k, -(co * part), (d + 2.0 * UNIT * abs(co)) * part)
     elif op == SINHCOSH:
-        s, e = _weighted(V, E, a, out + 1, k, k)
-        co, d = _weighted(V, E, a, out, k, k)
-        _put(V, E, out, k, s / k, e / k + UNIT * abs(s))
-        _put(V, E, out + 1, k, co / k, d / k + UNIT * abs(co))
+        s, e = _slope(V, E, a, out + 1, k)
+        co, d = _slope(V, E, a, out, k)
+        _put(V, E, out, k, s * part, (e + 2.0 * UNIT * abs(s)) * part)
+        _put(V, E, out + 1, k, co * part, (d + 2.0 * UNIT * abs(co)) * part)
     elif op == TANGENT:
-        y, e = _weighted(V, E, a, out + 1, k, k)
-        _put(V, E, out, k, y / k, e / k + UNIT * abs(y))
-        w, d = _product(V, E, out, out, k, 0, k)
+        y, e = _slope(V, E, a, out + 1, k)
+        _put(V, E, out, k, y * part, (e + 2.0 * UNIT * abs(y)) * part)
+        w, d = _product(V, E, out, out, k)
         _put(V, E, out + 1, k, w if b == 0 else -w, d)
     elif op == INTEGRAL and c != ANGLE:
         # y' a = b'  =>  k y_k a_0 = k b_k - sum_{j<k} j y_j a_{k-j}
-        s, e = _weighted(V, E, out, a, k, k - 1)
-        _divide(V, E, out, k, V[b, k] - s / k, E[b, k] + e / k + UNIT * (abs(V[b, k]) + abs(s)), a)
+        s, e = _inner(V, E, out, a, k, True)
+        n = V[b, k] - s * part
+        _divide(V, E, out, k, n, E[b, k] + (e + 2.0 * UNIT * abs(s)) * part + UNIT * abs(n), a)
     elif op == INTEGRAL:
         # y = angle of (a, b):  y' (a^2 + b^2) = a b' - b a'
-        left, e = _weighted(V, E, b, a, k, k)
-        right, d = _weighted(V, E, a, b, k, k)
+        left, e = _slope(V, E, b, a, k)
+        right, d = _slope(V, E, a, b, k)
         total, error = left - right, e + d + UNIT * (abs(left) + abs(right))
         for j in range(1, k):
-            w1, e1 = _product(V, E, a, a, k - j, 0, k - j)
-            w2, e2 = _product(V, E, b, b, k - j, 0, k - j)
+            w1, e1 = _product(V, E, a, a, k - j)
+            w2, e2 = _product(V, E, b, b, k - j)
             total -= j * V[out, j] * (w1 + w2)
             error += j * (abs(V[out, j]) * (e1 + e2) + E[out, j] * abs(w1 + w2)) + 3 * UNIT * abs(total)
         square = V[a, 0] ** 2 + V[b, 0] ** 2
@@ -236,17 +269,21 @@ def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) ->
     if op == SCALE:
         y = u * v
         _put(V, E, out, k, y, abs(u) * dv + du * (abs(v) + dv) + UNIT * abs(y))
+    elif op == DIVIDE_BY and k == 0:
+        _divide(V, E, out, 0, u, du, b)
     elif op == DIVIDE_BY:
-        _divide(V, E, out, k, u, du, b)
+        _multiply(V, E, out, k, u, du, b)
     elif op == SINCOS_LINEAR and k == 0:
         _leading(SINCOS, V, E, a, b, 0, out)
     elif op == SINCOS_LINEAR:
         rate, e = V[a, 1], E[a, 1]
         s, ds, co, dco = V[out, k - 1], E[out, k - 1], V[out + 1, k - 1], E[out + 1, k - 1]
-        y = rate * co / k
-        _put(V, E, out, k, y, (abs(rate) * dco + e * (abs(co) + dco)) / k + 2.0 * UNIT * abs(y))
-        y = -rate * s / k
-        _put(V, E, out + 1, k, y, (abs(rate) * ds + e * (abs(s) + ds)) / k + 2.0 * UNIT * abs(y))
+        part = 1.0 / k
+        rate, e = rate * part, (e + 2.0 * UNIT * abs(rate)) * part
+        y = rate * co
+        _put(V, E, out, k, y, abs(rate) * dco + e * (abs(co) + dco) + UNIT * abs(y))
+        y = -(rate * s)
+        _put(V, E, out + 1, k, y, abs(rate) * ds + e * (abs(s) + ds) + UNIT * abs(y))
     elif k > 0:
         _put(V, E, out, k, -u if op == CONSTANT_SUB else u, du)
     else:
@@ -269,19 +306,24 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
     elif op == NEG:
         _put(V, E, out, k, -V[a, k], E[a, k])
     elif op == MUL:
-        y, e = _product(V, E, a, b, k, 0, k)
+        y, e = _product(V, E, a, b, k)
         _put(V, E, out, k, y, e)
+    elif op == DIV and k == 0:
+        _divide(V, E, out, 0, V[a, 0], E[a, 0], b)
     elif op == DIV:
-        y, e = _product(V, E, out, b, k, 0, k - 1)
+        y, e = _inner(V, E, out, b, k, False)
+        first = V[out, 0] * V[b, k]
+        e += abs(V[out, 0]) * E[b, k] + E[out, 0] * (abs(V[b, k]) + E[b, k]) + UNIT * abs(first)
+        y += first
         n = V[a, k] - y
-        _divide(V, E, out, k, n, E[a, k] + e + (UNIT * abs(n) if k > 0 else 0.0), b)
+        _multiply(V, E, out, k, n, E[a, k] + e + UNIT * (abs(y) + abs(n)), b)
     elif op == SQRT:
         if k == 0:
             y = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             e = E[a, 0] / (2.0 * y) if y > 0.0 else math.sqrt(E[a, 0])
             _put(V, E, out, 0, y, e + UNIT * abs(y))
         else:
-            y, e = _product(V, E, out, out, k, 1, k - 1)
+            y, e = _inner(V, E, out, out, k, False)
             n = 0.5 * (V[a, k] - y)
             if V[out, 0] == 0.0 and n == 0.0 and E[a, k] + e == 0.0:
                 _put(V, E, out, k, 0.0, 0.0)

@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ if ENABLED:
     from numba.core import cgutils, event
     from numba.extending import intrinsic
 
-    from hybridsim.engine.machine_code import compile_text, machine_name
+    from hybridsim.engine.machine_code import compile_text, machine_name, ready
 
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
@@ -141,11 +141,47 @@ if ENABLED:
         """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
         return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
 
+    def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        found: Callable[..., Any] = function.compile(tuple(map(function.typeof_pyval, arguments)))
+        return found
+
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Compile one function of a generated module; return its address and the object that keeps it alive."""
         path = Path(module.__file__)
         kept = path.with_name(f"{path.stem}.{name}.{machine_name()}.o")
         return compile_text(path.read_text(encoding="utf-8"), name, kept)
+
+    def compile_series(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+        """Addresses of functions of series, for `call_series`, and the object that keeps them alive."""
+        return ready(_of_this_machine(kept), names, written)
+
+    def is_kept(kept: Path) -> bool:
+        """Whether functions of series are on disk."""
+        return _of_this_machine(kept).exists()
+
+    def _of_this_machine(kept: Path) -> Path:
+        return kept.with_name(f"{kept.name}.{machine_name()}.o")
+
+    @intrinsic
+    def call_series(
+        typingctx: Any, address: Any, s: Any, error: Any, x: Any, guards: Any, constants: Any, out: Any
+    ) -> Any:
+        """Call the function of series at an address (see `hybridsim.engine.series_code`) with contiguous arrays."""
+        signature = types.void(types.int64, types.float64, types.float64, x, guards, constants, out)
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            double = ir.DoubleType()
+            pointer = ir.PointerType(double)
+            kind = ir.FunctionType(ir.VoidType(), [double, double, *[pointer] * 4])
+            target = builder.inttoptr(args[0], ir.PointerType(kind))
+            data = [
+                context.make_array(ty)(context, builder, value).data
+                for ty, value in zip(sig.args[3:], args[3:], strict=True)
+            ]
+            builder.call(target, [args[1], args[2], *data])
+            return context.get_dummy_value()
+
+        return signature, generate
 
     def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
         made = _with_cache_folder(
@@ -201,6 +237,23 @@ else:
         """None: nothing is compiled."""
         return 0.0
 
+    def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        return function
+
+    def compile_series(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+        """Nothing is compiled: series are those of the interpreter."""
+        raise NotImplementedError
+
+    def is_kept(kept: Path) -> bool:
+        """Nothing is kept."""
+        return False
+
+    def call_series(
+        address: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any
+    ) -> None:
+        """Nothing is compiled, and never called."""
+        raise NotImplementedError
+
     def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
         if function not in _reached:
             _reached.append(function)
@@ -241,6 +294,23 @@ def kernel_address(function: Callable[..., int], *packs: Any) -> int:
     if key not in _addresses:
         _addresses[key] = _kernel_at(function, *packs)
     return _addresses[key]
+
+
+class Door:
+    """A kernel whose arguments are of the same types at every call: they are looked at once.
+
+    To look at them takes longer than a short run where there are packs among them.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._entry: Callable[..., Any] | None = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the kernel returns."""
+        if self._entry is None:
+            self._entry = _entry(self._function, arguments)
+        return self._entry(*arguments)
 
 
 @cache

@@ -14,23 +14,28 @@ import numpy as np
 from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.jit import call, call_series, inlined, kernel
 from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
+from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of
 
 AT_TARGET, STOPPED, FULL = 0, 1, 2
-_DEFECT = 100.0  # as in the taylor integrator
 _SHORTER = 0.25
 _TRIALS = 30
 _SMALLEST = 10.0
 
 
 class Room(NamedTuple):
-    """Scratch arrays: two sets of series (registers, order + 1), a polynomial, its Bernstein forms, a state, guards."""
+    """Scratch arrays: series of all registers (registers, order + 1) and of the active guards, what is ahead of them,
+    powers of a step and sizes of the latter over it, a polynomial, its Bernstein forms, a state, guards."""
 
     V: np.ndarray
     W: np.ndarray
+    guard_series: np.ndarray
+    ahead: np.ndarray
+    sizes: np.ndarray
+    numbers: np.ndarray
     a: np.ndarray
     b: np.ndarray
     stack: np.ndarray
@@ -39,6 +44,7 @@ class Room(NamedTuple):
     orders: np.ndarray
     floors: np.ndarray
     watched: np.ndarray
+    everyone: np.ndarray
     pace: np.ndarray
 
 
@@ -75,66 +81,35 @@ def load(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
     advance(tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]], V, 0)
 
 
-@kernel
-def holds(
+@inlined
+def series_at(
+    code: int,
+    is_known: bool,
     rows: Any,
     places: Any,
     order: int,
     s: float,
-    x0: Any,
-    x1: Any,
-    d: float,
-    rtol: float,
-    atol: Any,
+    x: Any,
     watched: Any,
     V: Any,
-    W: Any,
-) -> bool:
-    """Whether the series V from s still hold at s + d, where the state is x1: the equation, and the guards' values."""
-    time, states, derivatives = places
-    if time >= 0:
-        W[time, 0] = s + d
+    U: Any,
+    out: Any,
+) -> None:
+    """Coefficients of the states, to out, and of the watched functions, to U, along the flow from x at local time s.
+
+    code: address of a function that does the same; 0 for none. is_known: `values_at` has been there last.
+    """
+    if code != 0:
+        call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
+        return
+    expand(rows, places, order, s, x, V)
+    states = places[1]
     for i in range(states.shape[0]):
-        W[states[i], 0] = x1[i]
-    advance(rows, W, 0)
-    for i in range(states.shape[0]):
-        slope, change, power = 0.0, 0.0, 1.0
-        for k in range(1, order + 1):
-            term = V[states[i], k] * power
-            slope += k * term
-            power *= d
-            change += abs(term * d)
-        scale = atol[i] + rtol * max(abs(x0[i]), abs(x1[i])) + rtol * change
-        if not abs(d * (slope - W[derivatives[i], 0])) <= _DEFECT * scale:
-            return False
-    for j in range(watched.shape[0]):
-        r = watched[j]
-        value, largest, power = 0.0, 0.0, 1.0
         for k in range(order + 1):
-            term = V[r, k] * power
-            value += term
-            largest = max(largest, abs(term))
-            power *= d
-        if not abs(value - W[r, 0]) <= (_DEFECT * rtol + 64.0 * UNIT) * largest:
-            return False
-    return True
-
-
-@inlined
-def value_and_slope(rows: Any, places: Any, register: int, s: float, x: Any, W: Any) -> tuple[float, float]:
-    """A function of the tape and its rate along the flow at (s, x)."""
-    expand(rows, places, 1, s, x, W)
-    return W[register, 0], W[register, 1]
-
-
-@inlined
-def state_at(states: Any, order: int, d: float, V: Any, x: Any) -> None:
-    """States at a distance d from the origin of the series (Horner)."""
-    for i in range(states.shape[0]):
-        total = V[states[i], order]
-        for k in range(order - 1, -1, -1):
-            total = total * d + V[states[i], k]
-        x[i] = total
+            out[i, k] = V[states[i], k]
+    for j in range(watched.shape[0]):
+        for k in range(order + 1):
+            U[j, k] = V[watched[j], k]
 
 
 @kernel
@@ -146,31 +121,41 @@ def earliest_exit(
     sides: Any,
     orders: Any,
     floors: Any,
-    V: Any,
+    U: Any,
+    watched: Any,
+    powers: Any,
+    totals: Any,
     a: Any,
     b: Any,
     stack: Any,
+    bernstein: Any,
 ) -> tuple[int, int, float]:
-    """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time)."""
-    found, best = -1, 1.0
-    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        g = tapes.active[i]
-        r = tapes.guards[k, g]
-        power, total = 1.0, 0.0
-        for j in range(order + 1):
-            a[j] = V[r, j] * power
-            total += abs(a[j])
-            power *= h
+    """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time).
+
+    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
+    bernstein: see `first_exit`, by the number of leading zeros.
+    """
+    found, best, begin = -1, 1.0, tapes.active_start[k]
+    for i in range(watched.shape[0]):
+        g = tapes.active[begin + i]
+        r = watched[i]
+        total, first = totals[i], U[r, 0]
         if not total < math.inf:
             return OPEN, g, 0.0
         if total == 0.0 and sides[g] >= 0:
             continue  # zero all along: neither a side nor a change of it
         if sides[g] <= 0:
             return OPEN, g, 0.0
-        error = 2.0 * (abs(a[order]) + abs(a[order - 1])) + 8.0 * UNIT * total + floors[g]
+        last = abs(U[r, order]) * powers[order] + abs(U[r, order - 1]) * powers[order - 1]
+        error = 2.0 * last + 8.0 * UNIT * total + floors[g]
         if not error < math.inf:  # nothing is below what is not a number, and halving would not end
             return OPEN, g, 0.0
-        outcome, theta = first_exit(a[: order + 1], error, orders[g], b, stack)
+        if orders[g] == 0 and first - (total - abs(first)) > error + 64.0 * UNIT * total:
+            continue  # the first term outweighs all others
+        for j in range(order + 1):
+            a[j] = U[r, j] * powers[j]
+        code = bernstein[orders[g]] if orders[g] < bernstein.shape[0] else 0
+        outcome, theta = first_exit(a[: order + 1], error, orders[g], b, stack, code)
         if outcome == OPEN:
             return OPEN, g, theta * h
         if outcome == FOUND and (found < 0 or theta < best):
@@ -185,6 +170,7 @@ def leap(
     tapes: Any,
     inputs: Any,
     lin: Any,
+    codes: Any,
     places: Any,
     control: Any,
     target: Any,
@@ -196,7 +182,7 @@ def leap(
 ) -> tuple[int, int, int]:
     """Go from event to event; returns why it ended and how many steps and segments were committed.
 
-    places: rates, then where in p the origin and the phases are.
+    codes: machine code of the tapes, where there is some. places: rates, then where in p the origin and the phases are.
     control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
     the segment, moved on. state: x, x_error, z, p, sides, orders, floors at the start of the segment, moved on. room:
     scratch arrays. record: what the committed steps, segments and events are written to.
@@ -206,7 +192,9 @@ def leap(
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
     V, W, a, b, stack = room.V, room.W, room.a, room.b, room.stack
-    y, y1, y_error, slopes, scale = work.y, work.x_after, work.y_error, work.slopes, room.scale
+    guard_series, ahead = room.guard_series, room.ahead
+    powers, totals = room.sizes[: order + 1], room.sizes[order + 1 :]
+    y, y_error, scale = work.y, work.y_error, room.scale
     side_now, order_now, floor_now = room.sides, room.orders, room.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
@@ -226,17 +214,22 @@ def leap(
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
         rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
         flow_places = (time, states, tapes.derivatives[k])
+        code, values_code = codes.series[k], codes.values[k]
+        ahead_code, sizes_code = codes.ahead[k], codes.sizes[k]
         load(inputs, tapes, k, p, V)
-        load(inputs, tapes, k, p, W)
+        if code == 0:
+            load(inputs, tapes, k, p, W)
         count = tapes.active_start[k + 1] - tapes.active_start[k]
-        watched = room.watched[:count]
+        watched, numbers = room.watched[:count], room.numbers[:count]
+        y1, rates_now, values, sums = parts_of(ahead, order, n, count)
         for i in range(count):
             watched[i] = tapes.guards[k, tapes.active[tapes.active_start[k] + i]]
         put(sides, side_now)
         put(orders, order_now)
         put(floors, floor_now)
         put(x, y)
-        s, fired, lands = 0.0, -1, landing(automata, z)
+        constants = V if code != 0 else W
+        s, fired, lands, holds = 0.0, -1, landing(automata, z), holding(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
         while fired < 0 and s < bound:
@@ -244,25 +237,45 @@ def leap(
                 return FULL, first_step, n_segments
             if s > longest:
                 return STOPPED, first_step, n_segments
-            expand(rows, flow_places, order, s, y, V)
+            coefficients = series[n_steps]
+            is_known = n_steps > first_step and not lands
+            series_at(code, is_known, rows, flow_places, order, s, y, watched, V, guard_series, coefficients)
             left = bound - s
-            h = reach(V, states, watched, order, rtol, atol, min(left, max_step))
+            h = reach(
+                sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, min(left, max_step),
+                powers, totals,
+            )  # fmt: skip
             if not h > _SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments
-            outcome, g, d = earliest_exit(tapes, k, order, h, side_now, order_now, floor_now, V, a, b, stack)
+            outcome, g, d = earliest_exit(
+                tapes, k, order, h, side_now, order_now, floor_now, guard_series, numbers, powers, totals,
+                a, b, stack, codes.bernstein,
+            )  # fmt: skip
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
-            state_at(states, order, d, V, y1)
             trials = 0
-            while not holds(rows, flow_places, order, s, y, y1, d, rtol, atol, watched, V, W):
+            while True:
+                look_ahead(
+                    ahead_code,
+                    rows,
+                    flow_places,
+                    order,
+                    s,
+                    d,
+                    watched,
+                    coefficients,
+                    guard_series,
+                    constants,
+                    ahead,
+                )
+                if flow_holds(ahead, order, n, d, y, rtol, atol) and keeps_up(
+                    guard_series, numbers, order, ahead, rtol, values, sums
+                ):
+                    break
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
                 if trials > _TRIALS:
                     return STOPPED, first_step, n_segments
-                state_at(states, order, d, V, y1)
             steps[n_steps, 0], steps[n_steps, 1] = s, d
-            for i in range(n):
-                for j in range(order + 1):
-                    series[n_steps, i, j] = V[states[i], j]
             n_steps += 1
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
             if outcome == FOUND:
@@ -275,9 +288,11 @@ def leap(
                 scale[i] = max(scale[i], abs(y1[i]))
             for g in range(side_now.shape[0]):
                 side_now[g], order_now[g], floor_now[g] = 1, 0, 0.0
-        if holding(automata, z):
-            call(functions.project, s, y, p, z, y1)
-            put(y1, y)
+        if code == 0:
+            codes.lacked[k] += n_steps - first_step
+        if holds:
+            call(functions.project, s, y, p, z, work.x_after)
+            put(work.x_after, y)
         segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
         fires[n_segments] = fired
         put(z, modes[n_segments])
@@ -293,14 +308,19 @@ def leap(
         if is_crowded(s, clock, pace):
             return STOPPED, first_step, n_segments
         s_error = 2.0 * 2.0**-52 * s
-        value, slope = value_and_slope(rows, flow_places, tapes.guards[k, fired], s, y, W)
-        if slope != 0.0 and math.isfinite(value / slope):
-            s_error = max(s_error, abs(value / slope))
-        call(functions.flow, s, y, p, z, slopes)
-        state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
+        if holds:
+            values_at(values_code, rows, flow_places, s, y, watched, constants, values, rates_now)
+        for i in range(count):
+            if tapes.active[tapes.active_start[k] + i] == fired:
+                slope = guard_series[i, 1]
+                for j in range(2, order + 1):
+                    slope += j * guard_series[i, j] * ahead[j - 1]
+                if slope != 0.0 and math.isfinite(values[i] / slope):
+                    s_error = max(s_error, abs(values[i] / slope))
+        state_errors(automata, s_error, y, scale, x_error, z, rates_now, y_error)
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments
-        put(y1, jumps[n_segments, 1])
+        put(work.x_after, jumps[n_segments, 1])
         n_segments += 1
 
 

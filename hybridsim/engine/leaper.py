@@ -14,15 +14,18 @@ import numpy as np
 
 from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import functions_of, work_space
+from hybridsim.engine.jit import Door
 from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
-from hybridsim.engine.packs import packed
-from hybridsim.engine.segment_end import State, reach_settling
+from hybridsim.engine.packs import Sheet, packed
+from hybridsim.engine.segment_end import reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
+from hybridsim.engine.series_shelf import SeriesShelf
 from hybridsim.engine.stepping import (
     ARRIVED,
     BEFORE_SOMETHING,
@@ -33,6 +36,7 @@ from hybridsim.engine.stepping import (
     StepFailure,
     Tolerances,
 )
+from hybridsim.engine.steps_ahead import room_ahead
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
@@ -41,7 +45,7 @@ _STEPS, _SEGMENTS = 4096, 1024  # room for one call
 # doubles for the series of one call, and how many steps there is room for in any case
 _ROOM, _FEWEST = 1 << 19, 64
 _GROWTH, _LARGEST = 8, 1 << 23  # of that room, for a segment that is longer
-_NONE = np.zeros(0, dtype=np.int64)  # the model has no monitors
+_NONE = np.zeros(0, dtype=np.int64)
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
 
@@ -129,19 +133,35 @@ class Leaper(ABC):
 
     def _renew(self) -> None:
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
-        n, count = self.system.n, len(self.system.automata)
         self.used = (0, 0)  # rows of steps, rows of segments
-        # one row more of segments: where each begins and where the last one ends
-        self.record = (
-            np.empty((self.steps, 2)),
-            np.empty((self.steps, n, self.columns)),
-            np.empty(_SEGMENTS + 1, dtype=np.int64),
-            np.empty((_SEGMENTS + 1, 2)),
-            np.empty((_SEGMENTS + 1, count), dtype=np.int64),
-            np.empty((_SEGMENTS, self.system.layout.size)),
-            np.empty(_SEGMENTS, dtype=np.int64),
-            np.empty((_SEGMENTS, 2, n)),
-        )
+        self.sheet = self._sheet()
+        self.memory = self.sheet.blank()
+
+    def _sheet(self) -> Sheet:
+        """What the kernel writes to; the trajectory keeps it, events longer than steps."""
+        system, steps, columns = self.system, self.steps, self.columns
+
+        def made() -> Sheet:
+            return Sheet(
+                Record,
+                (
+                    (float, (steps, 2), 0),
+                    (float, (steps, system.n, columns), 0),
+                    (
+                        np.int64,
+                        (_SEGMENTS + 1,),
+                        0,
+                    ),  # one row more: where each begins and where the last one ends
+                    (float, (_SEGMENTS + 1, 2), 1),
+                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+                    (float, (_SEGMENTS, system.layout.size), 0),
+                    (np.int64, (_SEGMENTS,), 1),
+                    (float, (_SEGMENTS, 2, system.n), 1),
+                ),
+            )
+
+        sheet: Sheet = system.code.shared(f"sheet for {steps} steps of {columns} columns", made)
+        return sheet
 
     @property
     def place(self) -> np.ndarray:
@@ -161,53 +181,46 @@ class Leaper(ABC):
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
         self.shelf.surround(outcome.z)
-        clock, to = np.array(origin), np.array(target)
-        state = State(
-            outcome.x.copy(),
-            outcome.x_error.copy(),
-            outcome.z.copy(),
-            p.copy(),
-            outcome.sides.copy(),
-            outcome.orders.copy(),
-            outcome.guard_floors.copy(),
-        )
-        as_packed, n = packed(state), self.system.n
+        clock, to, n = np.array(origin), np.array(target), self.system.n
         try:
-            work, room = self.spare.pop()
+            desk = self.spare.pop()
         except IndexError:
-            work, room = work_space(self.system), self._room()
-            reach_settling(self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, as_packed, work)
+            desk = Desk.of(outcome, p, work_space(self.system), self._room())
+            reach_settling(
+                self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, desk.as_packed, desk.work
+            )
+        desk.take_up(outcome, p)
+        as_packed, z, work, room = desk.as_packed, desk.state.z, desk.work, desk.room
         instants, owners = [np.empty((0, 2))], [_NONE]
         while True:
-            rows, began = packed(self._rows()), perf_counter()
+            rows, began = self._rows(), perf_counter()
             code, steps, count = self._go(to, clock, as_packed, work, room, rows)
             record.counters.kernel_time += perf_counter() - began
+            self.shelf.look()
             self._count(record.counters, steps, room)
             is_too_long = code == FULL and count == 0 and self.used == (0, 0)  # a single segment
             if is_too_long and self.steps * _GROWTH * n * self.columns <= _LARGEST:
                 self.steps, is_too_long = self.steps * _GROWTH, False
             is_full = code == FULL and not is_too_long
             if count:
-                found = self._commit(steps, count, state[2], clock, record)
+                found = self._commit(steps, count, z, clock, record)
                 instants.append(found[0])
                 owners.append(found[1])
             if is_full:
                 self._renew()
             known = len(self.shelf.tapes.modes)
-            self.shelf.surround(state[2])
+            self.shelf.surround(z)
             if is_full or len(self.shelf.tapes.modes) == known:
                 break
-        self.spare.append((work, room))
-        x, x_error, z, p, sides, orders, floors = state
-        after = Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, np.zeros(0), continuous=False)
+        after = desk.outcome()
+        self.spare.append(desk)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
         return Landing(Instant(*clock.tolist()), after, end, np.concatenate(instants), np.concatenate(owners))
 
-    def _rows(self) -> Record:
+    def _rows(self) -> Any:
         """The rows that the next call writes to."""
         steps, first = self.used
-        lengths, series, ends, *others = self.record
-        return Record(lengths[steps:], series[steps:], ends[first + 1 :], *(part[first:] for part in others))
+        return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
     def _commit(
         self, steps: int, count: int, z: np.ndarray, clock: np.ndarray, record: Trajectory
@@ -218,7 +231,7 @@ class Leaper(ABC):
         """
         first_step, first = self.used
         last_step, last = self.used = (first_step + steps, first + count + 1)
-        lengths, series, ends, origins, modes, vectors, fired, jumps = self.record
+        lengths, series, ends, origins, modes, vectors, fired, jumps = self.sheet.rows(self.memory)
         ends[first], origins[last - 1], modes[last - 1] = 0, clock, z
         begun = slice(first, last - 1)
         system, counters = self.system, record.counters
@@ -245,6 +258,9 @@ class Leaper(ABC):
         return instants, system.owner[fired[ended]]
 
 
+_leap = Door(leap)
+
+
 class TaylorLeaper(Leaper):
     """Leaps of Taylor series."""
 
@@ -252,6 +268,9 @@ class TaylorLeaper(Leaper):
         rtol = max(tolerances.rtol, _TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
         super().__init__(system, self.order + 1, f"order {self.order}")
+        self.codes: SeriesShelf = system.code.shared(
+            f"series of order {self.order}", lambda: SeriesShelf(system, self.order)
+        )
         self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
 
     def _room(self) -> Any:
@@ -261,6 +280,11 @@ class TaylorLeaper(Leaper):
             Room(
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
+                guard_series=np.zeros((guards, order + 1)),
+                ahead=np.empty(room_ahead(order, n, guards)),
+                sizes=np.empty(order + 1 + guards),
+                numbers=np.arange(guards, dtype=np.int64),
+                everyone=np.arange(n, dtype=np.int64),
                 a=np.empty(order + 1),
                 b=np.empty(order + 1),
                 stack=np.empty((64, order + 3)),
@@ -281,10 +305,13 @@ class TaylorLeaper(Leaper):
         room: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
-        code, steps, count = leap(
-            self.functions, self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, self.places, self.control,
+        tapes = self.shelf.tapes  # another thread may put more on the shelf
+        codes = self.codes.of(tapes)
+        code, steps, count = _leap(
+            self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.places, self.control,
             to, clock, state, work, room, rows,
         )  # fmt: skip
+        self.codes.look(tapes, codes)
         return code, steps, count
 
     def _count(self, counters: Counters, steps: int, room: Any) -> None:

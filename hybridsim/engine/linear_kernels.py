@@ -21,11 +21,14 @@ _PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
 _POLISH = 6  # iterations of it from nearby
-_POINTS = (
-    10**6
-)  # from which a guard is followed: a second; a run that is to be stopped must not wait for more
+# points from which a guard is followed: a second; a run that is to be stopped must not wait for more
+_POINTS = 10**6
 _SAFE = 0.95  # to end on the safe side
 _HALVINGS = 5
+# a parabola stays positive up to 4; iterations towards the lowest point; times its error that it stays above there
+_DIPS, _TURNS, _CLEAR = 6.0, 3, 4.0
+# c (x - v)**2 + e has positive coefficients in Bernstein form of degree 15 up to v + 7.5 e/(c v)
+_PAST = 3.0
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 # a monomial x**i on [0, 1] in Bernstein form of degree TERMS - 1: C(j, i)/C(TERMS - 1, i)
@@ -363,6 +366,24 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, backward: Any)
 
 
 @inlined
+def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
+    """Just past the lowest point of a guard that falls and rises again; 0 if it does not, or comes near its error."""
+    a, b, c = terms[first], terms[first + 1], terms[first + 2]
+    if not (b < 0.0 < c and b * b < _DIPS * a * c):
+        return 0.0
+    m = TERMS - first
+    for i in range(m):
+        backward[m - 1 - i] = terms[first + i]
+    lowest, value = -0.5 * b / c, 0.0
+    for _ in range(_TURNS):
+        value, slope = value_and_slope(backward, m, lowest, 0.0)
+        lowest -= 0.5 * slope / c
+    if not (value > _CLEAR * error and lowest > 0.0):
+        return 0.0
+    return min(lowest + min(lowest, _PAST * value / (c * lowest)), longest)
+
+
+@inlined
 def falls_over(terms: Any, rest: float, longest: float) -> float:
     """How far on either side a guard falls at least half as fast as here, by its Taylor polynomial; 0 if not at all."""
     steepness = -terms[1]
@@ -437,8 +458,7 @@ def first_zero(
         return NEVER, bound
     if side <= 0 or order >= TERMS - 3 or not start[order] > 0.0:
         return OPEN, 0.0
-    farthest, grown = lin.farthest[k, g], lin.grown[k, g]
-    margin = (16.0 + 2.0 * lin.counts[k]) * UNIT
+    farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
     if bound <= farthest and stays_positive(start, order, grown * rest, bound, lower):
         return NEVER, bound
     if 0.0 < hint <= farthest:
@@ -455,9 +475,12 @@ def first_zero(
                 return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
     for i in range(TERMS):
         terms[i] = start[i]
-    s = 0.0
+    s, error = 0.0, margin * size + floor
     for _ in range(_POINTS):
-        d = safe_step(terms, order, grown * rest, min(bound - s, farthest), lower)
+        reach = min(bound - s, farthest)
+        d = past_dip(terms, order, reach, error, lower)
+        if d == 0.0 or not stays_positive(terms, order, grown * rest, d, lower):
+            d = safe_step(terms, order, grown * rest, reach, lower)
         if d >= bound - s:
             return NEVER, bound
         if not s + d > s:

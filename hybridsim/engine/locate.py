@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.roots import POINTS, Crossing, Grazing, find_roots, quiet
-from hybridsim.engine.stepping import Flow, Step, Watch
+from hybridsim.engine.stepping import Flow, Step, StepFailure, Watch
 
 _POLISH = 200  # iterations: bisection alone needs 52; the search ends when the bracket is down to neighbours
+_WIDER = 6  # doublings of a bracket whose end is on the wrong side, by the error of the polynomial that isolated it
+# Pieces that are halved no further are narrower than this; ends of wider brackets are certain, and what changes sign
+# beyond them is another zero.
+_NARROW = 2.0**-24
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,21 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
     def value(theta: float) -> float:
         return crossing.direction * float(sample(np.array([theta]))[0])
 
-    high = value(right)
-    low = min(value(left), 0.0)  # the side at the left is known, whatever rounding makes of the value
+    high, low, width = value(right), value(left), right - left
+    for _ in range(_WIDER if width < _NARROW else 0):
+        if high < 0.0 and right < 1.0:
+            left, low, right = right, high, min(right + width, 1.0)
+            high = value(right)
+        elif low > 0.0 and left > 0.0:
+            left, right, high = max(left - width, 0.0), left, low
+            low = value(left)
+        else:
+            break
+        width *= 2.0
+    else:  # no zero of these samples is near: a question of rounding
+        left, right = crossing.left, crossing.right
+        low, high = value(left), value(right)
+    low = min(low, 0.0)  # the side where a step begins is known, whatever rounding makes of the value
     kept = 0
     for _ in range(_POLISH):
         if right - left <= math.ulp(right) or high == 0.0:
@@ -104,15 +121,18 @@ class Locator:
                 floor = self.floors[g]
                 if flow.system.is_corner[flow.system.owner[g]]:  # within rounding either of its sides will do
                     floor = max(floor, self._bound(step, int(g), self.rounding()))
-                found, grazed, guard_ends[g], gap = find_roots(
-                    sample,
-                    values[:, g],
-                    order,
-                    side or 1,
-                    -1,
-                    self._rounding(step, int(g), False),
-                    floor,
-                )
+                try:
+                    found, grazed, guard_ends[g], gap = find_roots(
+                        sample,
+                        values[:, g],
+                        order,
+                        side or 1,
+                        -1,
+                        self._rounding(step, int(g), False),
+                        floor,
+                    )
+                except StepFailure as failure:
+                    raise StepFailure(f"{flow.system.guard_title(int(g), flow.z)}: {failure}") from None
                 grazings += [(int(g), z) for z in grazed]
                 exits += [Hit(polish(sample, c), int(g), -1) for c in found if c.direction < 0]
                 guard_gaps += [(gap, int(g))] if gap <= 1.0 else []
@@ -125,15 +145,20 @@ class Locator:
             for k in self.monitor_numbers[~still]:
                 sample, side = self._sampler(step, flow.monitors, int(k)), int(self.monitor_sides[k])
                 order = int(self.monitor_orders[k]) if side else 0
-                found, _, monitor_ends[k], gap = find_roots(
-                    sample,
-                    values[:, k],
-                    order,
-                    side,
-                    0,
-                    self._rounding(step, int(k), True),
-                    self.monitor_floors[k],
-                )
+                try:
+                    found, _, monitor_ends[k], gap = find_roots(
+                        sample,
+                        values[:, k],
+                        order,
+                        side,
+                        0,
+                        self._rounding(step, int(k), True),
+                        self.monitor_floors[k],
+                    )
+                except StepFailure as failure:
+                    if np.isfinite(values[:, k]).all():
+                        raise StepFailure(f"monitor {flow.system.monitor_names[k]}: {failure}") from None
+                    found, monitor_ends[k], gap = [], 0, 0.0  # it ends in a pole
                 crossings += [Hit(polish(sample, c), int(k), c.direction) for c in found]
                 monitor_gaps += [(gap, int(k))] if gap <= 1.0 else []
         return Findings(
@@ -158,7 +183,14 @@ class Locator:
         def bound() -> float:
             if not known:
                 errors = 4.0 * UNIT * np.maximum(np.abs(step.x0), np.abs(step.x1))
-                known.append(self._bound(step, number, errors, is_monitor))
+                if step.s1 != step.s0:  # the time of a sample is rounded as well
+                    slopes = np.abs(step.x1 - step.x0) / abs(step.s1 - step.s0)
+                    errors += math.ulp(max(abs(step.s0), abs(step.s1))) * slopes
+                bound_at_end = self._bound(step, number, errors, is_monitor)
+                if not math.isfinite(bound_at_end):  # without a value there
+                    start = replace(step, s1=step.s0, x1=step.x0)
+                    bound_at_end = self._bound(start, number, errors, is_monitor)
+                known.append(bound_at_end)
             return known[0]
 
         return bound

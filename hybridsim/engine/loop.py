@@ -57,7 +57,7 @@ class ModeLoop:
         self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf
         self.outcome: Outcome  # what holds at the origin, and the run-time vector there
         self.p: np.ndarray
-        self.accumulation = Accumulation()
+        self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # by component
         self.notices = Notices(system, method, task, self.record)
         self.leaper = self._leaper()
@@ -113,14 +113,14 @@ class ModeLoop:
             self._mark(step_size)
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
-            if self.leaper is not None and not self.accumulation.is_under_way(float(self.origin)):
+            if self.leaper is not None and not self.accumulation.is_closing_in(float(self.origin)):
                 arrived, stop = self._leap(self.leaper, target, appointment)
                 if arrived or stop:
                     if not stop:
                         self._mark(None)
                         self._progress(self.origin)
                     continue
-            reach = min(self.renewal, self.accumulation.reach())
+            reach = min(self.renewal, self.accumulation.reach(float(self.origin)))
             if abs(target.minus(self.origin)) > reach:
                 target = self.origin.plus(reach if self.forward else -reach)
                 appointment = Appointment(target, (), is_renewal=True)
@@ -140,15 +140,19 @@ class ModeLoop:
         """Note a state from which the run could go on, where an event has just been settled."""
         if self.adopted != self.origin:
             return
-        outcome = self.outcome
-        arrays = {name: getattr(outcome, name) for name in _STATE}
-        size = math.nan if step_size is None else step_size
-        arrays |= {"continuous": np.array(outcome.continuous), "step_size": np.array(size)}
-        if self.leaper is not None:
-            arrays["place"] = self.leaper.place
-        self.record.mark(
-            Checkpoint(self.origin, arrays, self.timetable.settled, dict(self.accumulation.paces))
-        )
+        outcome, continuous, origin = self.outcome, self.outcome.continuous, self.origin
+        settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+        place = None if self.leaper is None else self.leaper.place
+
+        def checkpoint(segments: int, occurrences: int) -> Checkpoint:
+            arrays = {name: getattr(outcome, name) for name in _STATE}
+            size = math.nan if step_size is None else step_size
+            arrays |= {"continuous": np.array(continuous), "step_size": np.array(size)}
+            if place is not None:
+                arrays["place"] = place
+            return Checkpoint(origin, arrays, settled, paces, segments, occurrences)
+
+        self.record.mark(checkpoint)
 
     def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
         """Take a noted state up; the step size to begin with."""
@@ -360,7 +364,7 @@ class ModeLoop:
         if limit is None or stop is not None:
             return bool(stop)
         self.record.status = "accumulation"
-        self.record.message = accumulated(limit, self.system.automata)
+        self.record.message = accumulated(limit, self.system.automata, "adaptive" not in self.method.lacks)
         return True
 
     def _gathered(self, limit: Limit) -> bool | None:

@@ -15,6 +15,7 @@ from hybridsim.engine.nonlinear import nonlinear, refuse_powers
 from hybridsim.engine.program import Assign, Item, Switch, ordered
 from hybridsim.engine.program_names import declared_name, user
 from hybridsim.engine.second_order import Partner, attraction, partners
+from hybridsim.engine.ties import Tie, help_of_ties, ties, without_share
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.switching import ATTRACTION
@@ -37,6 +38,7 @@ class Program:
     projected: dict[int, tuple[int, ...]]  # component -> those that its holding mode projects instead
     rates: list[Any]  # SymPy, parameters only
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
+    ties: list[Tie]  # gaps with contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
     linear: dict[str, tuple[bool, ...]]  # component -> which of its modes have a flow linear in the states
     conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
@@ -79,6 +81,8 @@ class Lowering:
             set()
         )  # components whose unknown does not act on the rate of their surface
         self.partners: dict[int, Partner] = {}  # of those that are held by the surface of their rate
+        self.ties: list[Tie] = []
+        self.effect: dict[tuple[int, int], Any] = {}  # of unknowns on what is held
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
@@ -160,6 +164,7 @@ class Lowering:
         }
         self._check_surfaces(surfaces)
         gap_rates = self._gap_rates(surfaces, der, definitions | signals)
+        self.ties = ties(self, surfaces, gap_rates)
         unknown_items, clusters = self._unknowns(surfaces | gap_rates, der, definitions)
         constraints = {(c, 0): s for c, s in surfaces.items() if c not in self.never_held}
         held = HeldStates(self, constraints | {(c, 1): rate for c, rate in gap_rates.items()})
@@ -183,6 +188,7 @@ class Lowering:
             held.by_component(held.projected),
             self.rates,
             clusters,
+            self.ties,
             [self._jump(c) for c in surfaces],
             affine_modes(self, der, definitions, surfaces),
             conditions,
@@ -279,7 +285,7 @@ class Lowering:
         all_unknown = set(unknown.values())
         blends = self._blends()
         rate: dict[int, Any] = {}
-        effect: dict[tuple[int, int], Any] = {}
+        self.effect = effect = {}
         for c in order:
             s = surfaces[c]
             total = self._rate_in_time(s)
@@ -370,9 +376,13 @@ class Lowering:
                 off = {m.name: -by_mode.get(m.name, sp.Integer(0)) for m in self.components[c].modes}
                 off = dict.fromkeys(off, sp.Integer(1)) if c == d else off
                 held = off[self.components[c].surface.hold] if c in self.never_held else entry
+                more, held = without_share(self, self.ties, c, d, held, sp.Integer(1 if c == d else 0))
+                items += more
                 items.append(branches(c, name, held, off))
                 matrix[c, d] = sp.Symbol(name, real=True)
             hold = sp.Integer(0) if c in self.never_held or partner else -rate[c]
+            more, hold = without_share(self, self.ties, c, -1, hold, sp.Integer(0))
+            items += more
             items.append(branches(c, f"right_{c}", hold, without=given))
             right[c] = sp.Symbol(f"right_{c}", real=True)
         return items + eliminated(cluster, unknown, matrix, right)
@@ -434,12 +444,16 @@ class Lowering:
         conditions: dict[tuple[int, int, int], tuple[Any, ...]] = {}
         for c, component in enumerate(self.components):
             widest = max(len(m.guards) for m in component.modes)
+            helping, most = help_of_ties(self, self.ties, c, self.effect)
+            items += helping
             for g in range(widest):
                 branches = []
                 for m, mode in enumerate(component.modes):
                     if g < len(mode.guards):
                         guard = mode.guards[g]
                         value = self.convert(guard.expr)
+                        if helping and mode.name == component.surface.hold:
+                            value += most
                         conditions[c, m, g] = tuple(
                             None if choice.when is None else self.convert(choice.when)
                             for choice in guard.then

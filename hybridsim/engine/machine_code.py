@@ -11,6 +11,7 @@ import ctypes
 import ctypes.util
 import hashlib
 import sys
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -254,26 +255,41 @@ def compile_text(text: str, name: str, kept: Path) -> tuple[int, Any]:
 
     kept: where its machine code is on disk; written there the first time.
     """
+    addresses, engine = ready(kept, (name,), lambda: _translated(text, name))
+    return addresses[0], engine
+
+
+def ready(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+    """Addresses of functions of a module of LLVM, and what keeps them alive.
+
+    kept: where its machine code is on disk. Without it, it is compiled from the text that `written` gives, and kept.
+    """
     code = _known(kept)
     if code is None:
-        code = _compiled(text, name)
+        code = _compiled(written())
         write_whole(kept, hashlib.sha256(code).digest() + code)
     _prepare()
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return engine.get_function_address(name), engine
+    return [engine.get_function_address(name) for name in names], engine
 
 
-def _compiled(text: str, name: str) -> bytes:
-    """A function as an object file for this machine."""
+def _translated(text: str, name: str) -> str:
+    """A function of a generated module as a module of LLVM."""
     definition = next(
         node for node in python_tree(text).body if isinstance(node, ast.FunctionDef) and node.name == name
     )
-    module, machine = ir.Module(name), _machine()
+    module = ir.Module(name)
     Translator(module, definition)
-    module.triple = machine.triple
-    parsed = binding.parse_assembly(str(module))
+    return str(module)
+
+
+def _compiled(text: str) -> bytes:
+    """A module of LLVM as an object file for this machine."""
+    machine = _machine()
+    parsed = binding.parse_assembly(text)
+    parsed.triple = machine.triple
     parsed.verify()
     builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     builder.getModulePassManager().run(parsed, builder)

@@ -35,6 +35,8 @@ def rivals(
     side that moves no more.
     """
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
+    if not unique:
+        return candidates[:0]
     fine = candidates[verdicts == FINE]
     if len(np.unique(fine[:, unique], axis=0)) < 2:
         return fine[:0]

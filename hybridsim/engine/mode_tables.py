@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from pathlib import Path
 from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.bounds_code import bounds_text, can_bound
+from hybridsim.engine.jit import ENABLED, compile_series, is_kept
+from hybridsim.engine.mode_code import KNOWN, NEVER, WORTH, constant_rows, given, kept, mode_tape
 from hybridsim.engine.packs import packed
+from hybridsim.engine.series_code import TooLong
 from hybridsim.engine.system import System
 
 _LONGEST = 256  # vectors of modes on a shelf that is shared: each event searches it from one end to the other
@@ -42,7 +48,11 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """One row or one slice for each vector of modes: modes, lean rows, constant rows, active guards, registers."""
+    """One row or one slice for each vector of modes: modes, lean rows, constant rows, active guards, registers.
+
+    bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
+    was missed.
+    """
 
     modes: np.ndarray
     lean_start: np.ndarray
@@ -53,6 +63,8 @@ class Tapes(NamedTuple):
     active: np.ndarray
     derivatives: np.ndarray
     guards: np.ndarray
+    bounds: np.ndarray
+    lacked: np.ndarray
 
 
 def automata_of(system: System) -> Automata:
@@ -128,7 +140,37 @@ class TapeShelf:
         self._met: dict[bytes, np.ndarray] = {}
         self._surrounded: set[bytes] = set()
         self._lock = Lock()
+        self._engines: list[Any] = []  # what keeps machine code alive
+        self._code = np.zeros((2, 0), dtype=np.int64)
         self.tapes = self._stacked()
+
+    def look(self) -> None:
+        """Get code ready for the short series that were missed often."""
+        tapes = self.tapes
+        if not ENABLED or tapes.lacked.max(initial=0) < KNOWN:
+            return
+        for k in np.flatnonzero(tapes.lacked >= KNOWN).tolist():
+            place = kept(self.system, "bounds", tapes.modes[k])
+            if tapes.lacked[k] >= WORTH or is_kept(place):
+                with self._lock:
+                    self._make(tapes.modes[k], place, k)
+
+    def _make(self, z: np.ndarray, place: Path, k: int) -> None:
+        system, tapes = self.system, self.tapes
+        if tapes.lacked[k] < KNOWN:  # another thread was first
+            return
+        tape, rows = mode_tape(system, z), constant_rows(system, z)
+        tapes.lacked[k] = NEVER
+        if can_bound(tape, rows):
+            numbers = np.flatnonzero(system.active(z)).tolist()
+            with suppress(TooLong):  # it stays with the interpreter
+                (address,), engine = compile_series(
+                    place,
+                    ("bounds_0",),
+                    lambda: bounds_text(tape, rows, given(system), numbers, system.guard_count),
+                )
+                self._engines.append(engine)
+                tapes.bounds[k] = address
 
     def surround(self, z: np.ndarray) -> None:
         """Put the tapes of a vector of modes on the shelf, and those of the modes that one event may lead to."""
@@ -150,6 +192,9 @@ class TapeShelf:
         system, met = self.system, list(self._met.values())
         lean = [system.lean_tape(z) for z in met]
         modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
+        code = np.zeros((2, len(met)), dtype=np.int64)
+        code[:, : self._code.shape[1]] = self._code
+        self._code = code
         active = [list(np.flatnonzero(system.active(z))) for z in met]
         tapes: Tapes = packed(
             Tapes(
@@ -161,6 +206,7 @@ class TapeShelf:
                 np.array([tape.guards for tape in lean], dtype=np.int64).reshape(
                     len(met), system.guard_count
                 ),
+                *code,
             )
         )
         return tapes

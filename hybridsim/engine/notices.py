@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.pieces import Occurrence, Segment
+from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.stepping import Method
 from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task, Trajectory
 
 # Chattering: so many events in a row, between two of which no state moves by more than this share of its range so far.
@@ -24,6 +26,27 @@ _FASTER = 0.5  # intervals that shrink by more over these events accumulate, whi
 # Stiff: of the steps looked at so many are longer than this share of what stability allows along the negative axis.
 _STEPS, _LOOKS, _MOST, _NEAR = 500, 8, 6, 0.6
 _ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and how well its vector must have settled on a decay
+
+
+@kernel
+def moves_little(states: Any, share: float, extent: Any) -> bool:
+    """Whether no state moves by more than a share of its range from one event to the next.
+
+    states (k, 2, n): before and after each event. extent (2, n): the range so far, least and largest, which takes in
+    that before each event.
+    """
+    count, _, n = states.shape
+    still = True
+    for i in range(n):
+        low, high, moved = extent[0, i], extent[1, i], 0.0
+        for k in range(count):
+            x = states[k, 0, i]
+            low, high = min(low, x), max(high, x)
+            if k > 0:
+                moved = max(moved, abs(x - states[k - 1, 1, i]))
+        extent[0, i], extent[1, i] = low, high
+        still = still and moved <= share * (high - low)
+    return still
 
 
 class Notices:
@@ -36,7 +59,7 @@ class Notices:
     def __init__(self, system: System, method: Method, task: Task, record: Trajectory) -> None:
         self.system, self.method, self.tolerances, self.record = system, method, task.tolerances, record
         self._events = self._steps = 0  # at the last look
-        self._lowest = self._highest = task.x0
+        self._range = np.array([task.x0, task.x0])
         self._done: set[str] = set()
 
     def accumulated(self, names: list[str]) -> None:
@@ -52,30 +75,24 @@ class Notices:
             self._look_for_chattering()
         if self.method.stable_to and counters.steps - self._steps >= _STEPS and self.record.segments:
             self._steps = counters.steps
-            self._look_for_stiffness(_sampled(self.record.segments.blocks[-1]))
+            self._look_for_stiffness(self.record.segments.blocks[-1])
 
     # -- chattering -----------------------------------------------------------------------------------------
 
     def _look_for_chattering(self) -> None:
-        last = [o for o in _last(self.record.occurrences.blocks, _EVENTS) if o.kind == "transition"]
-        if not last:
+        instants, states = _last_transitions(self.record.occurrences.blocks, _EVENTS)
+        if not len(instants):
             return
-        states = np.array([o.x_minus for o in last])
-        self._lowest = np.minimum(self._lowest, states.min(axis=0))
-        self._highest = np.maximum(self._highest, states.max(axis=0))
-        if len(last) < _EVENTS or "chattering" in self._done:
+        is_still = moves_little(states, _SHARE, self._range)
+        if not is_still or len(instants) < _EVENTS or "chattering" in self._done:
             return
-        times = np.array([float(o.instant.minus(last[0].instant)) for o in last])
+        times = (instants - instants[0]).sum(axis=1)
         turns = max(map(abs, self.system.rates), default=0.0) * abs(times[-1]) / (2.0 * math.pi)
-        moved = np.abs(states[1:] - np.array([o.x_plus for o in last])[:-1]).max(axis=0, initial=0.0)
         quarter = _EVENTS // 4
         first, end = abs(times[quarter]), abs(times[-1] - times[-1 - quarter])
-        if (
-            (moved <= _SHARE * (self._highest - self._lowest)).all()
-            and turns < 1.0
-            and end >= _FASTER * first
-        ):
+        if turns < 1.0 and end >= _FASTER * first:
             self._done.add("chattering")
+            last = _last(self.record.occurrences.blocks, _EVENTS)
             (name, count), *_ = Counter(o.component for o in last).most_common(1)
             self.record.warn(
                 f"chattering: {count} of {_EVENTS} events within {abs(times[-1]):.3g} from t = "
@@ -85,39 +102,79 @@ class Notices:
 
     # -- stiffness ------------------------------------------------------------------------------------------
 
-    def _look_for_stiffness(self, samples: list[tuple[Segment, int]]) -> None:
-        if "stiff" in self._done or len(samples) < _LOOKS:
+    def _look_for_stiffness(self, block: Any) -> None:
+        if "stiff" in self._done:
             return
-        lengths = [
-            abs(segment.s[k + 1] - segment.s[k]) * self._fastest_decay(segment, k) for segment, k in samples
-        ]
+        samples = _sampled(block)
+        if len(samples) < _LOOKS:
+            return
+        system, floors = self.system, self.tolerances.atol / self.tolerances.rtol
+        flow, work = system.address("flow"), np.empty((5, system.n))
+        lengths = [abs(h) * fastest_decay(flow, s, x, p, z, floors, work) for _, s, h, x, p, z in samples]
         if sum(length >= _NEAR * self.method.stable_to for length in lengths) >= _MOST:
             self._done.add("stiff")
             longest = int(np.argmax(lengths))
-            segment, k = samples[longest]
-            t, h = float(segment.origin.plus(float(segment.s[k]))), abs(segment.s[k + 1] - segment.s[k])
+            i, s, h, *_ = samples[longest]
+            t, h = float(Instant(*block.origins[i].tolist()).plus(s)), abs(h)
             self.record.warn(
                 f"stiff: at t = {t:.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the steps at "
                 f"{h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
             )
 
-    def _fastest_decay(self, segment: Segment, k: int) -> float:
-        """The largest rate of the flow at a step's start if it is that of a decay, else 0."""
-        system, s, x = self.system, float(segment.s[k]), segment.x[k]
-        sizes = np.abs(x) + self.tolerances.atol / self.tolerances.rtol
-        sizes = np.where(sizes > 0.0, sizes, 1.0)
-        here = system.flow(s, x, segment.p, segment.z)
-        v, rate, aligned = here / sizes, 0.0, 0.0
-        for _ in range(_ITERATIONS):
-            size = float(np.linalg.norm(v))
-            if not 0.0 < size < math.inf:
-                return 0.0
-            v = v / size
-            step = math.sqrt(UNIT)
-            image = (system.flow(s, x + step * sizes * v, segment.p, segment.z) - here) / (step * sizes)
-            rate, aligned = float(np.linalg.norm(image)), float(image @ v)
-            v = image
-        return rate if aligned <= -_ALIGNED * rate else 0.0
+
+@kernel
+def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work: Any) -> float:
+    """The largest rate of the flow at a state if it is that of a decay, else 0, by the power method on differences.
+
+    floors (n,): sizes of states that are none; work (5, n) is written to.
+    """
+    here, sizes, v, moved, image = work[0], work[1], work[2], work[3], work[4]
+    call(flow, s, x, p, z, here)
+    for i in range(x.shape[0]):
+        sizes[i] = abs(x[i]) + floors[i]
+        if not sizes[i] > 0.0:
+            sizes[i] = 1.0
+        v[i] = here[i] / sizes[i]
+    rate = aligned = 0.0
+    step = math.sqrt(UNIT)
+    for _ in range(_ITERATIONS):
+        size = 0.0
+        for i in range(x.shape[0]):
+            size += v[i] * v[i]
+        size = math.sqrt(size)
+        if not 0.0 < size < math.inf:
+            return 0.0
+        for i in range(x.shape[0]):
+            v[i] /= size
+            moved[i] = x[i] + step * sizes[i] * v[i]
+        call(flow, s, moved, p, z, image)
+        rate = aligned = 0.0
+        for i in range(x.shape[0]):
+            image[i] = (image[i] - here[i]) / (step * sizes[i])
+            rate += image[i] * image[i]
+            aligned += image[i] * v[i]
+        rate = math.sqrt(rate)
+        for i in range(x.shape[0]):
+            v[i] = image[i]
+    return rate if aligned <= -_ALIGNED * rate else 0.0
+
+
+def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Instants (k, 2) and states on both sides (k, 2, n) of those that are transitions among so many of the last."""
+    parts, missing = [], count
+    for block in reversed(blocks):
+        first = max(0, len(block) - missing)
+        parts.append(block.transitions(first))
+        missing -= len(block) - first
+        if missing <= 0:
+            break
+    if len(parts) == 1:
+        return parts[0]
+    filled = [part for part in reversed(parts) if len(part[0])]
+    if not filled:
+        return np.empty((0, 2)), np.empty((0, 2, 0))
+    instants, states = zip(*filled, strict=True)
+    return np.concatenate(instants), np.concatenate(states)
 
 
 def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
@@ -131,16 +188,24 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
     return found
 
 
-def _sampled(block: Any) -> list[tuple[Segment, int]]:
-    """Some steps that no event cut short, evenly among the segments of a block."""
-    size = len(block)
-    chosen = np.unique(np.linspace(0, size - 1, min(size, _LOOKS)).astype(int)).tolist()
+def _sampled(block: Any) -> list[tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]]:
+    """Some steps that no event cut short, evenly among the segments of a block.
+
+    Of each the number of the segment, its local time and length, the state there, run-time vector and modes.
+    """
+    chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
-    found: list[tuple[Segment, int]] = []
+    found: list[tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]] = []
     for i in chosen:
-        segment: Segment = block[i]
-        whole = len(segment.s) - 2  # steps but for the last
-        if whole > 0:
-            places = np.unique(np.linspace(0, whole - 1, min(whole, share)).astype(int))
-            found += [(segment, k) for k in places.tolist()]
+        knots, states, p, z = block.steps_of(i)
+        for k in _evenly(len(knots) - 2, share):  # steps but for the last
+            s, end = float(knots[k]), float(knots[k + 1])
+            found.append((i, s, end - s, np.ascontiguousarray(states[k]), p, z))
     return found[:_LOOKS]
+
+
+def _evenly(count: int, most: int) -> list[int]:
+    """So many numbers below a count at most, from the first to the last one."""
+    if count <= most:
+        return list(range(count))
+    return [k * (count - 1) // (most - 1) for k in range(most)] if most > 1 else [0]

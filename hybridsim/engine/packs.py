@@ -8,14 +8,17 @@ Whoever calls the kernel holds the arrays meanwhile.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import ENABLED
+from hybridsim.engine.jit import ENABLED, kernel
 
 _WORDS = 6  # of an array in the table: its address, and up to five lengths
+_ALIGNED = 64  # bytes; numbers of any kind may begin there
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -36,18 +39,10 @@ if ENABLED:
     from numba.np.numpy_support import from_dtype
 
     class Packed:
-        """A named tuple of C-contiguous arrays, as kernels take it."""
+        """A named tuple of C-contiguous arrays, as kernels take it: by the table of their addresses and shapes."""
 
-        def __init__(self, arrays: Any) -> None:
-            self.arrays = arrays
-            words: list[int] = []
-            for array in arrays:
-                assert array.flags.c_contiguous
-                words += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
-            self.table = np.array(words, dtype=np.int64)
-            self.address = self.table.__array_interface__["data"][0]
-            kind: Any = type(arrays)
-            self.numba_type = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
+        def __init__(self, arrays: Any, table: np.ndarray, numba_type: PackType, address: int) -> None:
+            self.arrays, self.table, self.numba_type, self.address = arrays, table, numba_type, address
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self.arrays, name)
@@ -123,4 +118,76 @@ if ENABLED:
 
 def packed(arrays: Any) -> Any:
     """A named tuple of arrays as kernels take it; the tuple itself where the compiler is switched off."""
-    return Packed(arrays) if ENABLED else arrays
+    if not ENABLED:
+        return arrays
+    words: list[int] = []
+    for array in arrays:
+        assert array.flags.c_contiguous
+        words += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
+    kind: Any = type(arrays)
+    form = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
+    table = np.array(words, dtype=np.int64)
+    return Packed(arrays, table, form, table.__array_interface__["data"][0])
+
+
+@kernel
+def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
+    """The table of arrays in some blocks; its address. See `Sheet`."""
+    for k in range(words.shape[0]):
+        for i in range(words.shape[1]):
+            table[k, i] = words[k, i] + skipped[k] * steps[k, i]
+        table[k, 0] += blocks[owners[k]].ctypes.data
+    address: int = table.ctypes.data
+    return address
+
+
+class Sheet:
+    """Arrays of rows that lie one behind the other in a few blocks of memory.
+
+    Where each lies is worked out once; a fresh block is a single allocation, and a pack of all a few sums. A block goes
+    when the last array in it does: what is needed for different lengths of time belongs into different ones.
+
+    Parameters
+    ----------
+    kind : type of the named tuple.
+    fields : dtype, shape and number of the block of each array.
+    """
+
+    def __init__(self, kind: Any, fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
+        self._kind = kind
+        self._places: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
+        self._sizes = [0] * (1 + max(block for *_, block in fields))
+        self._words = np.zeros(
+            (len(fields), _WORDS), dtype=np.int64
+        )  # the table, but for the blocks' addresses
+        self._steps = np.zeros_like(self._words)  # what a row that is skipped adds to it
+        self._owners = np.array([block for *_, block in fields], dtype=np.int64)
+        for k, (name, shape, block) in enumerate(fields):
+            dtype, offset = np.dtype(name), self._sizes[block]
+            row = dtype.itemsize * math.prod(shape[1:])
+            self._places.append((shape, dtype, block, offset))
+            self._words[k, : 1 + len(shape)] = offset, *shape
+            self._steps[k, :2] = row, -1
+            self._sizes[block] += -(-row * shape[0] // _ALIGNED) * _ALIGNED
+        form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
+        self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
+        self._from_the_first = np.zeros(len(fields), dtype=np.int64)
+
+    def blank(self) -> tuple[np.ndarray, ...]:
+        """Fresh blocks."""
+        return tuple([np.empty(size, dtype=np.uint8) for size in self._sizes])
+
+    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
+        """The arrays as kernels take them, without so many rows of each at the beginning."""
+        if not ENABLED:
+            arrays = self.rows(blocks)
+            first = skipped or self._from_the_first
+            return self._kind(*(a[k:] for a, k in zip(arrays, first, strict=True)))
+        rows = self._from_the_first if skipped is None else np.array(skipped)
+        table = np.empty_like(self._words)
+        address = _lay_out(self._words, self._steps, self._owners, rows, blocks, table)
+        return Packed(None, table, self._type, address)
+
+    def rows(self, blocks: tuple[np.ndarray, ...]) -> Any:
+        """The arrays."""
+        return self._kind(*[np.ndarray(shape, d, blocks[k], offset) for shape, d, k, offset in self._places])

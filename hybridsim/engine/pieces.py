@@ -70,4 +70,7 @@ class Occurrence(NamedTuple):
 
 def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
     """A segment of no length: the state after an event with which a run ends."""
-    return Segment(origin, z, p, np.zeros(1), x[None, :].copy(), lambda s: np.tile(x, (len(s), 1)))
+    states = x[None].copy()
+    return Segment(
+        origin, z.copy(), p.copy(), np.zeros(1), states, lambda s: np.repeat(states, len(s), axis=0)
+    )

@@ -195,6 +195,7 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "pins": {},
         "projected": {},
         "clusters": (),
+        "ties": (),
         "rates": 0,
         "linear": {"": (False,)} | linear,
         "quantities": tuple(output.name for output in model.outputs),

@@ -209,7 +209,7 @@ def is_zero(
         work.y_error[i] *= 2.0
     event = Before(s, s_error, y, work.y_error, p, z)
     guard_series(tapes, inputs, lin, k, event, y, work.y_error, work)
-    return abs(work.values[fired, 0]) <= work.bounds[fired, 0]
+    return abs(work.judged[0, fired, 0]) <= work.judged[1, fired, 0]
 
 
 @kernel

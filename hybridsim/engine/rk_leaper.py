@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridsim.engine.guard_parts import GuardParts
 from hybridsim.engine.hermite import Hermite, bernstein_weights, fit_all, right_system, shift_matrix
+from hybridsim.engine.jit import Door
 from hybridsim.engine.leaper import NOT_LINEAR, Leaper
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rk_leap import rk_leap
@@ -32,6 +33,11 @@ class Room(NamedTuple):
     a: np.ndarray
     b: np.ndarray
     stack: np.ndarray
+    powers: np.ndarray
+    values: np.ndarray
+    sums: np.ndarray
+    totals: np.ndarray
+    bernstein: np.ndarray
     stages: np.ndarray
     left: np.ndarray
     right: np.ndarray
@@ -63,6 +69,9 @@ class HermiteBlock(SeriesBlock):
         return out
 
 
+_leap = Door(rk_leap)
+
+
 class RungeKuttaLeaper(Leaper):
     """Leaps of an explicit Runge-Kutta method."""
 
@@ -87,6 +96,9 @@ class RungeKuttaLeaper(Leaper):
                 a=np.empty(columns),
                 b=np.empty(columns),
                 stack=np.empty((64, columns + 2)),
+                powers=np.empty(columns + 1),
+                **{name: np.empty(guards) for name in ("values", "sums", "totals")},
+                bernstein=np.zeros(0, dtype=np.int64),
                 stages=np.empty((len(self.tableau.c), n)),
                 left=np.empty((n, TERMS)),
                 right=np.empty((n, TERMS)),
@@ -119,7 +131,7 @@ class RungeKuttaLeaper(Leaper):
     ) -> tuple[int, int, int]:
         room.counts[:] = 0
         tapes = self.shelf.tapes  # one and the same for both: another thread may put more on the shelf
-        code, steps, count = rk_leap(
+        code, steps, count = _leap(
             self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs,
             NOT_LINEAR, self.places, self.method, self.control, to, clock, state, work, room, rows,
         )  # fmt: skip

@@ -48,9 +48,10 @@ class Tableau:
     def packed(self) -> Any:
         """What `attempt` takes."""
         rows = [self.b, self.e, self.e_low] if self.e_low.size else [self.b, self.e]
-        return packed(Coefficients(self.c, np.ascontiguousarray(self.a), np.array(rows)))
+        arrays = (np.ascontiguousarray(part, dtype=float) for part in (self.c, self.a, rows))
+        return packed(Coefficients(*arrays))
 
-    @property
+    @cached_property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
         """First terms of the error estimates of a step on a linear problem, by coefficients x_k = x^(k)/k! of the flow.
 

@@ -246,7 +246,8 @@ def find_roots(
         pieces += 1
         if pieces > _MOST_PIECES:
             raise StepFailure(
-                f"a guard could not be resolved within one step in {pieces} pieces: lower max_step"
+                f"its zeros could not be told apart within one step in {pieces} pieces: lower max_step, or write it "
+                "so that it has no pole and a value on both sides of its zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

@@ -27,6 +27,7 @@ from hybridsim.engine.stepping import (
 )
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
+from hybridsim.errors import UsageError
 
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
 _CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
@@ -116,6 +117,8 @@ class SegmentRun:
         while True:
             step = stepper.step()
             self.counters.steps += 1
+            if self.counters.steps == 1:
+                self._check_shape(step)
             if not np.isfinite(step.x1).all():
                 raise StepFailure(f"the state is not finite at local time {step.s1!r}")
             self.last_step = abs(step.s1 - step.s0)
@@ -139,6 +142,23 @@ class SegmentRun:
                 return arrival
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
+
+    def _check_shape(self, step: Step) -> None:
+        """Refuse dense output of another shape than the contract has; its times are not as many as there are states."""
+        n = self.system.n
+        times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
+        try:
+            shape = np.shape(step.dense(times))
+        except (TypeError, ValueError, IndexError) as error:
+            found = f"fails for an array of times ({type(error).__name__}: {error})"
+        else:
+            found = f"gives an array of shape {shape} for {len(times)} times and {n} states"
+            if shape == (len(times), n):
+                return
+        raise UsageError(
+            f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {found}",
+            remedy="step.dense(times) takes an array of k local times to states of shape (k, n), a row for each time",
+        )
 
     def rounding(self) -> np.ndarray:
         """How well the states are known on the segment: its own rounding and what the last event left over."""

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.accumulation import CLOSING_IN
 from hybridsim.engine.event_work import AT, AT_ERROR, FIRED
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
 from hybridsim.engine.timepair import two_sum
 
-_SHRINKING, _STEADY = 0.999, 1e-3  # ratio of intervals between events from which on they may accumulate
+_STEADY = 1e-3  # of the ratio of intervals between events: what it may change by in a series that accumulates
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
@@ -35,7 +36,7 @@ def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
     gap: since the last event. pace (3,): the gap before, its ratio to the one before that, how often it was steady.
     """
     ratio = gap / pace[0]
-    steady = ratio < _SHRINKING and abs(ratio - pace[1]) <= _STEADY * ratio
+    steady = ratio < CLOSING_IN and abs(ratio - pace[1]) <= _STEADY * ratio
     pace[0], pace[1], pace[2] = gap, ratio, pace[2] + 1.0 if steady else 0.0
     return pace[2] > 2.0 or gap <= _ULPS * 2.0**-52 * abs(clock[0])
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jit import allocating_kernel, call
-from hybridsim.engine.pieces import Segment
+from hybridsim.engine.pieces import Segment, end_point
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.engine.timepair import Instant
@@ -135,9 +135,28 @@ class SeriesBlock(Sequence[Segment]):
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
-        first, last = self.ends[i], self.ends[i + 1]
-        s = np.append(self.steps[first:last, 0], self.spans[i, 1])
-        x = self.states(np.full(len(s), i), s)
+        i = range(len(self))[i]
+        one = self._alone(i) if len(self) > 1 else self
+        s, *_ = self.steps_of(i)
+        x = one.states(np.zeros(len(s), dtype=np.int64), s)
         high, low = self.origins[i].tolist()
-        dense = SeriesPieces(s, self.polynomials[first:last])
+        dense = SeriesPieces(s, one.polynomials)
         return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
+
+    def _alone(self, i: int) -> SeriesBlock:
+        """A block of one segment."""
+        first, last = self.ends[i], self.ends[i + 1]
+        rows = (self.origins, self.modes, self.vectors, self.jumps)
+        ends = np.array([0, last - first])
+        steps, series = self.steps[first:last], self.series[first:last]
+        return type(self)(self.system, ends, steps, series, *(r[i : i + 1] for r in rows))
+
+    def at_end(self) -> Segment:
+        """The end of the last segment."""
+        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 0])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Knots (m + 1,), states where steps begin (m, n), run-time vector and modes of a segment."""
+        steps, first, last = self.steps, self.ends[i], self.ends[i + 1]
+        s = np.append(steps[first:last, 0], steps[last - 1, 0] + steps[last - 1, 1])
+        return s, self.series[first:last, :, 0], self.vectors[i], self.modes[i]

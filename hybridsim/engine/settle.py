@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.candidates import all_verdicts, verdicts_on
 from hybridsim.engine.decide import (
     LEAVES,
     NONE,
@@ -24,16 +26,20 @@ from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.releases import Releases
+from hybridsim.engine.rest_at_stops import together, with_tied
 from hybridsim.engine.system import Series, System
 
 # A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
 # mode of the model goes round in circles.
 _ROUNDS_PER_MODE = 8
+_SEVERAL = "several motions are admissible"
 _MOST_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
 
 
 class Settling:
     """One event being settled."""
+
+    is_thorough = False  # judges all candidates, also those that no choice needs
 
     def __init__(
         self,
@@ -314,7 +320,7 @@ class Settling:
                 x_error[place] = UNIT * abs(value)
             if not np.isfinite(value):
                 state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, self.at.x, strict=True))
-                return f"{self._reset_in_words(key)} sets {name} to {float(value)!r}, at {state}"
+                return f"{self._reset_in_words(key)} sets {name} to no finite number, at {state}"
             previous = writer.setdefault(name, (label, float(value)))
             if previous[1] != value and not (np.isnan(value) and np.isnan(previous[1])):
                 return f"two resets at one instant set {name} to {previous[1]!r} and to {float(value)!r}"
@@ -347,40 +353,34 @@ class Settling:
 
     def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
         at, automata = self.at, self.system.automata
-        taking_part = [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
+        taking_part = with_tied(
+            self.system, [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
+        )
         for c in taking_part:
             self.on_surface[c] = True
         sizes = [len(automata[c].modes) for c in taking_part]
-        if int(np.prod(sizes)) > _MOST_CANDIDATES:
+        if math.prod(sizes) > _MOST_CANDIDATES:
             names = ", ".join(automata[c].name for c in taking_part)
-            return (
-                "inconsistent",
-                f"{len(taking_part)} coupled components at their surfaces at once ({names})",
-            )
-        candidates = joint_candidates(sizes)
+            return "inconsistent", f"{len(sizes)} coupled components at their surfaces at once ({names})"
+        candidates = together(self.system, taking_part, joint_candidates(sizes))
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
-        verdicts = np.array(
-            [self.verdict(self.with_modes(taking_part, c), cluster) for c in candidates], dtype=np.int64
-        )
+        holds = np.array([automata[c].hold for c in taking_part])
+        verdicts, is_whole = verdicts_on(self, taking_part, candidates, holds, cluster)
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
-            status = "nonunique" if self.forward else "backward-nonunique"
-            return status, self._say(taking_part, rival, "several motions are admissible")
-        holds = np.array([automata[c].hold for c in taking_part])
+            return f"{'' if self.forward else 'backward-'}nonunique", self._say(taking_part, rival, _SEVERAL)
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
-            return "nonunique", self._say(
-                taking_part, candidates[verdicts != LEAVES], "several motions are admissible"
-            )
+            verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
+            return "nonunique", self._say(taking_part, candidates[verdicts != LEAVES], _SEVERAL)
         if number == NONE:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
         if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
             return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
-        guards = {
-            c: automata[c].guard_names[source[c]][j] for c, j, _ in self._fired_guards() if source[c] >= 0
-        }
+        fired = [(c, j) for c, j, _ in self._fired_guards() if source[c] >= 0]
+        guards = {c: automata[c].guard_names[source[c]][j] for c, j in fired}
         for c, mode in zip(taking_part, candidates[number], strict=True):
             at.z[c] = mode
             if source[c] != mode:

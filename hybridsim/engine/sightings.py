@@ -14,8 +14,14 @@ from hybridsim.engine.trajectory import Trajectory
 def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
     """In the order of time; the record is warned of near-grazings."""
     passed = [(seen.s, _sighting(system, origin, seen)) for seen in run.sightings]
-    declared = (g for g in run.grazings if not system.is_corner[system.owner[g[0]]])
-    passed += [(s, _grazing(system, origin, run, guard, s, record)) for guard, s, _ in declared]
+    declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
+    if declared:
+        times = np.array([s for _, s, _ in declared])
+        states = run.flow.project(times, run.segment().dense(times))
+        passed += [
+            (s, _grazing(system, origin, run, guard, s, x, record))
+            for (guard, s, _), x in zip(declared, states, strict=True)
+        ]
     return [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
 
 
@@ -25,13 +31,12 @@ def _sighting(system: System, origin: Instant, seen: Sighting) -> Occurrence:
 
 
 def _grazing(
-    system: System, origin: Instant, run: SegmentRun, guard: int, s: float, record: Trajectory
+    system: System, origin: Instant, run: SegmentRun, guard: int, s: float, x: np.ndarray, record: Trajectory
 ) -> Occurrence:
     c = int(system.owner[guard])
     automaton, number = system.automata[c], int(run.flow.z[c])
     mode = automaton.modes[number]
     name = automaton.guard_names[number][automaton.guards[number].index(guard)]
-    x = run.flow.project(np.array([s]), run.segment().dense(np.array([s])))[0]
     record.warn(
         f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -208,6 +208,10 @@ class Leaps(Protocol):
 
 class Method(Protocol):
     """What the mode loop uses of an integrator."""
+
+    @property
+    def lacks(self) -> Mapping[str, str]:
+        """What it cannot do, with reasons; "adaptive" where it has a step and no rtol."""
 
     @property
     def dense_is_accurate(self) -> bool:

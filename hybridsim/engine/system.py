@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridsim.engine.differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.jets import ORDER, run_series
+from hybridsim.engine.jit import Door
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.lean_tape import LeanTape, has_corners, lean, twins_of
+from hybridsim.engine.lean_tape import LeanTape, has_corners, lean
 from hybridsim.engine.modules import compiled
-from hybridsim.engine.packs import packed
+from hybridsim.engine.registers import Registers
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase
@@ -62,37 +63,6 @@ class Automaton:
     def has_surface(self) -> bool:
         """Whether its mode is decided by admissibility at a surface."""
         return self.hold >= 0
-
-
-class Inputs(NamedTuple):
-    """Registers of a tape's inputs: constants with values and error bounds (m, 2), parameters and their places in p,
-    phases, time (1,) (-1: none), states."""
-
-    constants: np.ndarray
-    values: np.ndarray
-    parameters: np.ndarray
-    sources: np.ndarray
-    phases: np.ndarray
-    time: np.ndarray
-    states: np.ndarray
-
-
-class _Registers:
-    """Where the tape's inputs are, as index arrays."""
-
-    def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        self.twins = twins_of(tape)
-        self.count: int = tape["registers"] + len(self.twins)
-        time: int = tape["time"]
-        constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
-        values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)
-        parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
-        sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
-        is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)
-        phases, states = parameters[is_phase], np.array(tape["states"], dtype=np.int64)
-        self.inputs = packed(
-            Inputs(constants, values, parameters, sources, phases, np.array([time], dtype=np.int64), states)
-        )
 
 
 @dataclass(frozen=True)
@@ -199,6 +169,9 @@ class _Frame:
         return table
 
 
+_run_series = Door(run_series)
+
+
 class System:
     """A model with values: what integrators and the mode loop work on.
 
@@ -222,10 +195,13 @@ class System:
         self.has_surface: np.ndarray = frame.has_surface
         self.is_corner: np.ndarray = frame.is_corner
         self.is_unilateral: np.ndarray = frame.is_unilateral
+        # by impacts or resets; friction and relays alone do not
+        self.may_bounce = bool((frame.is_unilateral | ~(frame.has_surface | frame.is_corner)).any())
         self.owner: np.ndarray = frame.owner  # component of each guard
         self.guard_count: int = data["guard_count"]
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
         self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
+        self.ties: tuple[tuple[int, int, bool], ...] = data["ties"]  # see `hybridsim.engine.ties.Tie`
         self.pins: dict[int, tuple[int, ...]] = data["pins"]
         self.projected: dict[int, tuple[int, ...]] = data["projected"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
@@ -242,16 +218,15 @@ class System:
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_tape: bool = data["tape"] is not None  # it is made from expressions
         if self.has_tape:
-            self._registers: _Registers = self.code.shared(
-                "registers", lambda: _Registers(data["tape"], self.layout)
+            self._registers: Registers = self.code.shared(
+                "registers", lambda: Registers(data["tape"], self.layout)
             )
         self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
 
     @property
     def has_corners(self) -> bool:
         """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
-        tape = self.code.data["tape"]
-        return self.has_tape and bool(self.code.shared("corners", lambda: has_corners(tape)))
+        return self.has_tape and self.code.shared("corners", lambda: has_corners(self.code.data["tape"]))
 
     @cached_property
     def is_linear(self) -> bool:
@@ -311,9 +286,7 @@ class System:
 
     def hot_functions(self) -> tuple[str, ...]:
         """The functions that every run needs compiled; the others are compiled when they are first used."""
-        names = ["flow"]
-        names += ["guards"] if self.guard_count else []
-        names += ["project"] if self.can_hold else []
+        names = ["flow", *(["guards"] if self.guard_count else []), *(["project"] if self.can_hold else [])]
         names += ["monitors"] if self.monitor_names else []
         return tuple(names)
 
@@ -324,7 +297,7 @@ class System:
         return self.code.address(name)
 
     @property
-    def registers(self) -> _Registers:
+    def registers(self) -> Registers:
         """Where the tape's inputs and results are."""
         return self._registers
 
@@ -427,8 +400,7 @@ class System:
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
         """Active guard numbers (components, widest), -1 where a mode has fewer."""
-        numbers: np.ndarray = self._frame.guard_table[self._frame.component_numbers, z]
-        return numbers
+        return np.asarray(self._frame.guard_table[self._frame.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
         """A guard of the modes z in words."""
@@ -467,7 +439,8 @@ class System:
             return self._differences(s, x, p, z, x_error, s_error)
         tape, count = self.lean_tape(z), self._registers.count
         V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
-        run_series(
+        x, x_error, p = (np.ascontiguousarray(array, dtype=float) for array in (x, x_error, p))
+        _run_series(
             tape.constant_rows, tape.rows, self._registers.inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
         )  # fmt: skip
         return Series(V, E, tape)

@@ -2,6 +2,10 @@
 
 The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
 doi:10.1080/10586458.2005.10128904), over the lean tape and without the error bounds that `hybridsim.engine.jets` keeps.
+
+Sums run from the middle of a convolution outward: what is newest, at both ends, comes last, so that little waits for
+it. What is divided by an order, or at higher orders by one and the same number, is multiplied by the reciprocal. The
+generated code of `hybridsim.engine.series_code` and `hybridsim.engine.jets` do each operation alike, to the last bit.
 """
 
 from __future__ import annotations
@@ -9,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import inlined, kernel
+from hybridsim.engine.jit import call_series, inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -48,27 +52,43 @@ from hybridsim.engine.tape import (
     TANGENT,
 )
 
+EXACTLY = 3  # order of states up to which events are judged: they are divided by their order
+
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
 _SHORTER = 0.5  # factor on a step over which a guard's series does not reach
 _TRIALS = 60  # halvings: down to nothing
 
 
 @inlined
-def _convolution(V: Any, a: int, b: int, k: int, first: int, last: int) -> float:
-    """sum_{i=first}^{last} a_i b_{k-i}."""
-    total = 0.0
-    for i in range(first, last + 1):
-        total += V[a, i] * V[b, k - i]
+def _inner(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k-1} a_i b_{k-i}."""
+    total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
+    for i in range((k - 1) // 2, 0, -1):
+        total += V[a, i] * V[b, k - i] + V[a, k - i] * V[b, i]
     return total
 
 
 @inlined
-def _weighted(V: Any, a: int, b: int, k: int, last: int) -> float:
-    """sum_{i=1}^{last} i a_i b_{k-i}: coefficient k - 1 of a' b."""
-    total = 0.0
-    for i in range(1, last + 1):
-        total += i * V[a, i] * V[b, k - i]
+def _product(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=0}^{k} a_i b_{k-i}."""
+    if k == 0:
+        return V[a, 0] * V[b, 0]
+    return _inner(V, a, b, k) + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
+
+
+@inlined
+def _weighted(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k-1} i a_i b_{k-i}."""
+    total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
+    for i in range((k - 1) // 2, 0, -1):
+        total += i * V[a, i] * V[b, k - i] + (k - i) * V[a, k - i] * V[b, i]
     return total
+
+
+@inlined
+def _slope(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k} i a_i b_{k-i}: coefficient k - 1 of a' b."""
+    return _weighted(V, a, b, k) + k * V[a, k] * V[b, 0]
 
 
 @kernel
@@ -102,25 +122,25 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Order k >= 1 of the operations that follow a differential equation."""
+    part = 1.0 / k
     if op == EXP:
-        V[out, k] = _weighted(V, a, out, k, k) / k
+        V[out, k] = _slope(V, a, out, k) * part
     elif op == SINCOS:
-        V[out, k] = _weighted(V, a, out + 1, k, k) / k
-        V[out + 1, k] = -_weighted(V, a, out, k, k) / k
+        V[out, k] = _slope(V, a, out + 1, k) * part
+        V[out + 1, k] = -(_slope(V, a, out, k) * part)
     elif op == SINHCOSH:
-        V[out, k] = _weighted(V, a, out + 1, k, k) / k
-        V[out + 1, k] = _weighted(V, a, out, k, k) / k
+        V[out, k] = _slope(V, a, out + 1, k) * part
+        V[out + 1, k] = _slope(V, a, out, k) * part
     elif op == TANGENT:
-        V[out, k] = _weighted(V, a, out + 1, k, k) / k
-        w = _convolution(V, out, out, k, 0, k)
+        V[out, k] = _slope(V, a, out + 1, k) * part
+        w = _product(V, out, out, k)
         V[out + 1, k] = w if b == 0 else -w
     elif op == INTEGRAL and c != ANGLE:
-        V[out, k] = (V[b, k] - _weighted(V, out, a, k, k - 1) / k) / V[a, 0]
+        V[out, k] = (V[b, k] - _weighted(V, out, a, k) * part) / V[a, 0]
     elif op == INTEGRAL:
-        total = _weighted(V, b, a, k, k) - _weighted(V, a, b, k, k)
+        total = _slope(V, b, a, k) - _slope(V, a, b, k)
         for j in range(1, k):
-            square = _convolution(V, a, a, k - j, 0, k - j) + _convolution(V, b, b, k - j, 0, k - j)
-            total -= j * V[out, j] * square
+            total -= j * V[out, j] * (_product(V, a, a, k - j) + _product(V, b, b, k - j))
         V[out, k] = total / (k * (V[a, 0] ** 2 + V[b, 0] ** 2))
 
 
@@ -181,21 +201,26 @@ def advance(rows: Any, V: Any, k: int) -> None:
         elif op == CONSTANT_SUB:
             V[out, k] = V[b, 0] - V[a, 0] if k == 0 else -V[a, k]
         elif op == SINCOS_LINEAR and k > 0:
-            V[out, k] = V[a, 1] * V[out + 1, k - 1] / k
-            V[out + 1, k] = -V[a, 1] * V[out, k - 1] / k
+            rate = V[a, 1] * (1.0 / k)
+            V[out, k] = rate * V[out + 1, k - 1]
+            V[out + 1, k] = -(rate * V[out, k - 1])
         elif op == MUL:
-            V[out, k] = _convolution(V, a, b, k, 0, k)
+            V[out, k] = _product(V, a, b, k)
         elif op == DIVIDE_BY:
-            V[out, k] = V[a, k] / V[b, 0]
+            V[out, k] = V[a, k] / V[b, 0] if k == 0 else V[a, k] * (1.0 / V[b, 0])
         elif op == DIV:
-            V[out, k] = (V[a, k] - _convolution(V, out, b, k, 0, k - 1)) / V[b, 0]
+            if k == 0:
+                V[out, 0] = V[a, 0] / V[b, 0]
+            else:
+                rest = V[a, k] - (_inner(V, out, b, k) + V[out, 0] * V[b, k])
+                V[out, k] = rest * (1.0 / V[b, 0])
         elif op == NEG:
             V[out, k] = -V[a, k]
         elif op == SQRT:
             if k == 0:
                 V[out, 0] = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             else:
-                rest = 0.5 * (V[a, k] - _convolution(V, out, out, k, 1, k - 1))
+                rest = 0.5 * (V[a, k] - _inner(V, out, out, k))
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
         elif op >= ABS and op <= EQUAL:
             _logic(op, V, a, b, c, out, k)
@@ -220,44 +245,103 @@ def expand(rows: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None
         advance(rows, V, k)
         if k < order:
             for i in range(states.shape[0]):
-                V[states[i], k + 1] = V[derivatives[i], k] / (k + 1)
+                rate, j = V[derivatives[i], k], k + 1
+                V[states[i], j] = rate / j if j <= EXACTLY else rate * (1.0 / j)
+
+
+@inlined
+def tabulate(h: float, order: int, powers: Any) -> None:
+    """powers[k] = h**k for k = 0..order; even and odd ones side by side, so that they need not wait for each other."""
+    even, odd, square = 1.0, h, h * h
+    for k in range(0, order, 2):
+        powers[k], powers[k + 1] = even, odd
+        even, odd = even * square, odd * square
+    if order % 2 == 0:
+        powers[order] = even
+
+
+@inlined
+def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
+    """sum_k |U[r, k]| h**k, the powers given."""
+    even, odd = 0.0, 0.0
+    for k in range(0, order, 2):
+        even += abs(U[r, k]) * powers[k]
+        odd += abs(U[r, k + 1]) * powers[k + 1]
+    if order % 2 == 0:
+        even += abs(U[r, order]) * powers[order]
+    return even + odd
+
+
+@inlined
+def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
+    """Powers of h, and for the series in the watched rows of U what `sum_sizes` makes of them.
+
+    code: address of a function that does so where these are all rows, and where the totals follow on the powers in
+    memory (`sizes` of `hybridsim.engine.series_code`); 0 for none.
+    """
+    if code != 0:
+        call_series(code, h, 0.0, U, U, U, powers)
+        return
+    tabulate(h, order, powers)
+    for j in range(watched.shape[0]):
+        totals[j] = sum_sizes(U, watched[j], order, powers)
 
 
 @kernel
-def reach(V: Any, states: Any, watched: Any, order: int, rtol: float, atol: Any, longest: float) -> float:
-    """The step up to which the series hold to the tolerance, at most `longest`.
+def reach(
+    code: int,
+    V: Any,
+    states: Any,
+    U: Any,
+    watched: Any,
+    order: int,
+    rtol: float,
+    atol: Any,
+    longest: float,
+    powers: Any,
+    totals: Any,
+) -> float:
+    """The step h up to which the series hold to the tolerance, at most `longest`.
 
-    The last two terms of each state are below atol + rtol |x|; those of each watched function below rtol of its
-    largest term. NaN where a coefficient is no number.
+    powers (order + 1,) are h**k then, totals those of `sum_sizes` for the functions; code: see `measure`.
+
+    states: rows of V with the series of the states, watched: rows of U with those of functions. The last two terms of
+    each state are below atol + rtol |x|; those of each function below rtol of its largest term. NaN where a
+    coefficient is no number.
     """
-    h = longest
+    h, first, last = longest, math.inf, math.inf
     for i in range(states.shape[0]):
         r = states[i]
+        one, two = abs(V[r, order - 1]), abs(V[r, order])
+        if not (one < math.inf and two < math.inf):
+            return math.nan
         scale = atol[i] + rtol * abs(V[r, 0])
-        for k in range(order - 1, order + 1):
-            size = abs(V[r, k])
-            if not size < math.inf:
-                return math.nan
-            if size * h**k > scale:
-                if scale == 0.0:
-                    scale = rtol * max(abs(V[r, 1]) * h, 1e-300)
-                h = min(h, (scale / size) ** (1.0 / k))
+        if scale == 0.0:
+            scale = rtol * max(abs(V[r, 1]) * h, 1e-300)
+        if one > 0.0 and one * first > scale:
+            first = scale / one
+        if two > 0.0 and two * last > scale:
+            last = scale / two
+    h = min(h, first ** (1.0 / (order - 1)))
+    measure(code, U, watched, order, h, powers, totals)
+    if last < powers[order]:
+        h = min(h, last ** (1.0 / order))
+        measure(code, U, watched, order, h, powers, totals)
     for j in range(watched.shape[0]):
         r = watched[j]
         for _ in range(_TRIALS):
-            largest, power = 0.0, 1.0
-            for k in range(order - 1):
-                size = abs(V[r, k]) * power
-                if not size < math.inf:
-                    return math.nan
-                largest = max(largest, size)
-                power *= h
-            last = max(abs(V[r, order - 1]) * power, abs(V[r, order]) * power * h)
-            if not last < math.inf:
+            if not totals[j] < math.inf:
                 return math.nan
-            if last <= rtol * largest or last == 0.0:
+            term = max(abs(U[r, order - 1]) * powers[order - 1], abs(U[r, order]) * powers[order])
+            largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
+            if term <= rtol * largest or term == 0.0:
                 break
-            h *= max(_SHORTER, 0.9 * (rtol * largest / last) ** (1.0 / order)) if largest > 0.0 else _SHORTER
+            for k in range(2, order - 1):
+                largest = max(largest, abs(U[r, k]) * powers[k])
+            if term <= rtol * largest:
+                break
+            h *= max(_SHORTER, 0.9 * (rtol * largest / term) ** (1.0 / order)) if largest > 0.0 else _SHORTER
+            measure(code, U, watched, order, h, powers, totals)
     return h
 
 

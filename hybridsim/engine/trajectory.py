@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,12 @@ from hybridsim.engine.stepping import Counters
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
-__all__ = ["Occurrence", "Pieces", "Segment", "Task", "Trajectory"]
+# Events that a run may look back on where bounces come to an end. What is shown of it must not change what is found.
+LOOKED_BACK_ON = 4096
+
+Made = Callable[[int, int], Checkpoint]  # of how many segments and occurrences were recorded since
+
+__all__ = ["LOOKED_BACK_ON", "Occurrence", "Pieces", "Segment", "Task", "Trajectory"]
 
 
 class Trajectory:
@@ -33,13 +40,16 @@ class Trajectory:
     def __init__(self, system: System, keep: Keep = ALL) -> None:
         # the last segment is needed in any case: it says where a run ends
         self.segments = SegmentChain(system, 0.0 if keep.segments is None else keep.segments)
-        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events)
+        self._may_bounce = system.may_bounce
+        least = LOOKED_BACK_ON if self._may_bounce else 0
+        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events, least)
+        self.hidden: list[Any] = []  # the blocks of occurrences before some were let go of, to go on with
         self.counters = Counters()
         self.status, self.message = "finished", ""
         self.warnings_there: dict[str, int] = {}  # those up to the checkpoint
         self.warnings: dict[str, int] = {}  # message -> how often
-        self.checkpoint: Checkpoint | None = None  # the last one
-        self._mark: tuple[Checkpoint, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
+        self._checkpoint: Checkpoint | Callable[[], Checkpoint] | None = None
+        self._mark: tuple[Made, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
     def stop_early(self, status: str, why: str, start: float) -> None:
         """Say of a run that stopped before its end why, where its solution ends (begun at `start`), how it goes on."""
@@ -51,26 +61,30 @@ class Trajectory:
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
         """Keep the state after an event at the very end of the run, which no segment begins with."""
         if self.segments:
-            last = self.segments[-1]
-            same = (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all()
-            if same or float(last.end) != float(instant):
+            if float(self.segments.blocks[-1].until) != float(instant):
                 return
-        self.segments.append(end_point(instant, z.copy(), p, x))
+            last = self.segments[-1]
+            if (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all():
+                return
+        self.segments.append(end_point(instant, z, p, x))
 
     def close(self, keep: Keep) -> None:
         """Let go of everything that is not to be kept, to the exact time."""
         if keep == ALL or not self.segments:
             return
-        last = self.segments[-1]
-        end, forward = last.end, last.s[-1] >= last.s[0]
         if keep.segments is None:
-            self.segments.blocks = []
-            self.segments.append(end_point(end, last.z, last.p, last.x[-1]))
-        elif keep.segments < math.inf:
-            self.segments.cut(_before(end, keep.segments, forward))
+            self.segments.keep_only(self.segments.blocks[-1].at_end())
+        if keep.events != math.inf and self._may_bounce:
+            self.hidden = list(self.occurrences.blocks)
         if keep.events is None:
             self.occurrences.blocks = []
-        elif keep.events < math.inf:
+        if keep.segments in (None, math.inf) and keep.events in (None, math.inf):
+            return
+        last = self.segments[-1]
+        end, forward = last.end, last.s[-1] >= last.s[0]
+        if keep.segments is not None and keep.segments < math.inf:
+            self.segments.cut(_before(end, keep.segments, forward))
+        if keep.events is not None and keep.events < math.inf:
             start = _before(end, keep.events, forward)
             sign = 1.0 if forward else -1.0
             times = np.concatenate([np.empty(0), *(block.times for block in self.occurrences.blocks)])
@@ -80,19 +94,27 @@ class Trajectory:
                 first += 1
             self.occurrences.drop(first)
 
-    def mark(self, checkpoint: Checkpoint) -> None:
-        """Note where the run could go on."""
+    def mark(self, checkpoint: Made) -> None:
+        """Note where the run could go on; the last checkpoint is made when the run is over."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:
         """Make the last place that was noted the one to go on from: nothing more will be recorded."""
         if self._mark is not None:
             checkpoint, segments, occurrences, self.warnings_there = self._mark
-            self.checkpoint = replace(
-                checkpoint,
-                segments=self.segments.since_mark(segments),
-                occurrences=self.occurrences.since_mark(occurrences),
-            )
+            since = self.segments.since_mark(segments), self.occurrences.since_mark(occurrences)
+            self._checkpoint = partial(checkpoint, *since)
+
+    @property
+    def checkpoint(self) -> Checkpoint | None:
+        """The last place from which the run can go on; made when somebody asks for it."""
+        if callable(self._checkpoint):
+            self._checkpoint = self._checkpoint()
+        return self._checkpoint
+
+    @checkpoint.setter
+    def checkpoint(self, checkpoint: Checkpoint | None) -> None:
+        self._checkpoint = checkpoint
 
     def up_to_checkpoint(self, system: System) -> Trajectory:
         """A copy that ends at the checkpoint, to go on with."""
@@ -103,6 +125,10 @@ class Trajectory:
             (earlier.occurrences, self.occurrences, self.checkpoint.occurrences),
         ):
             chain.window, chain.blocks = others.window, others.without_last(count)
+        if self.hidden:
+            whole: Chain[Occurrence] = Chain(OccurrenceList)
+            whole.blocks = self.hidden
+            earlier.occurrences.blocks = whole.without_last(self.checkpoint.occurrences)
         earlier.counters, earlier.warnings = copy(self.counters), dict(self.warnings_there)
         earlier.checkpoint = self.checkpoint
         return earlier

@@ -32,13 +32,13 @@ def _text(node: ast.expr) -> tuple[str, int]:
         case ast.UnaryOp(op=ast.Not(), operand=operand):
             return f"not {write(operand, _NOT)}", _NOT
         case ast.UnaryOp(op=op, operand=operand):
-            return ("-" if isinstance(op, ast.USub) else "+") + write(operand, _UNARY), _UNARY
+            return ("-" if isinstance(op, ast.USub) else "+") + _unsigned(write(operand, _UNARY)), _UNARY
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
             return f"{write(left, _ATOM)}**{write(right, _UNARY)}", _POWER
         case ast.BinOp(left=left, op=operator, right=right):
             level, sign = _LEVEL[type(operator)], BINARY[type(operator)]
             spaced = f" {sign} " if level == _SUM else sign
-            return f"{write(left, level)}{spaced}{write(right, level + 1)}", level
+            return f"{write(left, level)}{spaced}{_unsigned(write(right, level + 1))}", level
         case ast.BoolOp(op=ast.And(), values=values):
             return " and ".join(write(value, _NOT) for value in values), _AND
         case ast.BoolOp(values=values):
@@ -54,3 +54,8 @@ def _text(node: ast.expr) -> tuple[str, int]:
         case ast.Call(func=ast.Name(id=name), args=args):
             return f"{name}({', '.join(write(arg) for arg in args)})", _ATOM
     raise TypeError(f"an unchecked node reached the writer: {ast.dump(node)}")
+
+
+def _unsigned(text: str) -> str:
+    """A text that may follow an operator: one that begins with a sign is put in parentheses."""
+    return f"({text})" if text.startswith(("-", "+")) else text

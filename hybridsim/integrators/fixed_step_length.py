@@ -8,6 +8,10 @@ from hybridsim.engine.period import system_period
 from hybridsim.engine.system import System
 from hybridsim.errors import UsageError
 
+_MOST_STEPS = (
+    1e18  # thirty years at a nanosecond each; below it a run to a far end may still be ended by a monitor
+)
+
 
 def fixed_step_length(
     system: System, step: float | None, period: float | None, steps_per_period: float, name: str
@@ -34,4 +38,14 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
         raise UsageError(
             f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
             remedy="set step or steps_per_period",
+        )
+
+
+def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
+    """Steps so short that nobody sees the end of a run: a slip of the keyboard."""
+    count = abs(span[1] - span[0]) / step
+    if count > _MOST_STEPS:
+        raise UsageError(
+            f"{name} is {step!r}: from {span[0]:g} to {span[1]:g} it would take {count:.0e} steps",
+            remedy=f"give a longer one: more than {_MOST_STEPS:.0e} steps come to no end",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +22,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
 from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTITUTION
+from hybridsim.integrators.fixed_step_length import refuse_endless
 from hybridsim.integrators.gaps import gaps
 
 _STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # what a run needs to go on
@@ -92,6 +94,7 @@ class FixedStepRun:
     def __init__(
         self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
     ) -> None:
+        refuse_endless(march.step, (task.t0, task.t1), "step")
         self.system, self.task, self.march, self.progress = system, task, march, progress
         self.record = task.record or Trajectory(system, task.keep)
         self.gauge = Gauge(task.limits, self.record.counters)
@@ -137,9 +140,8 @@ class FixedStepRun:
                 return
         while self.origin != self.end:
             arrays = {name: np.array(getattr(self, name)) for name in _STATE}
-            self.record.mark(
-                Checkpoint(self.origin, arrays, self.timetable.settled, dict(self.accumulation.paces))
-            )
+            settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+            self.record.mark(partial(Checkpoint, self.origin, arrays, settled, paces))
             appointment = self.timetable.next(self.origin, forward=True)
             if self._stretch(appointment, appointment.instant if appointment else self.end):
                 return
@@ -375,7 +377,7 @@ class FixedStepRun:
         limit = self.accumulation.limit(instant, changed)
         if limit is not None:
             record.status = "accumulation"
-            record.message = accumulated(limit, system.automata)
+            record.message = accumulated(limit, system.automata, has_rtol=False)
         return record.status != "finished"
 
     def _crossed_in_jump(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, NoReturn, Self
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
@@ -101,6 +101,24 @@ class ArraysResult(InTables):
             modes[component] = (known, numbers[np.maximum(place, 0)])
         about = {"model": self.model.name, "title": "", "integrator": self.integrator, "status": self.status}
         return Table(t, columns, modes, {}, about)
+
+    def _within(self, t: Any) -> np.ndarray:
+        """Times (k,) out of a number or an array of them, all of which lie in the run."""
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        inside = (times >= self.t_start) & (times <= self.t_end)
+        if not inside.all():
+            bad = float(times[~inside][0])
+            raise UsageError(
+                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
+            )
+        return times
+
+    def _require_states(self) -> None:
+        if self._save != "all":
+            raise UsageError(
+                f"the run was made with save={self._save!r}, which keeps no states between the ends",
+                remedy="run it with save='all'",
+            )
 
     def _require_events(self) -> None:
         if self._save == "nothing":

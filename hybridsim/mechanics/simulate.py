@@ -26,6 +26,10 @@ _OF_MODELS = {
 }
 _OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
 
+_INDEPENDENT = (
+    "(if the directions of its contacts and gaps are independent: else no model holds them all at once)"
+)
+
 
 def simulate_mechanical(
     system: MechanicalSystem,
@@ -50,7 +54,7 @@ def simulate_mechanical(
     """
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
-    from hybridsim.integrators.fixed_step_length import refuse_longer
+    from hybridsim.integrators.fixed_step_length import refuse_endless, refuse_longer
     from hybridsim.integrators.registry import keyword_elsewhere
     from hybridsim.mechanics.plant import build
     from hybridsim.mechanics.run import MechanicalRun
@@ -59,12 +63,13 @@ def simulate_mechanical(
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
         raise UsageError(
-            f"{name} does not run a MechanicalSystem", remedy=f"choose taylor, or run to_model() with {name}"
+            f"{name} does not run a MechanicalSystem",
+            remedy=f"choose taylor, or run to_model() with {name} {_INDEPENDENT}",
         )
     if system.impacts and name != "moreau":
         raise UsageError(
             f"{name} does not run a MechanicalSystem with impacts",
-            remedy='choose integrator="moreau", step=..., or run to_model() of a small one',
+            remedy=f'choose integrator="moreau", step=..., or run to_model() of a small one {_INDEPENDENT}',
         )
     method: Any = None
     if name == "moreau":
@@ -93,6 +98,7 @@ def simulate_mechanical(
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
     longest = arguments.step_bound(max_step, "max_step")
+    refuse_endless(longest, span, "max_step")
     grid = None if t_eval is None else arguments.time_grid(t_eval, span, ALL, save)
     callback = arguments.callback(progress)
     announce_compilation()

@@ -72,11 +72,7 @@ class MechanicalSolution(ArraysResult):
 
     @cached_property
     def _pieces(self) -> Pieces:
-        if self._save != "all":
-            raise UsageError(
-                f"the run was made with save={self._save!r}, which keeps no states between the ends",
-                remedy="run it with save='all'",
-            )
+        self._require_states()
         return Pieces(self._run.built.plant, self._run.pieces or [self._run.start_piece()])
 
     @cached_property
@@ -122,15 +118,9 @@ class MechanicalSolution(ArraysResult):
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
         """States at time t: (2n,) for a number, (2n, k) for k times; side "-" gives x- at an event."""
-        times = np.atleast_1d(np.asarray(t, dtype=float))
         if side not in ("+", "-"):
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
-        if len(times) and not ((times >= self.t_start) & (times <= self.t_end)).all():
-            bad = times[~((times >= self.t_start) & (times <= self.t_end))][0]
-            raise UsageError(
-                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
-            )
-        x = self._states(times, side == "+")
+        x = self._states(self._within(t), side == "+")
         return x[0] if np.ndim(t) == 0 else x.T
 
     def _states(self, times: np.ndarray, right: bool) -> np.ndarray:

@@ -80,11 +80,7 @@ class SteppedSolution(ArraysResult):
 
     @cached_property
     def _states(self) -> np.ndarray:
-        if self._save != "all":
-            raise UsageError(
-                f"the run was made with save={self._save!r}, which keeps no states between the ends",
-                remedy="run it with save='all'",
-            )
+        self._require_states()
         return np.concatenate(self._run.states)
 
     @cached_property
@@ -101,12 +97,7 @@ class SteppedSolution(ArraysResult):
 
     def __call__(self, t: Any) -> np.ndarray:
         """States at time t: (2n,) for a number, (2n, k) for k times."""
-        times = np.atleast_1d(np.asarray(t, dtype=float))
-        inside = (times >= self.t_start) & (times <= self.t_end)
-        if not inside.all():
-            raise UsageError(
-                f"t = {times[~inside][0]!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
-            )
+        times = self._within(t)
         n, first = self.model.n, self._step_of(times)
         after = np.minimum(first + 1, self._run.done)
         d = (times - self._steps[first])[:, None]

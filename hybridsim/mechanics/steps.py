@@ -101,7 +101,7 @@ def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short:
     if total == 0.0:
         return NEVER, 1.0
     error = 2.0 * (abs(room.poly[size - 1]) + abs(room.poly[size - 2])) + 8.0 * _UNIT * total + slack
-    outcome, theta = first_exit(room.poly[:size], error, order, room.bern, room.stack)
+    outcome, theta = first_exit(room.poly[:size], error, order, room.bern, room.stack, 0)
     if outcome == OPEN and is_short and end > error:
         outcome = NEVER
     return outcome, theta

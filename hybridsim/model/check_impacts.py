@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hybridsim.expr import evaluate
+from hybridsim.model.check_smooth import Remedies, need_smooth
 from hybridsim.model.impact import ROUNDING, SPEED, Impact
-from hybridsim.model.nonsmooth import has_word
 from hybridsim.model.scope import Scope
+
+_REMEDIES = Remedies(
+    switched="write it over states, parameters and t.",
+    not_smooth="write one impact for each smooth piece of it.",
+    no_state="write the distance between the bodies, e.g. 'h' or 'x2 - x1 - d'.",
+)
 
 
 def check_impacts(scope: Scope) -> None:
@@ -28,19 +34,7 @@ def _impact(scope: Scope, impact: Impact) -> None:
     if switched:
         message = f"{what}: the restitution depends on '{switched[0]}', which depends on a mode"
         scope.fail(impact, message, f"write it over {SPEED}, states and parameters.")
-    reached = scope.reached(impact.gap)
-    if not reached <= scope.all_names:
-        return
-    switched = sorted(filter(scope.is_switched, reached))
-    if switched:
-        message = f"{what}: the gap depends on '{switched[0]}', which depends on a mode"
-        scope.fail(impact, message, "write it over states, parameters and t.")
-    elif any(map(has_word, [impact.gap, *(e for n, e in scope.model.definitions if n in reached)])):
-        message = f"{what}: the gap '{impact.gap.text}' is not smooth"
-        scope.fail(impact, message, "write one impact for each smooth piece of it.")
-    elif not any(scope.kinds.get(name) == "state" for name in reached):
-        message = f"{what}: the gap '{impact.gap.text}' contains no state"
-        scope.fail(impact, message, "write the distance between the bodies, e.g. 'h' or 'x2 - x1 - d'.")
+    need_smooth(scope, impact, f"{what}: the gap", impact.gap, _REMEDIES)
 
 
 def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float]) -> None:

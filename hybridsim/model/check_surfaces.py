@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from hybridsim.model.nonsmooth import has_word
+from hybridsim.model.check_smooth import Remedies, need_smooth
 from hybridsim.model.scope import Scope
 from hybridsim.model.switching import SwitchingSurface
+
+_REMEDIES = Remedies(
+    switched="write it over states, discrete states, parameters and t.",
+    not_smooth="write one without abs, min, max, sign and conditions, or modes with guards.",
+    no_state="write what is zero on the surface, e.g. 'x'; an input switches by itself.",
+)
 
 
 def check_surfaces(scope: Scope) -> None:
@@ -20,20 +26,4 @@ def _surface(scope: Scope, surface: SwitchingSurface) -> None:
     for side in ("above", "below"):
         for name, value in getattr(surface, side).items():
             scope.need(value, f"{what}, {side}, {name}", known)
-    reached = scope.reached(surface.expr)
-    if not reached <= scope.all_names:
-        return
-    switched = sorted(filter(scope.is_switched, reached))
-    if switched:
-        message = f"{what}: the switching function depends on '{switched[0]}', which depends on a mode"
-        scope.fail(surface, message, "write it over states, discrete states, parameters and t.")
-    elif any(map(has_word, [surface.expr, *(e for n, e in scope.model.definitions if n in reached)])):
-        message = f"{what}: the switching function '{surface.expr.text}' is not smooth"
-        scope.fail(
-            surface, message, "write one without abs, min, max, sign and conditions, or modes with guards."
-        )
-    elif not any(scope.kinds.get(name) == "state" for name in reached):
-        message = f"{what}: the switching function '{surface.expr.text}' contains no state"
-        scope.fail(
-            surface, message, "write what is zero on the surface, e.g. 'x'; an input switches by itself."
-        )
+    need_smooth(scope, surface, f"{what}: the switching function", surface.expr, _REMEDIES)

@@ -32,6 +32,12 @@ class Caution:
     def __str__(self) -> str:
         return str(HybridsimError(self.message, place=self.place, remedy=self.remedy))
 
+    @property
+    def sentence(self) -> str:
+        """The same in one line, with the file and the line but without what stands there."""
+        where = self.place.prefix if self.place else ""
+        return f"{where}{self.message}: {self.remedy.rstrip('.')}"
+
 
 def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
@@ -41,7 +47,13 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     is reported that the form of an expression does not show. The guards of contacts and surfaces are made by the
     program and not looked at.
     """
-    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *_of_jumps(model))
+    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *jumps_of(model))
+
+
+def jumps_of(model: Model) -> tuple[Caution, ...]:
+    """Jumps inside a mode where a state changes its sign, along which a motion cannot slide; runs tell of them, too."""
+    found: tuple[Caution, ...] = model.once("jumps", lambda: tuple(_of_jumps(model)))
+    return found
 
 
 class _Reading:
@@ -214,7 +226,6 @@ def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
 
 
 def _of_jumps(model: Model) -> Iterator[Caution]:
-    """Jumps inside a mode where a state changes its sign, along which a motion cannot slide."""
     if not uses_primitives(model):
         return
     meanings, states = Meanings(model), {state.name for state in model.states}
@@ -225,5 +236,6 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
                 f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a "
                 "motion that both sides drive back into the jump crawls",
                 one.place,
-                'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign.',
+                'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign; a '
+                "dry friction as a contact, [contacts.NAME], and NAME for its force.",
             )

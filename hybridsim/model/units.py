@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 
+_COUNT = 4  # numbers up to this, halves and quarters included, are taken to have no unit
+
+
 def units_of(model: Model) -> dict[str, str]:
     """Names of states, outputs, contact forces, discrete states and inputs, in that order, with their units."""
     units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
@@ -54,7 +57,11 @@ def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:
 
 
 def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, ast.expr]) -> str:
-    """The unit of an expression where it is that of one of its parts; "" where units would have to be multiplied."""
+    """The unit of an expression where it is that of one of its parts; "" where units would have to be multiplied.
+
+    A number that multiplies may have a unit of its own, which nothing tells: 9.81*m is no mass. Up to 4, halves and
+    quarters included, it is taken for a share or a count: 0.5*N is a load.
+    """
 
     def of(part: ast.expr) -> str:
         return _unit(part, known, definitions)
@@ -67,6 +74,8 @@ def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, as
             return of(operand)
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
             return of(left) or of(right)
+        case ast.BinOp(op=ast.Mult() | ast.Div()) if _has_bare_number(node, definitions):
+            return ""
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
             first, second = of(left), of(right)
             return "" if first and second else first or second
@@ -77,6 +86,20 @@ def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, as
         case ast.Call(func=ast.Name(id="abs" | "max" | "min"), args=args):
             return next((unit for arg in args if (unit := of(arg))), "")
     return ""
+
+
+def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> bool:
+    """Whether a factor or a divisor of a product is a number that counts nothing, also by way of names."""
+    match node:
+        case ast.Constant(value=int() | float() as value):
+            return bool(abs(value) > _COUNT or (4 * value) % 1)
+        case ast.Name(id=name) if name in definitions:
+            return _has_bare_number(definitions[name], definitions)
+        case ast.UnaryOp(operand=operand):
+            return _has_bare_number(operand, definitions)
+        case ast.BinOp(left=left, op=ast.Mult() | ast.Div(), right=right):
+            return _has_bare_number(left, definitions) or _has_bare_number(right, definitions)
+    return False
 
 
 def time_unit(model: Model) -> str:

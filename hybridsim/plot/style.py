@@ -13,6 +13,7 @@ from hybridsim.colours import INK as INK
 from hybridsim.colours import PALETTE as PALETTE
 from hybridsim.colours import mode_colours as mode_colours
 from hybridsim.errors import UsageError
+from hybridsim.files import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +71,8 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
         raise UsageError(
             f"{path} is no picture that can be written", remedy=f"end it in {', '.join(SUFFIXES)}"
         )
-    _figure_of(picture).savefig(path, dpi=dpi)
+    with whole_file(path) as partly:
+        _figure_of(picture).savefig(partly, dpi=dpi)
     return path
 
 

@@ -6,6 +6,7 @@ pickled, so that reading a file runs no code of its writer.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import zipfile
@@ -16,14 +17,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.files import whole_file
 
 if TYPE_CHECKING:
     from hybridsim.engine.checkpoint import Checkpoint
     from hybridsim.solution.run import Run
     from hybridsim.solution.solution import Solution
 
-FORMAT, VERSION = "hybridsim solution", 2
-_HEADER = "header"
+FORMAT, VERSION = "hybridsim solution", 3
+_HEADER, _SEAL = "header", "digest"
 
 
 def save(solution: Solution, path: str | PathLike[str]) -> None:
@@ -45,7 +47,7 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
     for kind, parts in taken_apart(trajectory.segments.blocks):
         arrays |= {f"segments/{len(kinds)}/{name}": part for name, part in parts.items()}
         kinds.append(kind)
-    occurrences = list(trajectory.occurrences)
+    occurrences = [o for block in trajectory.hidden or trajectory.occurrences.blocks for o in block]
     arrays["events/instants"] = np.array([o.instant for o in occurrences]).reshape(-1, 2)
     arrays["events/words"] = np.array([o[1:6] for o in occurrences], dtype=str).reshape(-1, 5)
     arrays["events/directions"] = np.array([o.direction for o in occurrences], dtype=np.int64)
@@ -65,6 +67,7 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
         "save": run.save,
         "reason": run.reason,
         "kinds": kinds,
+        "hidden": len(occurrences) - len(trajectory.occurrences),
         "status": trajectory.status,
         "message": trajectory.message,
         "warnings": trajectory.warnings,
@@ -79,19 +82,12 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
             **{n: getattr(checkpoint, n) for n in ("instant", "settled", "segments", "occurrences")},
             "paces": list(checkpoint.paces.items()),
         }
-    arrays[_HEADER] = np.frombuffer(
-        json.dumps(header, default=int).encode(), dtype=np.uint8
-    )  # NumPy's whole numbers
-    whole = os.fspath(path)
-    partly = f"{whole}.part"
-    try:
-        with open(partly, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]  # its keywords are arrays, and one is a flag
-        os.replace(partly, whole)  # a file of that name is whole at any time
-    except OSError as error:
-        raise UsageError(
-            f"{whole} cannot be written: {error.strerror}", remedy="give another path"
-        ) from error
+    header["arrays"] = list(arrays)
+    text = json.dumps(header, default=int)  # NumPy's whole numbers
+    seal = np.frombuffer(_digest(text, arrays).encode(), dtype=np.uint8)
+    arrays |= {_HEADER: np.frombuffer(text.encode(), dtype=np.uint8), _SEAL: seal}
+    with whole_file(path) as partly, open(partly, "wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]  # its keywords are arrays, and one is a flag
 
 
 def load_solution(path: str | PathLike[str]) -> Solution:
@@ -125,11 +121,19 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     name = os.fspath(path)
     remedy = "give a file that sol.save(...) has written"
     try:
-        with open(name, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {key: stored[key] for key in stored.files}
-        header = json.loads(bytes(arrays[_HEADER]))
-        if header["format"] != FORMAT:
-            raise ValueError(f"its format is {header['format']!r}")
+        with open(name, "rb") as file:
+            if not zipfile.is_zipfile(file):
+                raise ValueError("it is no archive of arrays")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as stored:
+                if _HEADER not in stored.files:
+                    raise ValueError("its arrays are others, and it has no header")
+                text = bytes(_array(stored, _HEADER)).decode()
+                header = json.loads(text)
+                if header["format"] != FORMAT:
+                    raise ValueError(f"its format is {header['format']!r}")
+                arrays = {key: _array(stored, key) for key in header.get("arrays", ())}
+                seal = bytes(stored[_SEAL]).decode() if _SEAL in stored.files else ""
     except OSError as error:
         raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=remedy) from error
     except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
@@ -140,12 +144,23 @@ def load_solution(path: str | PathLike[str]) -> Solution:
             f"this one reads version {VERSION}",
             remedy="read it with that version",
         )
+    if seal != _digest(text, arrays):
+        raise UsageError(f"{name} is damaged: it was changed after it was written", remedy=remedy)
     try:
         return _put_together(header, arrays)
     except HybridsimError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise UsageError(f"{name} is damaged: {type(error).__name__}: {error}", remedy=remedy) from error
+
+
+def _array(stored: Any, key: str) -> np.ndarray:
+    """One array of a file; one of Python objects is none of ours, and is not unpickled."""
+    try:
+        array: np.ndarray = stored[key]
+    except ValueError as error:
+        raise ValueError(f"its array '{key}' cannot be read as numbers") from error
+    return array
 
 
 def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solution:
@@ -167,7 +182,9 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
         instant, direction = Instant(*events["instants"][k].tolist()), int(events["directions"][k])
         states = (events["x_minus"][k], events["x_plus"][k])
         found.append(Occurrence(instant, kind, component, guard, source, target, direction, *states))
-    trajectory.occurrences.blocks = [found] if found else []
+    shown = OccurrenceList(found[header["hidden"] :])
+    trajectory.hidden = [found] if header["hidden"] else []
+    trajectory.occurrences.blocks = [shown] if shown else []
     trajectory.counters = Counters(**header["counters"])
     trajectory.status, trajectory.message = header["status"], header["message"]
     trajectory.warnings, trajectory.warnings_there = header["warnings"], header["warnings_there"]
@@ -216,6 +233,16 @@ def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkp
         header["segments"],
         header["occurrences"],
     )
+
+
+def _digest(text: str, arrays: dict[str, np.ndarray]) -> str:
+    """Hash of the header and the arrays: what does not fit together does not come as far as compiled code."""
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _below(arrays: dict[str, np.ndarray], head: str) -> dict[str, np.ndarray]:

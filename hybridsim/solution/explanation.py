@@ -21,8 +21,16 @@ from hybridsim.model.impact import SPEED
 from hybridsim.model.one_sided import number_of
 from hybridsim.model.switching import ATTRACTION
 from hybridsim.model.units import rate_of, time_unit, unit_of, units_of
+from hybridsim.solution.one_instant import (
+    BY_RESET,
+    change_of,
+    changes_in_words,
+    fired_guards,
+    resets_before,
+)
 
 if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Change
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
     from hybridsim.model.component import Choice
@@ -59,9 +67,16 @@ class GuardView:
     order: int
     units: tuple[str, ...] = ("", "", "", "")
 
+    @property
+    def is_open(self) -> bool:
+        """Whether its sign just after is a question of rounding: nothing decides, and it is not zero identically."""
+        left = (*self.derivatives[self.decreed :], *self.bounds[self.decreed :])
+        return self.side == 0 and any(left)
+
     def __str__(self) -> str:
-        if not any(self.derivatives) and not any(self.bounds):
-            return f"{self.guard} (g = {self.text}) stays >= 0: g = 0 and does not move"
+        if not self.is_open and self.side == 0:
+            still = "g = 0 exactly" if self.decreed else "g = 0"
+            return f"{self.guard} (g = {self.text}) stays >= 0: {still} and does not move"
         terms = []
         for k, (value, bound) in enumerate(zip(self.derivatives, self.bounds, strict=True)):
             name, unit = "g" + "'" * k, f" {self.units[k]}" if self.units[k] else ""
@@ -145,8 +160,9 @@ class Explanation:
 
 
 class _Watched(Settling):
-    """A settling that remembers the candidates that it looked at."""
+    """A settling that remembers the candidates that it looked at, which are all."""
 
+    is_thorough = True
     seen: list[tuple[np.ndarray, list[int], int, np.ndarray]]
 
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
@@ -180,11 +196,12 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
         raise UsageError(
             f"no segment ends at t = {event.t!r}", remedy="an event at the start of a run has no past"
         )
-    fired = _fired(solution._system, segment, together)
+    fired = fired_guards(solution._system, segment, together, solution._run.method)
     state = _state(solution, event)
     if not fired:
         return Explanation(event, (), (), _without_guards(solution, event, together), state)
     at = _situation(solution._system, segment, fired)
+    fired += _met(solution._system, at, fired)
     views = tuple(
         _views(solution._system, at, segment.z, sorted(fired), np.zeros(solution._system.guard_count, int))
     )
@@ -199,15 +216,14 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     touched = owners | set(np.flatnonzero(outcome.z != segment.z).tolist())
     seen = [one for one in settling.seen if touched & set(one[1])]
     candidates = tuple(_candidate(settling, outcome, *one) for one in seen)
-    moved = np.abs(outcome.x - x_minus) > 2.0 * x_error  # less is what rounding left of a zero, set exactly
-    changed = ", ".join(
-        f"{name} from {a:.6g} to {b:.6g}"
-        + (f" (= {resets[name].text})" if name in resets and resets[name].names else "")
-        for name, a, b, has_moved in zip(solution.names, x_minus, outcome.x, moved, strict=True)
-        if has_moved
-    )
-    blow = next((view for view in views if view.mode.startswith(f"{event.component} ")), None)
-    reason = _reason(solution, occurrence, settling, outcome, changed, choices, blow)
+    change, x_plus = change_of(settling, occurrence), outcome.x
+    if change is not None and not solution._system.automata[change.component].has_surface:
+        x_minus, x_plus = change.x_minus, change.x_plus  # its own round: others may go before it, or follow
+    texts = {name: f" (= {reset.text})" for name, reset in resets.items() if reset.names}
+    # less than the error is what rounding left of a zero, set exactly
+    changed = changes_in_words(solution.names, x_minus, x_plus, x_error, texts)
+    blow = next((view for view in views if view.mode == f"{event.component} {event.source}"), None)
+    reason = _reason(solution, occurrence, settling, outcome, changed, choices, blow, candidates, change)
     return Explanation(event, views, candidates, reason, state, choices)
 
 
@@ -238,7 +254,7 @@ def _without_guards(solution: Solution, event: Event, together: list[Occurrence]
     due = sorted({o.component for o in together if o.kind == "scheduled"})
     if due:
         return f"{', '.join(due)} was due at this instant; the modes that hold were found anew just after it"
-    if event.guard:
+    if event.guard and any(o.kind == "monitor" for o in together):
         return "a reset at this instant led there: no guard was located at zero"
     if solution.model.inputs and solution._run.method.leaps:
         names = ", ".join(declared.name for declared in solution.model.inputs)
@@ -337,16 +353,14 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
     return None
 
 
-def _fired(system: System, segment: Segment, together: list[Occurrence]) -> list[int]:
-    """Numbers of the guards that fired at one instant, in the modes of the segment before."""
+def _met(system: System, at: Situation, fired: list[int]) -> list[int]:
+    """Further guards that came to zero with those that fired and would go negative, whether or not a mode changed."""
+    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     found = []
-    for o in together:
-        c = next((k for k, a in enumerate(system.automata) if a.name == o.component), -1)
-        if c < 0 or not o.guard:
-            continue
-        mode = int(segment.z[c])
-        if o.guard in system.automata[c].guard_names[mode]:
-            found.append(system.automata[c].guards[mode][system.automata[c].guard_names[mode].index(o.guard)])
+    for g in np.flatnonzero(system.active(at.z)):
+        side, order = side_after(series.guards[g], series.guard_bounds[g], 0)
+        if side < 0 < order and g not in fired and not system.is_corner[system.owner[g]]:
+            found.append(int(g))
     return found
 
 
@@ -396,7 +410,7 @@ def _in_words(text: str) -> str:
     """The expression of a guard; that of a surface's attraction is one of the program's own."""
     if not text.startswith(ATTRACTION):
         return text
-    return f"pull of {text.removeprefix(ATTRACTION)}, how fast its two sides drive towards it"
+    return f"pull of {text.removeprefix(ATTRACTION)}, half the sum of how fast its two sides drive towards it"
 
 
 def _candidate(
@@ -423,6 +437,8 @@ def _reason(
     changed: str,
     choices: tuple[str, ...],
     blow: GuardView | None,
+    candidates: tuple[Candidate, ...],
+    change: Change | None,
 ) -> str:
     system = settling.system
     if outcome.status:
@@ -431,6 +447,12 @@ def _reason(
     c = names.index(occurrence.component)
     automaton = system.automata[c]
     after = automaton.modes[outcome.z[c]]
+    led = resets_before(settling, change) if change is not None else ""
+    if change is not None and change.guard == BY_RESET:
+        is_contact = any(contact.name == automaton.name for contact in solution.model.contacts)
+        gave = "gave it a velocity" if is_contact else "moved the state off its surface"
+        gave += f", to the side of {occurrence.target}: nothing is left to decide"
+        return f"{led or 'a reset at this instant'} {gave}"
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
         if after != occurrence.target:  # the run had it closer to the rounding of its own steps
             return f"an impact after which the gap opens by less than its rounding: {occurrence.target} from here on"
@@ -439,18 +461,26 @@ def _reason(
     if not automaton.has_surface:
         reset = f", with {changed}" if changed else ""
         first = "the first choice of guard {} whose condition held leads" if choices else "guard {} leads"
-        return f"{first.format(occurrence.guard)} to {occurrence.target}{reset}"
+        leads = f"{first.format(occurrence.guard)} to {occurrence.target}{reset}"
+        if blow is not None:
+            return leads
+        return f"{led or 'what else happened at this instant'} made the guard leave: it was not at zero before; {leads}"
+    whose = f"{automaton.name} {after}" if len(names) > 1 else after
     admissible = [z for z, members, verdict, _ in settling.seen if c in members and verdict == FINE]
     if len(admissible) == 1:
         members = next(m for z, m, verdict, _ in settling.seen if c in m and verdict == FINE)
         if len(members) > 1:
             all_of_them = ", ".join(f"{names[k]} {system.automata[k].modes[outcome.z[k]]}" for k in members)
             return f"{all_of_them} together: of all combinations of what acts on each other the only admissible one"
-        return f"{after} is the only mode that is admissible just after"
-    if any(z[c] == automaton.hold for z in admissible) and outcome.z[c] == automaton.hold:
-        return f"{after} and others are admissible; what holds comes before what slips"
+        return f"{whose} is the only mode that is admissible just after"
     if not admissible:
-        return (
-            f"{after} is a question of rounding, and nothing else is better: the mode is kept where it can be"
-        )
-    return f"{after} is admissible, and the motion that is nearest to the one before"
+        views = (view for one in candidates if one.taken for view in one.guards)
+        still_open = " and ".join(dict.fromkeys(view.mode for view in views if view.is_open)) or whose
+        return f"{still_open}: a question of rounding, and nothing else is better: a mode is kept where it can be"
+    fine = [one for one in candidates if one.verdict == _WORDS[FINE] and automaton.name in one.modes]
+    ways = [", ".join(f"{name} {mode}" for name, mode in one.modes.items()) for one in fine]
+    taken = next((way for way, one in zip(ways, fine, strict=True) if one.taken), whose)
+    return (
+        f"{' and '.join(f'({way})' for way in ways)} are admissible, and ({taken}) is taken: the fewest modes change, "
+        "and where as many do, what holds comes before what slips"
+    )

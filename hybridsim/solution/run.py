@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.python_code import PythonCode
+from hybridsim.model.hygiene import jumps_of
 from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
@@ -47,8 +48,12 @@ class Run:
         wall_time = time.perf_counter() - began
         if isinstance(self.system.code, PythonCode):
             self.system.code.report(trajectory)
+        for caution in jumps_of(self.model):
+            trajectory.warnings[caution.sentence] = 1
         trajectory.close(self.task.keep)
-        # a solution holds on to what the run left, not to what it began with
-        return Solution(
-            replace(self, task=replace(self.task, record=None)), trajectory, before + wall_time, compile_time
-        )
+        run = self
+        if (
+            self.task.record is not None
+        ):  # a solution holds on to what the run left, not to what it began with
+            run = replace(self, task=replace(self.task, record=None))
+        return Solution(run, trajectory, before + wall_time, compile_time)

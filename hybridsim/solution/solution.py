@@ -279,10 +279,8 @@ class Solution(InTables):
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
         self._require_events()
-        blocks = self._trajectory.occurrences.blocks
-        return np.concatenate(
-            [np.empty(0), *(block.times[block.chosen(component, kind)] for block in blocks)]
-        )
+        found = [b.times[b.chosen(component, kind)] for b in self._trajectory.occurrences.blocks]
+        return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
@@ -340,7 +338,7 @@ class Solution(InTables):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know: near-grazings, decisions inside rounding, accumulation, chattering, stiffness."""
+        """What to know of the run: near-grazings, decisions at rounding, accumulation, chattering, jumps, stiffness."""
         return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._trajectory.warnings.items())
 
     @property

@@ -11,7 +11,7 @@ import hybridsim as hs
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.base import Integrator
 from hybridsim.testing import judge
-from hybridsim.testing.clock import bounded_work
+from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import Scene
 
 # Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
@@ -70,8 +70,8 @@ class Study:
         wrong = [f"{setting.text}: {sentence}" for setting, run in self.done for sentence in run.wrong]
         if self.failure is not None:
             text, error = self.failure
-            how = "refused" if isinstance(error, HybridsimError) else f"raised {type(error).__name__}"
-            wrong.append(f"{text}: {how}: {error}")
+            how = "refused: " if isinstance(error, HybridsimError) else f"raised {type(error).__name__}: "
+            wrong.append(f"{text}: {'' if isinstance(error, Endless) else how}{error}")
         return wrong or judge_errors(self.done, self.tolerances)
 
     def errors(self) -> tuple[tuple[str, float, float], ...]:

@@ -23,14 +23,18 @@ from hybridsim.testing.study import (
     lacking,
     settings_for,
 )
+from hybridsim.testing.verdict import LACKS, RIGHT, WRONG_ANSWER, verdict
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Verdict on one integrator in one scene: right, wrong (with reasons) or lacks (with the reason).
+    """Verdict on one integrator in one scene.
 
     Parameters
     ----------
+    verdict : "right", "wrong answer", "wrong mode sequence", "hang (bounded)" or "refused", as in the atlas; or
+        "lacks", where the scene needs what the integrator says that it lacks.
+    reasons : what is not right, a sentence each, the first of them that of the verdict; or why it is lacking.
     errors : setting, error of event times, error of states, for every setting that ran.
     """
 
@@ -39,6 +43,11 @@ class Outcome:
     verdict: str
     reasons: tuple[str, ...] = ()
     errors: tuple[tuple[str, float, float], ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        """Whether it is neither right nor lacking."""
+        return self.verdict not in (RIGHT, LACKS)
 
 
 def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Outcome:
@@ -53,13 +62,16 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
         lacks = lacking(one)
         for capability in sorted(scene.needs | ({"located"} if "contacts" in scene.needs else set())):
             if capability in lacks:
-                return Outcome(name, scene.name, "lacks", (f"{capability}: {lacks[capability]}",))
+                return Outcome(name, scene.name, LACKS, (f"{capability}: {lacks[capability]}",))
         study = carry_out(name, scene, settings_for(one, scene), allowed_errors(one, scene), lacks, **options)
     faults = study.faults()
-    return Outcome(name, scene.name, "wrong" if faults else "right", tuple(faults), study.errors())
+    found = verdict(study)[0] if faults else RIGHT
+    if faults and found == RIGHT:
+        found = WRONG_ANSWER  # errors that are small enough, and do not fall
+    return Outcome(name, scene.name, found, tuple(faults), study.errors())
 
 
 def conformance_failures(method: str | type[Integrator], scenes: Iterable[Scene] = SCENES) -> list[str]:
     """What an integrator got wrong, one sentence each; empty if nothing. What it lacks is no failure."""
     outcomes = [outcome(method, scene) for scene in scenes]
-    return [f"{one.scene}: {reason}" for one in outcomes if one.verdict == "wrong" for reason in one.reasons]
+    return [f"{one.scene}: {reason}" for one in outcomes if one.failed for reason in one.reasons]

@@ -8,8 +8,8 @@ from typing import Any
 from hybridsim.integrators.registry import registered
 from hybridsim.testing import SCENES, Scene, Truth
 from hybridsim.testing.atlas.cooldown import CooldownRK45
-from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG_ANSWER, WRONG_SEQUENCE, verdict
 from hybridsim.testing.study import LOCATED, NOT_LOCATED, Setting, carry_out
+from hybridsim.testing.verdict import HANG, RIGHT, WRONG_ANSWER, WRONG_SEQUENCE, verdict
 
 BY_NAME = {scene.name: scene for scene in SCENES}
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,11 +17,15 @@ from hybridsim.errors import UsageError
 from hybridsim.plot.atlas import matrix
 from hybridsim.plot.atlas import scene as picture
 from hybridsim.testing import SCENES, conformance_failures, judge, outcome
+from hybridsim.testing import suite as suites
 from hybridsim.testing.atlas import Atlas, atlas, configurations, example, pages, scenes_named
 from hybridsim.testing.atlas import cell as cells
+from hybridsim.testing.atlas.cell import Cell, Row
+from hybridsim.testing.atlas.configurations import chosen
+from hybridsim.testing.atlas.pages import anchor, verdicts
 
 DOCS = Path(__file__).parents[2] / "docs" / "atlas"
-CHOSEN = ("exact", "rk4-sign", "scipy-rk45 native")
+CHOSEN = ("exact", "rk4-sign", "scipy-rk45 native", "rk4 tanh", "rk4 karnopp")
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +46,14 @@ def test_known_verdicts(small: Atlas) -> None:
 def test_the_class_of_trouble_chooses_scenes() -> None:
     assert {scene.trouble for scene in scenes_named((), "sliding")} == {"sliding"}
     assert scenes_named(()) == SCENES
+
+
+def test_an_integrator_brings_its_variants_and_no_other_model() -> None:
+    named = [one.name for one in chosen(("rk4-dichotomy", "rk4-sign", "scipy-rk45"))]
+    assert named == ["scipy-rk45", "rk4-dichotomy", "rk4-dichotomy refined", "rk4-sign", "scipy-rk45 native"]
+    with pytest.raises(UsageError) as caught:
+        chosen(("no such thing",))
+    assert f"{len(configurations())} in all" in str(caught.value)
 
 
 def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
@@ -73,7 +87,28 @@ def test_a_class_that_is_wrong_is_found_wrong() -> None:
         def start(self, flow, x0, *rest):
             return super().start(flow, x0 * (1 + 1e-5), *rest)
 
-    assert outcome(Late, scenes_named(("NOS-cross",))[0]).verdict == "wrong"
+    scene = scenes_named(("NOS-cross",))[0]
+    found = outcome(Late, scene)
+    assert found.verdict == "wrong answer" and found.failed
+    (cell,) = atlas([scene], [Late]).cells.values()
+    assert cell.verdict == found.verdict and cell.reason in found.reasons
+
+
+def test_what_does_not_come_to_an_end_is_called_so_by_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Asleep(Tsitouras):
+        name: ClassVar[str] = "asleep"
+
+        def start(self, flow, x0, *rest):
+            while True:
+                sum(range(1000))
+
+    monkeypatch.setattr(suites, "carry_out", partial(suites.carry_out, seconds=0.3))
+    monkeypatch.setattr(cells, "SECONDS", 0.15)
+    scene = scenes_named(("NOS-cross",))[0]
+    found = outcome(Asleep, scene)
+    (cell,) = atlas([scene], [Asleep]).cells.values()
+    assert found.verdict == cell.verdict == "hang (bounded)"
+    assert found.reasons == ("rtol 1e-06: no end after 0.3 s of processor time",) == (cell.reason,)
 
 
 def test_a_name_that_is_taken_is_refused() -> None:
@@ -105,6 +140,17 @@ def test_every_cell_is_drawn(small: Atlas) -> None:
     ]
 
 
+def test_a_tall_matrix_has_its_names_at_both_ends(small: Atlas) -> None:
+    many = tuple(replace(small.scenes[0], name=f"s{k}") for k in range(50))
+    cells = {
+        (scene.name, one.name): small.cells[small.scenes[0].name, one.name]
+        for scene in many
+        for one in small.configurations
+    }
+    for result, below in ((small, False), (Atlas(many, small.configurations, cells), True)):
+        assert matrix(result).xaxis.get_tick_params()["labelbottom"] is below
+
+
 def test_an_example_shows_the_true_motion_and_the_failing_one(small: Atlas) -> None:
     scene = next(one for one in small.scenes if one.name == "SCI-cubic")
     found = example(small, scene)
@@ -115,6 +161,8 @@ def test_an_example_shows_the_true_motion_and_the_failing_one(small: Atlas) -> N
     assert found.points == ((0.0, -24.0),)
     axes = picture(found)
     assert axes.get_ylabel() == "y"
+    assert axes.figure.axes[-1].get_xlabel() == "t"  # nothing has a unit in this scene
+    assert picture(replace(found, time="s")).figure.axes[-1].get_xlabel() == "t [s]"
 
 
 def test_ctrl_c_ends_a_picture_too(small: Atlas, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,6 +184,24 @@ def test_pages_tell_of_every_scene(small: Atlas) -> None:
     assert "(stick/FREE-1.png)" in found["stick.md"]
     assert "**wrong mode sequence** | rk4-sign" in found["stick.md"]
     assert "| `rk4-sign` |" in found["index.md"]
+    for scene in small.scenes:  # the index leads to the section of each
+        ((file, place),) = re.findall(rf"\[{scene.name}\]\((\w+\.md)#([^)]+)\)", found["index.md"])
+        headings = re.findall(r"^## (.+)$", found[file], re.MULTILINE)
+        assert [anchor(heading) for heading in headings].count(place) == 1
+
+
+def test_a_reason_is_read_easily_and_a_stop_by_design_says_so() -> None:
+    """Nine digits of a time, no order of an error that does not fall, and what `moreau` says of reversals."""
+    (moreau,) = chosen(("moreau",))
+    said = "unit/4800: event 2 should be f:slip- at t = 5.34544081677444, and is f:stick at t = 5.344786318305168"
+    rows = (Row("unit/4800", 1.0, 1e-3, 1, 0.0), Row("unit/19200", 1.0, 1e-3, 1, 0.0))
+    cell = Cell("DH-r2-f0.2", "moreau", "wrong mode sequence", said, rows, order=-0.02)
+    line = verdicts([cell], (moreau,))[-1]
+    assert "t = 5.34544082, and is f:stick at t = 5.34478632 (by design: no event is located" in line
+    assert "order" not in line and "order 0.9" in verdicts([replace(cell, order=0.9)], (moreau,))[-1]
+    assert (
+        "by design" not in verdicts([replace(cell, reason=said.replace("f:stick", "f:slip+"))], (moreau,))[-1]
+    )
 
 
 def test_the_pages_in_docs_are_those_of_its_data() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hybridsim.errors import UsageError
-from hybridsim.testing.atlas import verdict as v
+from hybridsim.testing import verdict as v
 from hybridsim.testing.clock import Endless
 from hybridsim.testing.judge import Measured
 from hybridsim.testing.study import RUNAWAY, Setting, Study, cut_short
@@ -47,7 +47,8 @@ def test_each_failure_has_its_name() -> None:
 def test_a_run_that_raises_has_refused_and_one_without_end_hangs() -> None:
     refusal = UsageError("it has no stick", remedy="choose another")
     assert v.verdict(study(failure=refusal)) == (v.REFUSED, "the last: it has no stick; choose another")
-    assert v.verdict(study(failure=ZeroDivisionError("by zero")))[1].startswith("the last: internal error")
+    found, why = v.verdict(study(failure=ZeroDivisionError("by zero")))
+    assert found == v.ERROR and why.startswith("the last: internal error")
     assert v.verdict(study(failure=Endless("no end after 4 s")))[0] == v.HANG
 
 

@@ -60,3 +60,12 @@ def test_corners_and_jumps_are_accounted_for(hybridsim: Callable, tmp_path: Path
         ("abs(x)", "component", 5),
         ("sign(v)", "kept", 5),
     ]
+
+
+def test_a_run_warns_of_a_jump_before_it_begins_and_once(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(
+        'schema = 1\nname = "c"\n[states]\nx = { start = 1, der = "-sign(x)" }\n'
+    )
+    _, _, err = hybridsim("run", "c.toml", "--t-end", "2", "--limit", "steps=300")
+    assert err.index("jumps inside a mode") < err.index("300 steps")
+    assert err.count("jumps inside a mode") == 1

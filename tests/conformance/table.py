@@ -41,7 +41,7 @@ def cell(result: Outcome) -> str:
     """One field of the table."""
     if result.verdict == "lacks":
         return f"lacks {result.reasons[0].split(':')[0]}"
-    if result.verdict == "wrong":
+    if result.failed:
         return "**wrong**"
     _, time_error, state_error = result.errors[-1]
     return f"{time_error:.0e}, {state_error:.0e}"
@@ -84,7 +84,7 @@ def native(names: Sequence[str]) -> list[str]:
     found, lines = outcomes(solvers, "native"), []
     for scene in SCENES:
         results = [found[name, scene.name] for name in solvers]
-        if any(result.verdict == "wrong" for result in results):
+        if any(result.failed for result in results):
             lines.append((scene.name, *map(native_cell, results)))
     table = rows(("scene", *solvers), lines)
     return [NATIVE, table, "", rows(("mechanism", "what happens"), MECHANISMS.items())] if solvers else []
@@ -92,7 +92,7 @@ def native(names: Sequence[str]) -> list[str]:
 
 def native_cell(result: Outcome) -> str:
     """One field of the table: right, lacking, or the mechanism of the failure."""
-    if result.verdict == "wrong":
+    if result.failed:
         return f"**wrong**: {mechanism(result.integrator, result.scene) or 'not understood'}"
     return cell(result)
 
@@ -123,7 +123,7 @@ def page(names: Sequence[str]) -> str:
     faults = [
         (r.integrator, r.scene, " ".join(r.reasons[0].split()).replace("|", "/"))
         for r in results.values()
-        if r.verdict == "wrong"
+        if r.failed
     ]
     if faults:
         parts += ["\n## What is wrong\n", rows(("integrator", "scene", "what"), faults)]

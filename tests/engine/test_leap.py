@@ -25,7 +25,7 @@ SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not i
 
 def exit_of(a: list[float], error: float = 1e-14, order: int = 0) -> tuple[int, float]:
     values = np.array(a)
-    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a) + 2)))
+    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a) + 2)), 0)
     return int(outcome), float(theta)
 
 
@@ -131,6 +131,23 @@ def test_the_reference_model_is_one_leap(monkeypatch: pytest.MonkeyPatch) -> Non
     sol = hs.simulate("dfcs", (0, 100 * PERIOD), integrator="taylor", rtol=1e-12)
     assert len(sol.events) == 401
     assert not taken
+
+
+@pytest.mark.parametrize(("r", "ratio"), [(1.103, 0.96)])
+def test_a_motion_that_settles_is_no_series_that_accumulates(
+    r: float, ratio: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # next to resonance the intervals between events shrink by one factor, by a few thousandths each
+    runs: list[object] = []
+    segment_run = loop.SegmentRun
+    monkeypatch.setattr(loop, "SegmentRun", lambda *a: runs.append(a) or segment_run(*a))
+    model = hs.load("dfcs").with_(N=40, F0=40 * ratio, omega=f"{r}*sqrt(k/m)")
+    period = 2 * math.pi / model.parameter_values()["omega"]
+    sol = hs.simulate(model, (0.0, 40 * period), integrator="exact")
+    gaps = np.diff(sol.event_times("f"))
+    falls = gaps[1:] / gaps[:-1]
+    assert ((falls[3:13] < 0.9995) & (falls[3:13] > 0.99)).all()
+    assert not runs
 
 
 def test_more_steps_and_segments_than_there_is_room_for() -> None:

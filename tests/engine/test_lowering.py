@@ -269,6 +269,7 @@ def test_two_contacts_on_one_velocity_are_refused() -> None:
     message = refusal(states=(State("v", 0, "-f - g"),), contacts=(CONTACT, second))
     assert "f, g" in message
     assert "not independent" in message
+    assert "hs.MechanicalSystem" in message
 
 
 def test_a_relative_velocity_that_is_linear_in_no_state_is_refused() -> None:

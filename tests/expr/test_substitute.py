@@ -90,3 +90,17 @@ def test_bounds_hold_for_what_is_put_in() -> None:
 def test_a_condition_does_not_go_where_a_number_belongs() -> None:
     with pytest.raises(ExpressionError, match="number is needed"):
         substitute(parse("x + 1"), {"x": "a > 0"})
+
+
+@pytest.mark.parametrize(
+    ("text", "u", "written"),
+    [
+        ("exp(-u/v)", "-w", "exp(-(-w)/v)"),
+        ("c*u", "-w", "c*(-w)"),
+        ("c - u*d", "-w", "c - (-w*d)"),
+        ("u*c", "-w", "-w*c"),
+        ("c**u", "-2", "c**-2"),
+    ],
+)
+def test_no_two_signs_meet(text: str, u: str, written: str) -> None:
+    assert substitute(parse(text), {"u": parse(u)}).text == written

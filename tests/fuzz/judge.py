@@ -21,6 +21,7 @@ import hybridsim as hs
 from fuzz import mutated_files, mutated_lines
 from fuzz.watch import watching
 from hybridsim.cli import main
+from hybridsim.cli.output import TRIAL
 from hybridsim.engine.cache import cache_root
 from hybridsim.model.hygiene import warnings_of
 
@@ -97,13 +98,15 @@ def line_case(seed: int, number: int, folder: Path) -> Finding:
     argv = mutated_lines.mutated(pick)
     named = [tail for word in argv for tail in (word, word.partition("=")[2]) if tail and "\0" not in tail]
     # a result is written beside its place and then put there; a folder may have to be made with those above
-    places = [Path(os.path.abspath(folder / name)) for word in named for name in (word, f"{word}.part")]
+    parts = [f"{stem}.part{suffix}" for stem, suffix in map(os.path.splitext, named)]
+    places = [Path(os.path.abspath(folder / name)) for name in (*named, *parts)]
     defaults = ("compare-", "sweep-", "study-", "atlas")
 
     def expected(place: Path) -> bool:
         inside = place.relative_to(folder).parts if place.is_relative_to(folder) else ("..",)
         return bool(inside) and (
             inside[0].startswith(defaults)
+            or (place.name.startswith(TRIAL) and not place.exists())
             or any(place.is_relative_to(named_place) for named_place in places)
             or any(
                 named_place.is_relative_to(place) and place.is_relative_to(folder) for named_place in places

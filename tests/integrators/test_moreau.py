@@ -21,7 +21,12 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("scene", SCENES)
+SLOW = {"square-wave"}
+
+
+@pytest.mark.parametrize(
+    "scene", [pytest.param(s, marks=pytest.mark.slow) if s in SLOW else s for s in SCENES]
+)
 def test_the_error_falls_in_proportion_to_the_step(scene: str) -> None:
     """In the mean over the time: a stop that comes a step late moves a jump of the rates, not the rest."""
     end, params, steps = SCENES[scene]

@@ -45,7 +45,7 @@ def test_one_argument_is_one_component() -> None:
 
 def test_nested_primitives_are_a_component_each() -> None:
     outer, inner = (corner.modes[0].guards[0].expr for corner in corners(moving("min(max(x, -1), 1)"))[::-1])
-    assert inner.text == "x - -1"
+    assert inner.text == "x - (-1)"
     assert outer.names < {name for one in corners(moving("min(max(x, -1), 1)")) for name in one.variables}
 
 

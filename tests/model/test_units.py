@@ -21,6 +21,11 @@ from hybridsim.model.units import units_of
         ("k*x", ""),  # N/m times m: nothing is multiplied here
         ("N/x", ""),
         ("3", ""),
+        ("0.25*N", "N"),
+        ("9.81*m", ""),  # the number has a unit that is not said
+        ("10*(2*m)", ""),
+        ("weight/2", ""),
+        ("N - 9.81*m", "N"),
     ],
 )
 def test_of_a_contact_force(normal: str, unit: str) -> None:
@@ -32,9 +37,10 @@ def test_of_a_contact_force(normal: str, unit: str) -> None:
             hs.Parameter("r", 2, "1"),
             hs.Parameter("k", 1, "N/m"),
             hs.Parameter("mu", 0.5),
+            hs.Parameter("m", 1, "kg"),
         ],
         contacts=[hs.Contact("f", "v", normal, "coulomb", {"mu": "mu"})],
-        definitions={"load": "0.5*N"},
+        definitions={"load": "0.5*N", "weight": "9.81*m"},
     )
     assert units_of(model)["f"] == unit
 

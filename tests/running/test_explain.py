@@ -210,3 +210,105 @@ def test_an_impact_lists_what_it_touches_alone(e: float) -> None:
 def test_a_reset_says_its_formula() -> None:
     sol = hs.simulate("impact-oscillator", (0.0, 5.0), integrator="scipy-dop853")
     assert "(= -e*v)" in sol.explain(0).reason
+
+
+STACK = """
+name = "stack"
+[states]
+u = { start = 0, der = "5*t - f" }
+w = { start = 0, der = "f - h" }
+[contacts.f]
+velocity = "u - w"
+normal = 1
+law = { name = "coulomb", mu = 0.5 }
+[contacts.h]
+velocity = "w"
+normal = 1
+law = { name = "coulomb", mu = 0.5 }
+"""
+
+
+@pytest.mark.parametrize("integrator", ["auto", "dop853", "taylor", "scipy-dop853"])
+def test_a_limit_that_is_met_and_kept_is_no_question_of_rounding(integrator: str) -> None:
+    """Both forces are 5 t until t = 0.1; then f = 0.5 = h for ever, at the limit of h identically: nothing is open."""
+    sol = hs.simulate(hs.Model.from_toml(STACK), (0, 0.5), integrator=integrator)
+    why = sol.explain(0)
+    assert sol.warnings == () and [view.mode for view in why.fired] == ["f stick", "h stick"]
+    (taken,) = (one for one in why.candidates if one.taken)
+    assert (taken.modes, taken.verdict) == ({"f": "slip+", "h": "stick"}, "admissible")
+    (at_limit,) = (view for view in taken.guards if view.mode == "h stick" and view.guard == "upper")
+    assert "stays >= 0: g = 0 exactly and does not move" in str(at_limit)
+    assert why.reason.startswith(
+        "(f slip+, h slip+) and (f slip+, h stick) are admissible, and (f slip+, h stick) is"
+    )
+
+
+@pytest.mark.parametrize(("normal", "unit"), [("9.81*m", ""), ("W", ""), ("N", " N"), ("-1*-N", " N")])
+def test_a_load_with_a_bare_number_gives_a_force_no_unit(normal: str, unit: str) -> None:
+    """9.81*m in kg is no load in kg: what the number stands for is not said."""
+    model = hs.Model(
+        "block",
+        parameters=[hs.Parameter("m", 2, "kg"), hs.Parameter("N", 19.62, "N")],
+        states=[hs.State("v", 1, "-f/m", unit="m/s")],
+        definitions={"W": "m*9.81"},
+        contacts=[hs.Contact("f", "v", normal=normal, law="coulomb", arguments={"mu": 0.5})],
+    )
+    text = str(hs.simulate(model, (0, 1)).explain(0))
+    assert f"g = 9.81{unit}\n" in text and "kg" not in text
+
+
+def test_with_two_contacts_it_is_said_whose_mode_it_is() -> None:
+    """Two bodies that do not touch; the first breaks away."""
+    model = hs.Model.from_toml(STACK.replace('"f - h"', '"t - h"').replace('"u - w"', '"u"'))
+    assert (
+        hs.simulate(model, (0, 0.3)).explain(0).reason
+        == "f slip+ is the only mode that is admissible just after"
+    )
+
+
+@pytest.mark.parametrize("integrator", ["exact", "scipy-dop853"])
+@pytest.mark.parametrize("target", ["0.25", "-5"])
+def test_a_guard_that_a_reset_moved_is_not_told_as_located(integrator: str, target: str) -> None:
+    first = hs.Guard("g", "x - 0.5", hs.Choice("q", reset={"y": target}))
+    second = hs.Guard("h", "y - 0.25", hs.Choice("s", reset={"x": "3"}))
+    model = hs.Model(
+        "chain",
+        states=[hs.State("x", 1, "-1"), hs.State("y", 9, "-1")],
+        components=[
+            hs.Component("a", [hs.Mode("p", first), hs.Mode("q")], initial="p"),
+            hs.Component("b", [hs.Mode("r", second), hs.Mode("s")], initial="r"),
+        ],
+    )
+    sol = hs.simulate(model, (0, 2), integrator=integrator)
+    moving, moved = sol.explain(0), sol.explain(1)
+    for why in (moving, moved):
+        (view,) = why.fired
+        assert (view.mode, view.guard) == ("a p", "g") and view.bounds[0] < 1e-14
+    assert moving.reason == f"guard g leads to q, with y from 8.5 to {target}"
+    assert moved.reason == (
+        f"the reset of guard g of a (y from 8.5 to {target}) made the guard leave: it was not at zero before; "
+        "guard h leads to s, with x from 0.5 to 3"
+    )
+
+
+def test_a_contact_that_a_reset_sets_moving_is_no_question_of_rounding() -> None:
+    guard = hs.Guard("g", "y - 0.5", hs.Choice("q", reset={"v": 2}))
+    model = hs.Model(
+        "kick",
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "-f"), hs.State("y", 1, "-1")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 1})],
+        components=[hs.Component("a", [hs.Mode("p", guard), hs.Mode("q")], initial="p")],
+    )
+    why = hs.simulate(model, (0, 1)).explain(1)
+    assert (why.event.component, why.event.target) == ("f", "slip+")
+    assert why.reason == (
+        "the reset of guard g of a (v from 0 to 2) gave it a velocity, to the side of slip+: nothing is left to decide"
+    )
+
+
+def test_a_jump_of_an_input_past_a_guard_is_no_zero_of_it() -> None:
+    step = hs.Input("u", "table", times=[0, 1, 1, 3], values=[0, 0, 5, 5])
+    automaton = hs.Component("c", [hs.Mode("p", hs.Guard("g", "2 - u", "q")), hs.Mode("q")], initial="p")
+    model = hs.Model("jump", states=[hs.State("x", 0, "1")], inputs=[step], components=[automaton])
+    why = hs.simulate(model, (0, 2)).explain(0)
+    assert not why.fired and "an input has a knot here (of u)" in why.reason

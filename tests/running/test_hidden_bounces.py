@@ -204,3 +204,49 @@ def test_without_a_limit_the_run_ends_there() -> None:
     assert sol.status == "accumulation"
     assert "of ball: declare the limit" in sol.message
     assert sol.t_end == pytest.approx(limit(0.5), abs=1e-6)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("save", ["nothing", "events", 0.01])
+def test_what_is_kept_does_not_change_where_they_end(integrator: str, save: str | float) -> None:
+    """A clock that runs in flight alone stops at the limit."""
+    ball = by_transitions(0.5, 100)
+    falls = falling({ball: 100.2})
+    model = hs.Model("clock", states=[*falls.states, hs.State("c", 0, "g_ball/10")], components=[ball])
+    kept = hs.simulate(model, (0, 2), integrator=integrator, save=save)
+    assert kept.y[2, -1] == pytest.approx(limit(0.5), rel=1e-11)
+    assert (kept.y[:, -1] == hs.simulate(model, (0, 2), integrator=integrator).y[:, -1]).all()
+
+
+@pytest.mark.parametrize("integrator", ["exact", "scipy-dop853"])
+def test_a_series_that_breaks_off_leaves_no_trace(integrator: str) -> None:
+    """Five transitions at ever shorter intervals, none after: a restart at each, and one where the sixth would be."""
+    zeros = "(t - 1)*(t - 1.5)*(t - 1.75)*(t - 1.875)*(t - 1.9375)"
+    one = hs.Mode("one", hs.Guard("down", f"-({zeros})", "two"), set={"k": 1})
+    two = hs.Mode("two", hs.Guard("up", zeros, "one"), set={"k": 1})
+    states = [hs.State("x", 0, "v"), hs.State("v", 1, "-k*x")]
+    switch = hs.Component("switch", [one, two], initial="one")
+    model = hs.Model("breaks", states=states, components=[switch], monitors=[hs.Monitor("far", "x - 2")])
+    sol = hs.simulate(model, (0, 1000), integrator=integrator)
+    assert [event.t for event in sol.events] == pytest.approx([1, 1.5, 1.75, 1.875, 1.9375])
+    assert sol.stats["restarts"] <= 1 + 5 + 1
+
+
+def test_a_series_that_breaks_off_leaves_no_trace_backward_in_time() -> None:
+    """Two relays, crossed ever faster into the past, until an input of 50 ends that: few restarts beside the events."""
+    states = [hs.State("x", 1, "v"), hs.State("v", 0, "-2*u + w + F")]
+    relays = [hs.SwitchingSurface("u", "x"), hs.SwitchingSurface("w", "v")]
+
+    def run(rises: float) -> hs.Solution:
+        push = hs.Input(
+            "F", "table", times=[-1e6, rises - 1e-8, rises, 1], values=[50, 50, 0, 0], interpolation="linear"
+        )
+        model = hs.Model("relays", states=states, surfaces=relays, inputs=[push])
+        return hs.simulate(model, (0, -20), integrator="dop853")
+
+    series = run(-1000.0).events
+    times = [event.t for event in series[34:37]]
+    sol = run(0.3 * times[1] + 0.7 * times[2])
+    assert (sol.status, sol.t_end) == ("finished", -20.0)
+    assert 30 < len(sol.events) < 45
+    assert sol.stats["restarts"] <= len(sol.events) + 8

@@ -73,3 +73,58 @@ def test_a_corner(name: str) -> None:
     assert sol.status == "step-failure"
     assert "max(-0.5 - x, exp(-1/max(x, 0)**2)) in mode + is not a number" in sol.message
     assert sol.t_end == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ["dop853", "tsit5", "taylor", "scipy-dop853"])
+def test_a_load_that_loses_its_value_ends_the_run_at_once(name: str) -> None:
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", 0, "v"), hs.State("v", 2, "-f")],
+        contacts=[hs.Contact("f", velocity="v", normal="sqrt(1 - t)", law="coulomb", arguments={"mu": 0.1})],
+    )
+    sol = hs.simulate(block, (0.0, 3.0), integrator=name, limits={"seconds": 5.0})
+    assert sol.status == "step-failure" and "'sqrt(1 - t)' has no value" in sol.message
+    assert sol.t_end == pytest.approx(1.0, abs=1e-12)
+    # v = 2 - mu (2/3)(1 - (1 - t)**1.5), by steps that each keep to 1e-9
+    assert sol.y[1, -1] == pytest.approx(2.0 - 0.1 * 2.0 / 3.0, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["taylor", "dop853", "scipy-dop853"])
+def test_a_monitor_is_warned_of(name: str) -> None:
+    falling = hs.Model(
+        "falling",
+        states=[hs.State("x", 1, "-1")],
+        monitors=[hs.Monitor("k", "log(x) + 1", direction="down")],
+    )
+    sol = hs.simulate(falling, (0.0, 3.0), integrator=name)
+    assert sol.status == "finished" and sol.y[0, -1] == pytest.approx(-2.0)
+    assert sol.events[0].t == pytest.approx(1.0 - np.exp(-1.0), rel=1e-12)
+    assert any("monitor k is not a number on a part of the run" in text for text in sol.warnings)
+
+
+@pytest.mark.parametrize("guard", ["1/x", "tan(2*t + 0.1) + 5"])
+def test_a_guard_with_a_pole(guard: str) -> None:
+    sol = hs.simulate(model(guard=guard), (0.0, 2.0), integrator="taylor")
+    assert sol.status == "step-failure" and "guard g in mode down" in sol.message and "pole" in sol.message
+
+
+@pytest.mark.parametrize("name", ["dop853", "taylor", "scipy-rk45"])
+def test_a_rate_with_a_pole(name: str) -> None:
+    """dx/dt = -1/x reaches zero at t = x0**2/2."""
+    sol = hs.simulate(model(rate="-1/x"), (0.0, 2.0), integrator=name)
+    assert sol.status == "step-failure" and sol.t_end == pytest.approx(0.5, abs=1e-8)
+    assert "x = " in sol.message and "there may be a pole" in sol.message
+
+
+def test_a_state_that_cannot_be_squared() -> None:
+    sol = hs.simulate("dfcs", (0.0, 2.0), x0={"x": 1e300})
+    assert sol.status == "step-failure" and "x = 1e+300 is too large to be squared" in sol.message
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "what"),
+    [("dop853", {"max_step": 1e-300}, "max_step"), ("moreau", {"step": 1e-20}, "step")],
+)
+def test_steps_without_end_are_refused(name: str, given: dict[str, float], what: str) -> None:
+    with pytest.raises(hs.UsageError, match=rf"^{what} is 1e-\d+: from 0 to 1 it would take 1e\+\d+ steps"):
+        hs.simulate("dfcs", (0.0, 1.0), integrator=name, **given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridsim as hs
+from hybridsim.model.hygiene import warnings_of
 
 STIFF = hs.Model(
     "stiff",
@@ -108,3 +109,25 @@ def test_a_touch_is_told_where_a_compiled_loop_runs(integrator: str) -> None:
     crossed = any(event.kind == "transition" for event in sol.events)
     assert crossed or told(sol, "near-grazing: guard top of c")
     assert [e.t for e in sol.events] == pytest.approx([1.0], abs=1e-7)
+
+
+CRAWL = 'schema = 1\nname = "crawl"\n[states]\nx = { start = 1, der = "-sign(x)" }\n'
+
+
+@pytest.mark.parametrize("integrator", ["auto", "rk4-sign"])
+def test_a_jump_in_a_rate_is_told_by_the_run_as_by_check(integrator: str) -> None:
+    """What `check` says of jumps, and nothing else, is a warning of every run of the model."""
+    model = hs.Model.from_toml(CRAWL, path="crawl.toml")
+    (caution,) = warnings_of(model)
+    options = {"step": 0.01} if integrator == "rk4-sign" else {}
+    sol = hs.simulate(model, (0, 2), integrator=integrator, limits={"steps": 300}, **options)
+    assert sol.warnings == (caution.sentence,)
+    assert caution.sentence.startswith("crawl.toml:4: 'sign(x)' in state x jumps inside a mode")
+    assert "[contacts.NAME]" in caution.sentence and "\n" not in caution.sentence
+    if sol.status == "limit":
+        assert sol.resume(limits={"steps": 400}).warnings == sol.warnings
+
+
+def test_a_corner_is_told_of_by_neither() -> None:
+    model = hs.Model.from_toml(CRAWL.replace("-sign(x)", "-1 - abs(x)"))
+    assert warnings_of(model) == () and hs.simulate(model, (0, 2)).warnings == ()

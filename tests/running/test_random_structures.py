@@ -12,7 +12,7 @@ import hybridsim as hs
 SEED = 1
 
 
-@pytest.mark.parametrize("number", [0, 2, 4, 9, 11, 14])
+@pytest.mark.parametrize("number", [0, 2, 4, 9, 46, 111])  # the last two rub along their stops
 def test_runs_end_as_they_should_and_agree_with_time_stepping(number: int) -> None:
     refused, verdicts = all_draws(structure(number, SEED), 3, SEED)
     assert not refused

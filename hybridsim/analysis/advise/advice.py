@@ -18,6 +18,7 @@ from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
 from hybridsim.analysis.provenance import provenance
 from hybridsim.errors import UsageError, nearest
+from hybridsim.files import write_text
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ class Advice:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8")
+            write_text(path, text + "\n")
         return text
 
     def plot(self) -> Any:

@@ -66,7 +66,7 @@ class Pool:
                     for future in done:
                         future.result()
                     self.tell(begin + (end - begin) * (count - len(open_)) / count)
-            except BaseException:
+            except BaseException:  # Ctrl-C above all: no more is begun, and it is raised again
                 threads.shutdown(wait=True, cancel_futures=True)
                 raise
         return [future.result() for future in futures]

@@ -94,7 +94,7 @@ def measured(solution: Solution, point: Point) -> ExactState:
     values = solution(times.ravel())[0].reshape(times.shape)
     energy = float((half * (values**2 @ _WEIGHTS)).sum())
     held = math.fsum(i.t1 - i.t0 for i in intervals if i.mode == "stick")
-    stops = sum(e.target == "stick" for e in solution.events)
+    stops = sum(i.mode == "stick" for i in intervals[1:])
     residual = abs(float(x[-1] - x[0])) / amplitude if amplitude > 0.0 else 0.0
     return ExactState(amplitude, energy, held / point.period, stops, residual)
 

@@ -14,6 +14,7 @@ from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import Verdict, verdict
 from hybridsim.analysis.table import setting
+from hybridsim.files import whole_file, write_text
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
@@ -136,7 +137,7 @@ class SuiteComparison:
             for result in self.results
             for record in result.comparison.records()
         ]
-        with open(path, "w", newline="", encoding="utf-8") as file:
+        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(records[0]))
             writer.writeheader()
             writer.writerows(records)
@@ -176,5 +177,5 @@ class SuiteComparison:
         """Everything, with versions and machine, as text; written where a path is given."""
         text = json.dumps(self.to_dict(), indent=2, default=str)
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8")
+            write_text(path, text + "\n")
         return text

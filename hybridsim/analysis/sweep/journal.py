@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from os import PathLike
 from types import TracebackType
 from typing import IO, Any
@@ -19,6 +20,7 @@ import numpy as np
 from hybridsim.analysis.sweep.job import Outcome
 from hybridsim.analysis.sweep.readings import Reading
 from hybridsim.errors import UsageError
+from hybridsim.files import cannot_write
 
 _FORMAT = "hybridsim sweep"
 
@@ -52,13 +54,11 @@ class Journal:
         try:
             self._file: IO[bytes] = open(self.path, "a+b")  # noqa: SIM115  # it is open as long as the journal is
         except OSError as error:
-            raise UsageError(
-                f"{self.path} cannot be written: {error.strerror}", remedy="give another path"
-            ) from error
+            raise cannot_write(self.path, error) from error
         try:
             self._read(sweep)
-        except BaseException:
-            self._file.close()
+        except BaseException:  # whatever it is, the file is not left open; it is raised again
+            self._close()
             raise
 
     def _read(self, sweep: str) -> None:
@@ -92,8 +92,15 @@ class Journal:
             self._write([list(numbers[: len(rows)]), rows])
 
     def _write(self, line: Any) -> None:
-        self._file.write(json.dumps(line).encode() + b"\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(line).encode() + b"\n")
+            self._file.flush()
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
+
+    def _close(self) -> None:
+        with suppress(OSError):  # of what could not be written before, which has been said
+            self._file.close()
 
     def __enter__(self) -> Journal:
         return self
@@ -101,7 +108,7 @@ class Journal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        self._close()
 
 
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:

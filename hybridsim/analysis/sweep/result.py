@@ -19,6 +19,7 @@ from hybridsim.analysis.sweep.axes import POINT
 from hybridsim.analysis.sweep.job import DONE, NOT_RUN
 from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.errors import UsageError, nearest
+from hybridsim.files import whole_file, write_text
 from hybridsim.model import Model
 from hybridsim.tables import library
 
@@ -114,7 +115,7 @@ class Sweep:
     def to_csv(self, path: str | Path) -> None:
         """Write one line a point, with all digits."""
         columns = self.columns()
-        with open(path, "w", newline="", encoding="utf-8") as file:
+        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(columns)
             for k in range(self.status.size):
@@ -141,7 +142,7 @@ class Sweep:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
         text = json.dumps(self.to_dict(), indent=2, default=str, allow_nan=False)
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8")
+            write_text(path, text + "\n")
         return text
 
     def to_xarray(self) -> xr.Dataset:

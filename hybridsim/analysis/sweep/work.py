@@ -57,7 +57,13 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
     """Which points (total,) are known from a journal; of a chain all or none."""
     total = len(collected.status)
     known = np.zeros(total, dtype=np.bool_)
-    for numbers, outcomes in journal.known:
+    for line, (numbers, outcomes) in enumerate(journal.known, start=2):
+        in_range = all(isinstance(k, int) and 0 <= k < total for k in numbers)
+        if not (numbers and in_range and len(numbers) == len(outcomes)):
+            raise UsageError(
+                f"{journal.path}, line {line}: the points {numbers!r} are none of this sweep of {total}",
+                remedy="take the line out, or delete the file",
+            )
         known[numbers] = True
         if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
             collected.put(numbers, outcomes)

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from hybridsim.plot import style
-from hybridsim.testing.atlas.verdict import (
+from hybridsim.testing.verdict import (
+    ERROR,
     HANG,
     NOT_RUN,
     REFUSED,
@@ -29,10 +30,12 @@ LOOKS = {
     WRONG_SEQUENCE: ("#8a3a78", "≠", "white"),
     HANG: ("#222222", "∞", "white"),
     REFUSED: ("#e9e9e9", "–", "#555555"),
+    ERROR: ("#F0E442", "!", "#222222"),
     NOT_RUN: ("white", "", "#999999"),
 }
 _CELL = 0.19  # inches; so are the margins, of which the top one holds the names of integrators
 _LEFT, _RIGHT, _TOP, _BOTTOM = 2.0, 0.1, 1.7, 0.7
+_TALL = 40  # rows from which on the names stand below as well
 _NARROWEST = 3.0  # what the legend needs
 
 
@@ -42,9 +45,10 @@ def matrix(result: Atlas) -> Axes:
     rows = sum(len(scenes) for scenes in groups.values()) + len(groups)
     columns = len(result.configurations)
     inner = max(columns * _CELL, _NARROWEST)
-    width, height = _LEFT + inner + _RIGHT, _TOP + rows * _CELL + _BOTTOM
+    below = _BOTTOM + (_TOP if rows > _TALL else 0.0)
+    width, height = _LEFT + inner + _RIGHT, _TOP + rows * _CELL + below
     figure = Figure(figsize=(width, height))
-    axes = figure.add_axes((_LEFT / width, _BOTTOM / height, inner / width, rows * _CELL / height))
+    axes = figure.add_axes((_LEFT / width, below / height, inner / width, rows * _CELL / height))
     axes.set_xlim(0, inner / _CELL)
     axes.set_ylim(rows, 0)
     y, places, names = 0, [], []
@@ -72,7 +76,7 @@ def matrix(result: Atlas) -> Axes:
     labels = [style.literal(one.name) for one in result.configurations]
     axes.set_xticks([x + 0.5 for x in range(columns)], labels, fontsize=8, rotation=90)
     axes.xaxis.tick_top()
-    axes.tick_params(length=0)
+    axes.tick_params(length=0, labelbottom=rows > _TALL)
     axes.spines[:].set_visible(False)
     shown = {cell.verdict for cell in result.cells.values()}
     figure.legend(

@@ -78,7 +78,7 @@ def scene(example: Example) -> Axes:
     strip.set_ylabel("events", rotation=0, ha="right", va="center", fontsize=8)
     strip.spines[["top", "right", "left"]].set_visible(False)
     strip.tick_params(labelsize=8)
-    strip.set_xlabel("t")
+    strip.set_xlabel(f"t [{example.time}]" if example.time else "t")
     return axes
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from PIL import Image
 
+from hybridsim.files import whole_file
 from hybridsim.plot.style import save
 
 _COLOURS = 48
@@ -14,8 +15,9 @@ _COLOURS = 48
 
 def save_small(picture: Any, path: Path, dpi: float = 100.0) -> Path:
     """Write a .png with a palette of its own, a third as large as one without."""
-    save(picture, path, dpi)
-    with Image.open(path) as image:
-        reduced = image.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
-    reduced.save(path, optimize=True)
+    with whole_file(path) as partly:
+        save(picture, partly, dpi)
+        with Image.open(partly) as image:
+            reduced = image.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
+        reduced.save(partly, optimize=True)
     return path

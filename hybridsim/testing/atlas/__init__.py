@@ -5,7 +5,7 @@ from hybridsim.testing.atlas.configurations import Configuration, configurations
 from hybridsim.testing.atlas.example import Example, example
 from hybridsim.testing.atlas.matrix import Atlas, atlas, listing, scenes_named, told
 from hybridsim.testing.atlas.pages import pages
-from hybridsim.testing.atlas.verdict import VERDICTS
+from hybridsim.testing.verdict import VERDICTS
 
 __all__ = [
     "VERDICTS",

@@ -11,10 +11,10 @@ from typing import Any
 
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
-from hybridsim.testing.atlas.verdict import NOT_RUN, order, verdict
 from hybridsim.testing.judge import Measured
 from hybridsim.testing.scene import Scene, Truth
 from hybridsim.testing.study import Setting, carry_out
+from hybridsim.testing.verdict import NOT_RUN, order, verdict
 
 # What one run may take, in processor time: the longest run of a right method takes five seconds, and 2e6 steps where
 # it is compiled.

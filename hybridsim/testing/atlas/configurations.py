@@ -159,14 +159,17 @@ def configurations() -> tuple[Configuration, ...]:
 
 
 def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
-    """Those of a name, or of an integrator of that name with all that belongs to it; all without names."""
+    """Those of a name, or of an integrator of that name with its variants; all without names.
+
+    The regularised forms of a model belong to no integrator: they are asked for by their own names.
+    """
     every = configurations()
     if names is None:
         return every
-    known = {one.name for one in every} | {one.integrator for one in every}
+    known = [one.name for one in every]
     for name in names:
         if name not in known:
             raise UsageError(
                 f"the atlas has no integrator {name!r}", remedy=nearest(name, known, kind="integrators")
             )
-    return tuple(one for one in every if one.name in names or one.integrator in names)
+    return tuple(one for one in every if one.name in names or (one.integrator in names and not one.form))

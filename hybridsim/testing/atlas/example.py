@@ -10,13 +10,14 @@ import numpy as np
 
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.registry import registered
+from hybridsim.model.units import time_unit
 from hybridsim.testing import judge
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.matrix import Atlas
-from hybridsim.testing.atlas.verdict import HANG, RIGHT, WRONG
 from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import END, Scene
+from hybridsim.testing.verdict import HANG, RIGHT, WRONG
 
 # Who is shown, first of all: what people use and what fails in a way that one can see.
 TYPICAL = (
@@ -46,6 +47,7 @@ class Example:
     Parameters
     ----------
     state, unit : name and unit of the state that is shown.
+    time : the unit of time, or nothing.
     points : true values in the window, from the truth of the scene.
     failing : None where no method fails.
     stopped : whether the failing run ended inside the window.
@@ -57,6 +59,7 @@ class Example:
     failing: Line | None
     points: tuple[tuple[float, float], ...]
     stopped: bool = False
+    time: str = ""
 
 
 def example(result: Atlas, scene: Scene) -> Example | None:
@@ -148,6 +151,7 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
         None if failing is None or cell is None else _line(cell.configuration, failing, row, window),
         points,
         ends is not None and ends < window[1] - 1e-9 * (window[1] - window[0]),
+        time_unit(right.model),
     )
 
 

@@ -19,9 +19,9 @@ from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell, run_cell
 from hybridsim.testing.atlas.configurations import Configuration, chosen
-from hybridsim.testing.atlas.verdict import VERDICTS
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import TROUBLES, Scene
+from hybridsim.testing.verdict import VERDICTS
 
 Progress = Callable[[float, str], None]
 
@@ -205,7 +205,7 @@ def _in_processes(
             futures = [pool.submit(_by_name, scene.name, one, quick) for scene, one in jobs]
         for future in as_completed(futures):
             keep(future.result())
-    except BaseException:
+    except BaseException:  # Ctrl-C above all: the workers are ended, and it is raised again
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - others:
             worker.terminate()  # a cell may take a minute

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from hybridsim.testing.atlas.cell import Cell
+from hybridsim.testing.atlas.configurations import Configuration
 from hybridsim.testing.atlas.matrix import Atlas
-from hybridsim.testing.atlas.verdict import HANG, NOT_RUN, REFUSED, RIGHT, VERDICTS, WRONG
 from hybridsim.testing.scene import TROUBLES, Scene
+from hybridsim.testing.verdict import ERROR, HANG, NOT_RUN, REFUSED, RIGHT, VERDICTS, WRONG, WRONG_SEQUENCE
 
 _WIDTH = 118
 
@@ -22,13 +24,35 @@ The truth of each is a closed form, or 30 digits and more from a computation tha
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
 A method is *right* in a scene when every event is found, in the right mode and order, none is invented, what is held is
-exact at every setting, and the errors come down to the scene's tolerance with rtol (1e-6, 1e-9, 1e-12) or, for fixed
-steps, with the step (a 300th, a 1200th and a 4800th of the scene's own time). Everything is run, also where an
-integrator says what it lacks; what fails there fails for the reason that it gives. The figure behind a name is the
-larger error of event times and states at the last setting, and the order in the step that the last two show. A scene in
-which nobody fails is one in which other programs do: all methods here share the location and the decisions of events,
-unless their name says otherwise.
+exact at every setting, and the errors come down to the scene's tolerance from setting to setting:
+
+| method | settings |
+| --- | --- |
+| with an error control | rtol 1e-6, 1e-9 and 1e-12; in a few scenes 1e-8, 1e-10 and 1e-12, or only 1e-9 and 1e-12 |
+| `rk4-dichotomy`, `rk4-sign` | steps of unit/300, unit/1200 and unit/4800 |
+| `moreau`, which is of first order | steps of unit/4800, unit/19200 and unit/76800 |
+| `rk4 tanh`, `rk4 karnopp` | v0 of 1e-2, 1e-3 and 1e-4 of the scene's speed, with steps of unit/1200, unit/12000 \
+and unit/120000, as far as 2e6 steps are enough for the run |
+| `scipy-rk45 cooldown` | rtol 1e-9, blind for 1e-2, 1e-3 and 1e-4 units after each event |
+
+`scipy-rk23` has tolerances a hundred times looser in scenes of more than fifty units. The *unit* is the scene's own
+time: the period of its forcing, or about one swing of its motion. The figure behind a name is the larger of two errors
+at the last setting: of event times, in units, and of states, each relative to its largest true value in the scene.
+Behind it stands the order in the step that the last two settings show, where the error falls with the step at all.
+Everything is run, also where an integrator says what it lacks; what fails there fails for the reason that it gives.
+
+All methods share the location and the decisions of events, unless their name says otherwise: native events, cooldown,
+regularised forms, CVODE's own root finding, and the fixed-step methods. Where all are right, the text says what goes
+wrong in programs that decide otherwise.
+
+A scene's picture shows one state over a part of the run, around where a method first goes visibly wrong: solid what is
+right, dashed the failing method that the legend names, at the setting of which the table tells. The strip below has a
+tick for each event in that part, and at its right edge their number, in the colour of each run.
 """
+_LEAST_ORDER = 0.5  # of what can be called falling with the step
+_NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
+_DIGITS = 9  # of a number in a reason
+_RUBBING = "Friction at a hard stop: the scene `rubbing-stop`, and `hybridsim run thrown-block`."
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
@@ -50,6 +74,12 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
         lines.append(
             f"| [{name}]({name}.md) | {len(scenes)} | {TROUBLES.get(trouble, '').partition(': ')[2]} |"
         )
+    lines += ["", "## Scenes", ""]
+    for trouble, scenes in groups.items():
+        name = trouble or "scenes"
+        links = ", ".join(f"[{one.name}]({name}.md#{anchor(one.title or one.name)})" for one in scenes)
+        lines += [*textwrap.wrap(f"**{name}**: {links}", _WIDTH, break_on_hyphens=False), ""]
+    lines.append(_RUBBING)
     shown = [verdict for verdict in VERDICTS if verdict != RIGHT]
     lines += ["", "## Integrators and what else people use", ""]
     lines.append(f"| name | what it is | {RIGHT} | {' | '.join(shown)} |")
@@ -63,6 +93,11 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def anchor(title: str) -> str:
+    """What a heading is linked to by."""
+    return re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
+
+
 def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[str] = ()) -> str:
     """The page of one class."""
     lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", "[The whole matrix](index.md)", ""]
@@ -71,19 +106,26 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
         lines += [textwrap.fill(" ".join(scene.story.split()), _WIDTH, break_on_hyphens=False), ""]
         if scene.name in pictures:
             lines += [f"![{scene.title}]({trouble or 'scenes'}/{scene.name}.png)", ""]
-        lines += [*verdicts(result.row(scene)), ""]
+        lines += [*verdicts(result.row(scene), result.configurations), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def verdicts(cells: list[Cell]) -> list[str]:
+def verdicts(cells: list[Cell], configurations: Sequence[Configuration] = ()) -> list[str]:
     """The verdicts on one scene: who is right, and one line for each that is not."""
+    lacks = {one.name: one.method.lacks for one in configurations}
     right = [cell for cell in cells if cell.verdict == RIGHT]
     lines = ["| | |", "| --- | --- |"]
     if right:
         lines.append(f"| {RIGHT} | {', '.join(map(_with_error, right))} |")
-    for verdict in (*WRONG, HANG, REFUSED):
+    for verdict in (*WRONG, HANG, REFUSED, ERROR):
         for reason, names in _by_reason([cell for cell in cells if cell.verdict == verdict]).items():
-            lines.append(f"| **{verdict}** | {', '.join(names)}: {_safe(reason)} |")
+            own = [
+                lacks.get(one.configuration, {})
+                for one in cells
+                if (one.verdict, one.reason) == (verdict, reason)
+            ]
+            said = _own_words(reason, own[0]) if verdict == WRONG_SEQUENCE and len(own) == 1 else ""
+            lines.append(f"| **{verdict}** | {', '.join(names)}: {_safe(reason)}{said} |")
     left_out = [cell.configuration for cell in cells if cell.verdict == NOT_RUN]
     return [*lines, *([f"| {NOT_RUN} | {', '.join(left_out)} |"] if left_out else [])]
 
@@ -102,11 +144,17 @@ def _with_error(cell: Cell) -> str:
     known = []
     if cell.error is not None and cell.rows:
         known.append(f"{cell.error:.0e}")
-    if cell.order is not None:
+    if cell.order is not None and cell.order >= _LEAST_ORDER:
         known.append(f"order {cell.order:.1f}")
     return f"{cell.configuration} ({', '.join(known)})" if known else cell.configuration
 
 
 def _safe(reason: str) -> str:
-    """A reason that breaks no table."""
-    return reason.replace("|", r"\|")
+    """A reason that breaks no table, with numbers of no more digits than are read."""
+    return _NUMBER.sub(lambda number: f"{float(number[0]):.{_DIGITS}g}", reason).replace("|", r"\|")
+
+
+def _own_words(reason: str, lacks: Mapping[str, str]) -> str:
+    """What a method that locates no events says of a stop that is none."""
+    is_stop = re.search(r"and is (\w+):stick at", reason) is not None
+    return f" (by design: {lacks['located']})" if is_stop and "located" in lacks else ""

@@ -16,6 +16,7 @@ from hybridsim.testing.catalogue import (
     sliding,
     stability,
     stiffness,
+    stops,
     thresholds,
     timed,
 )
@@ -47,6 +48,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             sliding,
             accumulation,
             impacts,
+            stops,
             stiffness,
             stability,
             sensitivity,

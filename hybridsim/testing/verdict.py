@@ -15,13 +15,16 @@ WRONG_ANSWER = "wrong answer"
 WRONG_SEQUENCE = "wrong mode sequence"
 HANG = "hang (bounded)"
 REFUSED = "refused"
+ERROR = "error"
 NOT_RUN = "not run"
+LACKS = "lacks"  # of `outcome`, which does not run what an integrator says that it lacks; the atlas does
 VERDICTS = {
     RIGHT: "every event found and none invented, and at the tightest setting errors within the scene's tolerance",
     WRONG_ANSWER: "the run ends as if all were well, and its numbers are wrong or do not become right",
     WRONG_SEQUENCE: "an event missed, invented or out of order, or a mode that is not the motion's",
     HANG: "no end within the time or the steps that a run may take",
     REFUSED: "it says that it cannot, with the reason: before the run, or where it stops",
+    ERROR: "it ends in an exception that is no refusal: a fault of the program",
     NOT_RUN: "nothing to run: no friction to regularise, or a long row and a method that steps in Python",
 }
 WRONG = (WRONG_ANSWER, WRONG_SEQUENCE)
@@ -37,7 +40,8 @@ def verdict(study: Study) -> tuple[str, str]:
         text, error = study.failure
         if isinstance(error, Endless):
             return HANG, f"{text}: {error}"
-        return REFUSED, f"{text}: {one_line(refusal(error))}"
+        found = REFUSED if isinstance(error, HybridsimError) else ERROR
+        return found, f"{text}: {one_line(refusal(error))}"
     if within(study.done[-1][1], study.tolerances):
         return RIGHT, ""
     faults = judge_errors(study.done, study.tolerances)

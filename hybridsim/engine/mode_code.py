@@ -1,0 +1,56 @@
+"""What machine code of one vector of modes is written from, and where it is kept on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.bounds_code import Given
+from hybridsim.engine.series_code import ModeTape
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+
+KNOWN = 32  # times without it that make it worth reading machine code (2 ms): each costs a microsecond
+WORTH = 2000  # times after which there are likely to be as many more as pay for compiling (0.1 s)
+NEVER = -(2**62)  # in place of these times: there is code, or there will be none
+
+
+def mode_tape(system: System, z: np.ndarray) -> ModeTape:
+    """The tape of a vector of modes, with its active guards."""
+    tape, lean = system.code.data["tape"], system.lean_tape(z)
+    return ModeTape(
+        rows=_rows(lean.rows),
+        time=tape["time"],
+        states=tuple(tape["states"]),
+        rates=tuple(lean.derivatives.tolist()),
+        guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
+    )
+
+
+def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:
+    """The rows of it that are run once a segment."""
+    return _rows(system.lean_tape(z).constant_rows)
+
+
+def given(system: System) -> Given:
+    """Where the constants of a system's tapes come from."""
+    tape = system.code.data["tape"]
+    return Given(
+        {register: (value, error) for register, value, error in tape["constants"]},
+        dict(tape["parameters"]),
+        frozenset(system.registers.inputs.phases.tolist()),
+    )
+
+
+def kept(system: System, kind: str, z: np.ndarray) -> Path:
+    """Where code of a kind is kept; the name of the machine comes behind it."""
+    path = Path(str(system.code.module.__file__))
+    return path.with_name(f"{path.stem}.{kind}.{hashlib.sha256(z.tobytes()).hexdigest()[:12]}")
+
+
+def _rows(rows: np.ndarray) -> tuple[tuple[int, ...], ...]:
+    return tuple(map(tuple, rows.tolist()))

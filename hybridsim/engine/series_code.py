@@ -1,0 +1,377 @@
+"""The series of one vector of modes as straight code: every operation of its lean tape written out, order by order.
+
+An interpreter of a tape spends more on finding out what to do next than on doing it. Here each coefficient is a value
+of its own, equal ones are worked out once, and what nobody asks for falls away. Each operation is that of
+`hybridsim.engine.taylor`, so that both give the same to the last bit and either may take the place of the other.
+
+The functions are void f(s, known, x, guards, constants, out): local time, whether order 0 is known, states, where the
+active guards' coefficients go, the constants of the tape in their registers, and where those of the states go. Sines,
+exponentials and the like at order 0 are left in their registers among the constants: a step begins where the one before
+it was looked at last, and need not work them out again. That of what is `ahead` is void f(s, d, series, guards,
+constants, out), see `hybridsim.engine.steps_ahead`; that of sizes void f(h, ., ., guards, ., out), see `measure` in
+`hybridsim.engine.taylor`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from hybridsim.engine.lean_tape import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+)
+from hybridsim.engine.tape import ADD, COPY, DIV, EXP, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
+from hybridsim.engine.taylor import EXACTLY
+
+# A function of so many lines is compiled in a quarter of a second; a longer one is left to the interpreter.
+_LONGEST = 6000
+TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # they keep a companion series in the next register
+_COSTLY = (*TWINS, EXP)  # of which order 0 takes as long as all other orders
+_COMMUTES = ("fadd", "fmul")
+ZERO, ONE, NAN, INF = "0.0", "1.0", "0x7FF8000000000000", "0x7FF0000000000000"
+KNOWN = frozenset(
+    (
+        COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT,
+        ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR,
+    )
+)  # fmt: skip
+
+DECLARATIONS = """
+declare double @llvm.sin.f64(double)
+declare double @llvm.cos.f64(double)
+declare double @llvm.exp.f64(double)
+declare double @llvm.sqrt.f64(double)
+declare double @llvm.fabs.f64(double)
+declare double @c_tan(double)
+declare double @c_tanh(double)
+"""
+
+
+def _results(op: int) -> int:
+    """How many registers an operation fills."""
+    return 2 if op in TWINS else 1
+
+
+class TooLong(Exception):
+    """The code of a tape would take too long to compile."""
+
+
+def number(value: float) -> str:
+    """A double as LLVM writes it, exactly."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+
+class Lines:
+    """The lines of one function, each value once."""
+
+    def __init__(self, prefix: str = "v") -> None:
+        self.lines: list[str] = []
+        self._prefix = prefix  # of the names of values
+        self._known: dict[tuple[str, ...], str] = {}
+
+    def put(self, line: str) -> None:
+        """A line that gives no value."""
+        self.lines.append(line)
+        if len(self.lines) > _LONGEST:
+            raise TooLong
+
+    def value(self, form: str, *parts: str) -> str:
+        """The value that a line gives; its parts are put for the braces of its form."""
+        key = (form, *parts)
+        if key not in self._known:
+            name = f"%{self._prefix}{len(self._known)}"
+            self.put(f"  {name} = {form.format(*parts)}")
+            self._known[key] = name
+        return self._known[key]
+
+    def op(self, name: str, a: str, b: str) -> str:
+        """Arithmetic of two doubles."""
+        if name in _COMMUTES and b < a:
+            a, b = b, a
+        return self.value(name + " double {}, {}", a, b)
+
+    def negative(self, a: str) -> str:
+        """-a."""
+        return self.value("fneg double {}", a)
+
+    def call(self, name: str, a: str) -> str:
+        """A function of one double."""
+        return self.value("call double @" + name + "(double {})", a)
+
+    def over(self, a: str, k: int) -> str:
+        """a / k, as states have it."""
+        if k == 1:
+            return a
+        return self.op("fdiv", a, number(k)) if k <= EXACTLY else self.op("fmul", a, number(1.0 / k))
+
+    def load(self, array: str, i: int) -> str:
+        """An element of an array that nobody writes to."""
+        place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
+        return self.value("load double, ptr {}", place)
+
+    def store(self, value: str, array: str, i: int) -> None:
+        """Write an element."""
+        place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
+        self.put(f"  store double {value}, ptr {place}")
+
+    def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
+        """One of two values, by a comparison of a and b."""
+        is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
+        return self.value("select i1 {}, double {}, double {}", is_so, then, otherwise)
+
+
+@dataclass(frozen=True)
+class ModeTape:
+    """What is needed of the lean tape of one vector of modes: rows, registers of time, states, rates, active guards."""
+
+    rows: tuple[tuple[int, ...], ...]
+    time: int
+    states: tuple[int, ...]
+    rates: tuple[int, ...]
+    guards: tuple[int, ...]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether every operation can be written out."""
+        return all(row[0] in KNOWN for row in self.rows)
+
+
+class _Expansion(Lines):
+    """Coefficients 0..order of every register; is_known: sines and the like at order 0 are in their registers."""
+
+    def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
+        super().__init__("v" if is_known else "u")
+        self.tape, self.order, self.stride, self.is_known = tape, order, stride, is_known
+        self.expand("%s", [self.load("%x", i) for i in range(len(tape.states))])
+
+    def expand(self, s: str, x: list[str]) -> None:
+        """All coefficients from a local time and a state on."""
+        tape, order, stride, is_known = self.tape, self.order, self.stride, self.is_known
+        self.series: dict[int, list[str]] = {r: [value] for r, value in zip(tape.states, x, strict=True)}
+        if tape.time >= 0:
+            self.series[tape.time] = [s, ONE] + [ZERO] * order
+        for k in range(order + 1):
+            for op, a, b, c, out in tape.rows:
+                if k == 0 and op in _COSTLY and is_known:
+                    values = tuple(self.load("%c", r * stride) for r in (out, out + 1)[: _results(op)])
+                else:
+                    values = self._advance(op, a, b, c, out, k)
+                for r, value in zip((out, out + 1), values, strict=False):
+                    self.series.setdefault(r, []).append(value)
+            if k < order:
+                rates = [self.at(r, k) for r in tape.rates]
+                for r, rate in zip(tape.states, rates, strict=True):
+                    self.series[r].append(self.over(rate, k + 1))
+
+    def at(self, r: int, k: int) -> str:
+        """Coefficient k of a register."""
+        if r in self.series:
+            return self.series[r][k]
+        return self.load("%c", r * self.stride) if k == 0 else ZERO
+
+    def _pair(self, a: int, b: int, i: int, j: int, weighted: bool) -> str:
+        first, second = self.at(a, i), self.at(a, j)
+        if weighted:
+            first, second = self.op("fmul", first, number(i)), self.op("fmul", second, number(j))
+        return self.op("fadd", self.op("fmul", first, self.at(b, j)), self.op("fmul", second, self.at(b, i)))
+
+    def _inner(self, a: int, b: int, k: int, weighted: bool = False) -> str:
+        total, m = ZERO, k // 2
+        if k > 0 and k % 2 == 0:
+            first = self.op("fmul", self.at(a, m), number(m)) if weighted else self.at(a, m)
+            total = self.op("fmul", first, self.at(b, m))
+        for i in range((k - 1) // 2, 0, -1):
+            total = self.op("fadd", total, self._pair(a, b, i, k - i, weighted))
+        return total
+
+    def _product(self, a: int, b: int, k: int) -> str:
+        if k == 0:
+            return self.op("fmul", self.at(a, 0), self.at(b, 0))
+        return self.op("fadd", self._inner(a, b, k), self._pair(a, b, 0, k, False))
+
+    def _slope(self, a: int, b: int, k: int) -> str:
+        last = self.op("fmul", self.op("fmul", self.at(a, k), number(k)), self.at(b, 0))
+        return self.op("fmul", self.op("fadd", self._inner(a, b, k, True), last), number(1.0 / k))
+
+    def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
+        """Coefficient k of an operation, and of its companion."""
+        if op in TWINS:
+            return self._start(op, a, b) if k == 0 else self._twins(op, a, b, out, k)
+        u = self.at(a, k)
+        if op == COPY:
+            return (u,)
+        if op == NEG:
+            return (self.negative(u),)
+        if op == SELECT:
+            return (self.choice("une", self.at(a, 0), ZERO, self.at(b, k), self.at(c, k)),)
+        if op in (ADD, SUB):
+            return (self.op("fadd" if op == ADD else "fsub", u, self.at(b, k)),)
+        if op in (ADD_CONSTANT, SUB_CONSTANT):
+            return (self.op("fadd" if op == ADD_CONSTANT else "fsub", u, self.at(b, 0)) if k == 0 else u,)
+        if op == CONSTANT_SUB:
+            return (self.op("fsub", self.at(b, 0), u) if k == 0 else self.negative(u),)
+        if op == SCALE:
+            return (self.op("fmul", u, self.at(b, 0)),)
+        if op == MUL:
+            return (self._product(a, b, k),)
+        if op in (DIVIDE_BY, DIV):
+            if k == 0:
+                return (self.op("fdiv", u, self.at(b, 0)),)
+            if op == DIV:
+                first = self.op("fmul", self.at(out, 0), self.at(b, k))
+                u = self.op("fsub", u, self.op("fadd", self._inner(out, b, k), first))
+            return (self.op("fmul", u, self.op("fdiv", ONE, self.at(b, 0))),)
+        return (self._exponential(a, out, k) if op == EXP else self._root(a, out, k),)
+
+    def _exponential(self, a: int, out: int, k: int) -> str:
+        if k > 0:
+            return self._slope(a, out, k)
+        u = self.at(a, 0)
+        return self.choice("oge", u, number(709.0), INF, self.call("llvm.exp.f64", u))
+
+    def _root(self, a: int, out: int, k: int) -> str:
+        u = self.at(a, k)
+        if k == 0:
+            return self.choice("oge", u, ZERO, self.call("llvm.sqrt.f64", u), NAN)
+        root = self.at(out, 0)
+        rest = self.op("fmul", self.op("fsub", u, self._inner(out, out, k)), number(0.5))
+        quotient = self.op("fdiv", rest, root)
+        return self.choice("oeq", root, ZERO, self.choice("oeq", rest, ZERO, ZERO, quotient), quotient)
+
+    def _start(self, op: int, a: int, b: int) -> tuple[str, ...]:
+        """Order 0 of an operation with a companion."""
+        u = self.at(a, 0)
+        if op != TANGENT:
+            return self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)
+        y = self.call("c_tan" if b == 0 else "c_tanh", u)
+        square = self.op("fmul", y, y)
+        return y, self.op("fadd", ONE, square if b == 0 else self.negative(square))
+
+    def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[str, ...]:
+        """Order k >= 1 of an operation with a companion."""
+        if op == SINCOS_LINEAR:
+            rate = self.op("fmul", self.at(a, 1), number(1.0 / k))
+            sine, cosine = self.at(out, k - 1), self.at(out + 1, k - 1)
+            return self.op("fmul", rate, cosine), self.negative(self.op("fmul", rate, sine))
+        if op == SINCOS:
+            return self._slope(a, out + 1, k), self.negative(self._slope(a, out, k))
+        self.series[out].append(self._slope(a, out + 1, k))
+        w = self._product(out, out, k)
+        return self.series[out].pop(), w if b == 0 else self.negative(w)
+
+
+def function(name: str, lines: Iterable[str]) -> str:
+    """A function of these lines."""
+    arguments = "double %s, double %e, ptr noalias %x, ptr noalias %g, ptr noalias %c, ptr noalias %out"
+    return "\n".join((f"define void @{name}({arguments}) {{", *lines, "  ret void", "}", ""))
+
+
+def series_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes the coefficients (n, order + 1) of the states and (guards, order + 1)."""
+    code, size = _Expansion(tape, order, order + 1, is_known=True), order + 1
+    for array, registers in (("%out", tape.states), ("%g", tape.guards)):
+        for i, r in enumerate(registers):
+            for k in range(size):
+                code.store(code.at(r, k), array, i * size + k)
+    begin = ("  %is_known = fcmp une double %e, 0.0", "  br i1 %is_known, label %go, label %first", "first:")
+    return function(name, [*begin, *_start(tape, size).lines, "  br label %go", "go:", *code.lines])
+
+
+def values_function(name: str, tape: ModeTape, stride: int) -> str:
+    """The function that writes the rates of the states and the values of the guards."""
+    code = _start(tape, stride)
+    for array, registers in (("%out", tape.rates), ("%g", tape.guards)):
+        for i, r in enumerate(registers):
+            code.store(code.at(r, 0), array, i)
+    return function(name, code.lines)
+
+
+class _Ahead(_Expansion):
+    """Order 0 at a distance %e from the origin of series of some order, and sums of these series."""
+
+    def __init__(self, tape: ModeTape, order: int) -> None:
+        Lines.__init__(self, "u")
+        self.tape, self.order, self.stride, self.is_known = tape, 0, order + 1, False
+        n, count, size = len(tape.states), len(tape.guards), order + 1
+        powers, square = [ONE, "%e"], self.op("fmul", "%e", "%e")
+        for k in range(2, size):
+            powers.append(square if k == 2 else self.op("fmul", powers[k - 2], square))
+        x, slopes, changes = [], [], []
+        for i in range(n):
+            c = [self.load("%x", i * size + k) for k in range(size)]
+            change = self.op("fmul", c[order], powers[order])
+            for k in range(order - 1, 0, -1):
+                change = self.op("fadd", change, self.op("fmul", c[k], powers[k]))
+            x.append(self.op("fadd", c[0], change))
+            slope, change = c[1], self.call("llvm.fabs.f64", c[1])
+            for k in range(2, size):
+                term = self.op("fmul", c[k], powers[k - 1])
+                slope = self.op("fadd", slope, self.op("fmul", number(k), term))
+                change = self.op("fadd", change, self.call("llvm.fabs.f64", term))
+            slopes.append(slope)
+            changes.append(change)
+        self.expand(self.op("fadd", "%s", "%e"), x)
+        sums = []
+        for j in range(count):
+            total = self.load("%g", j * size)
+            for k in range(1, size):
+                total = self.op("fadd", total, self.op("fmul", self.load("%g", j * size + k), powers[k]))
+            sums.append(total)
+        values = [self.at(r, 0) for r in tape.guards]
+        rates = [self.at(r, 0) for r in tape.rates]
+        for i, value in enumerate((*powers, *x, *rates, *slopes, *changes, *values, *sums)):
+            self.store(value, "%out", i)
+
+
+def ahead_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes what is ahead of series of an order."""
+    return function(name, _kept_order(_Ahead(tape, order)).lines)
+
+
+def sizes_function(name: str, guards: int, order: int) -> str:
+    """The function of h that writes its powers, and for each guard sum_k |c_k| h**k: even and odd terms apart."""
+    code, size = Lines(), order + 1
+    powers, square = [ONE, "%s"], code.op("fmul", "%s", "%s")
+    for k in range(2, size):
+        powers.append(square if k == 2 else code.op("fmul", powers[k - 2], square))
+    for k, power in enumerate(powers):
+        code.store(power, "%out", k)
+    for j in range(guards):
+        sums = ["", ""]
+        for k, power in enumerate(powers):
+            term = code.op("fmul", code.call("llvm.fabs.f64", code.load("%g", j * size + k)), power)
+            sums[k % 2] = code.op("fadd", sums[k % 2], term) if sums[k % 2] else term
+        code.store(code.op("fadd", *sums), "%out", size + j)
+    return function(name, code.lines)
+
+
+def _start(tape: ModeTape, stride: int) -> _Expansion:
+    """Order 0, of which what is costly is left in its registers."""
+    return _kept_order(_Expansion(tape, 0, stride))
+
+
+def _kept_order(code: _Expansion) -> _Expansion:
+    """Code with stores of what is costly at order 0."""
+    tape, stride = code.tape, code.stride
+    for op, *_, out in tape.rows:
+        if op in _COSTLY:
+            for r in (out, out + 1)[: _results(op)]:
+                code.store(code.at(r, 0), "%c", r * stride)
+    return code
+
+
+def series_text(tape: ModeTape, order: int) -> str:
+    """A module with series_0, values_0, ahead_0 and sizes_0; TooLong where it would take too long to compile."""
+    parts = (
+        series_function("series_0", tape, order),
+        values_function("values_0", tape, order + 1),
+        ahead_function("ahead_0", tape, order),
+        sizes_function("sizes_0", len(tape.guards), order),
+    )
+    return DECLARATIONS + "".join(parts)

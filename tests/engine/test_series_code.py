@@ -1,0 +1,183 @@
+"""Series as straight machine code: the same as the interpreters of their tapes, to the last bit, in every mode."""
+
+from __future__ import annotations
+
+import itertools
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine import mode_tables, series_shelf
+from hybridsim.engine.bernstein_code import LEADING, bernstein_text
+from hybridsim.engine.bounds_code import bounds_text, can_bound
+from hybridsim.engine.first_exit import to_bernstein
+from hybridsim.engine.jets import ORDER
+from hybridsim.engine.jit import ENABLED, call_series, compile_series, kernel
+from hybridsim.engine.mode_code import constant_rows, given, mode_tape
+from hybridsim.engine.mode_tables import shelf_of
+from hybridsim.engine.series import SeriesRun, series_order
+from hybridsim.engine.series_code import series_text
+from hybridsim.engine.series_shelf import SeriesShelf
+from hybridsim.engine.stepping import Tolerances
+from hybridsim.engine.steps_ahead import look_ahead, room_ahead
+from hybridsim.engine.system import System
+from hybridsim.engine.taylor import measure
+from hybridsim.engine.timepair import Instant
+
+pytestmark = pytest.mark.skipif(not ENABLED, reason="there is no machine code")
+
+# every operation that is written out, and the modes of contacts, switches and impacts
+SCENES = ("dfcs", "dfcs-stribeck", "belt", "square-wave", "bouncing-ball", "static-kinetic")
+RATES = {
+    "exp": "exp(-x*x)",
+    "quotient": "x/(1 + x*x) - 2/(3 + sin(t))",
+    "root": "sqrt(2 + x) + sqrt(t + 1)",
+    "sines": "sin(x)*cos(3*t)",
+    "tan": "tan(x/2) + 0.1*tanh(3*x)",
+    "constants": "a*x/(1 + a*a) - x/3 - exp(a)/7",
+}
+
+
+@kernel
+def called(code: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any) -> None:
+    """Call a function of series."""
+    call_series(code, s, error, x, guards, constants, out)
+
+
+@kernel
+def looked(
+    rows: Any, places: Any, order: int, s: float, d: float, watched: Any, C: Any, U: Any, W: Any, out: Any
+) -> None:
+    """What is ahead, by the interpreter."""
+    look_ahead(0, rows, places, order, s, d, watched, C, U, W, out)
+
+
+@kernel
+def sized(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
+    """Sizes of series."""
+    measure(code, U, watched, order, h, powers, totals)
+
+
+def systems() -> dict[str, System]:
+    """Models by name."""
+    found = {name: System(hs.load(name)) for name in SCENES}
+    for name, rate in RATES.items():
+        states = [hs.State("x", 0.25, der=rate)]
+        monitors = [hs.Monitor("late", "x - 2")]
+        found[name] = System(
+            hs.Model(name, states=states, parameters=[hs.Parameter("a", 0.7)], monitors=monitors)
+        )
+    return found
+
+
+SYSTEMS = systems()
+
+
+def modes_of(system: System) -> Any:
+    """All vectors of modes, of many the first."""
+    every = itertools.product(*(range(len(a.modes)) for a in system.automata))
+    return [np.array(z, dtype=np.int64) for z in itertools.islice(every, 6)]
+
+
+def start_of(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """A run-time vector and a state."""
+    discrete = np.array(list(system.model.discrete_values().values()), dtype=float)
+    return system.vector(Instant(0.3), discrete), 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
+    system = SYSTEMS[name]
+    p, x = start_of(system)
+    for i, z in enumerate(modes_of(system)):
+        run = SeriesRun(system, p, z, Tolerances(1e-9, np.zeros(system.n)))
+        tape, order, n = mode_tape(system, z), run.order, system.n
+        assert tape.is_known
+        (series, values, ahead, sizes), _keep = compile_series(
+            tmp_path / f"{i}",
+            ("series_0", "values_0", "ahead_0", "sizes_0"),
+            partial(series_text, tape, order),
+        )
+        watched = np.array(tape.guards, dtype=np.int64)
+        constants, interpreted = run.V.copy(), run.V.copy()
+        run.expand(0.1, x, 1.0)
+        expected, guards = run.V[run.states], run.V[watched]
+        C, U = np.empty((n, order + 1)), np.empty((len(watched), order + 1))
+        called(series, 0.1, 0.0, x, U, constants, C)
+        np.testing.assert_array_equal(C, expected)
+        np.testing.assert_array_equal(U, guards)
+        d = 0.01
+        found, want = np.empty((2, room_ahead(order, n, len(watched))))
+        called(ahead, 0.1, d, C, U, constants, found)
+        looked(run.lean.rows, run.places, order, 0.1, d, watched, expected, guards, interpreted, want)
+        np.testing.assert_array_equal(found, want)
+        measured = np.empty(order + 1 + len(watched))
+        called(sizes, d, 0.0, C, U, constants, measured)
+        for code in (0, sizes):
+            both = np.empty(order + 1 + len(watched))
+            sized(code, U, np.arange(len(watched)), order, d, both[: order + 1], both[order + 1 :])
+            np.testing.assert_array_equal(measured, both)
+        # from there, where order 0 is known, and by itself
+        x1 = found[order + 1 : order + 1 + n].copy()
+        run.expand(0.1 + d, x1, 1.0)
+        called(series, 0.1 + d, 1.0, x1, U, constants, C)
+        np.testing.assert_array_equal(C, run.V[run.states])
+        rates, at = np.empty(n), np.empty(len(watched))
+        called(values, 0.1 + d, 0.0, x1, at, constants, rates)
+        np.testing.assert_array_equal(rates, run.V[run.lean.derivatives, 0])
+        np.testing.assert_array_equal(at, run.V[watched, 0])
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_short_series_with_bounds(name: str, tmp_path: Path) -> None:
+    system = SYSTEMS[name]
+    p, x = start_of(system)
+    x_error = 1e-15 * np.arange(1.0, 1.0 + system.n)
+    for i, z in enumerate(modes_of(system)):
+        tape, rows, active = mode_tape(system, z), constant_rows(system, z), np.flatnonzero(system.active(z))
+        assert can_bound(tape, rows)
+        (code,), _keep = compile_series(
+            tmp_path / f"{i}",
+            ("bounds_0",),
+            partial(bounds_text, tape, rows, given(system), active.tolist(), system.guard_count),
+        )
+        out = np.empty((2, system.guard_count, ORDER + 1))
+        called(code, 0.1, 1e-17, x, x_error, p, out)
+        expected = system.series(0.1, x, p, z, x_error, 1e-17)
+        np.testing.assert_array_equal(out[0, active], expected.guards[active])
+        np.testing.assert_array_equal(out[1, active], expected.guard_bounds[active])
+
+
+def test_bernstein_forms(tmp_path: Path) -> None:
+    order = 14
+    names = [f"bernstein_{order + 1 - zeros}" for zeros in range(LEADING)]
+    codes, _keep = compile_series(tmp_path / "forms", names, lambda: bernstein_text(order))
+    for zeros, code in enumerate(codes):
+        a = np.cos(np.arange(order + 1.0 - zeros) ** 2)
+        found, expected = np.empty((2, len(a)))
+        called(code, 0.0, 0.0, a, a, a, found)
+        to_bernstein(a, expected)
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_a_run_is_the_same_with_code_and_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first run goes by the interpreters alone, the last by machine code."""
+    model, rtol, runs = hs.load("dfcs-stribeck"), 3e-10, []
+    system = System(model)
+    order = series_order(rtol, system.is_linear)
+    for steps in (2**62, 1, 1):
+        for module in (series_shelf, mode_tables):
+            monkeypatch.setattr(module, "KNOWN", steps)
+            monkeypatch.setattr(module, "WORTH", steps)
+        runs.append(hs.simulate(model, (0, 0.05), integrator="taylor", rtol=rtol))
+    tapes = shelf_of(system).tapes
+    codes = system.code.shared(f"series of order {order}", lambda: SeriesShelf(system, order)).of(tapes)
+    assert codes.series.all() and tapes.bounds.all()
+    assert len(runs[0].events) > 10
+    for other in runs[1:]:
+        np.testing.assert_array_equal(other.t, runs[0].t)
+        np.testing.assert_array_equal(other.y, runs[0].y)

@@ -1,0 +1,63 @@
+"""Arrays behind one pointer: what a kernel reads and writes through a sheet is what its rows hold."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from hybridsim.engine.jit import Door, kernel
+from hybridsim.engine.packs import Sheet, packed
+
+
+class Rows(NamedTuple):
+    """Three arrays of rows."""
+
+    numbers: np.ndarray
+    words: np.ndarray
+    waves: np.ndarray
+
+
+FIELDS = ((float, (5, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0))
+
+
+@kernel
+def _number(rows: Any) -> int:
+    """Write numbers that count up, and give the count of words."""
+    count = 0.0
+    for i in range(rows.numbers.shape[0]):
+        for j in range(rows.numbers.shape[1]):
+            rows.numbers[i, j] = count
+            count += 1.0
+    for i in range(rows.words.shape[0]):
+        rows.words[i] = 10 + i
+    return rows.words.shape[0] + 100 * rows.waves.shape[0]
+
+
+@pytest.mark.parametrize("skipped", [None, (2, 1, 5)])
+def test_a_kernel_writes_to_the_rows_of_a_sheet(skipped: tuple[int, ...] | None) -> None:
+    sheet = Sheet(Rows, FIELDS)
+    blocks = sheet.blank()
+    rows = sheet.rows(blocks)
+    rows.numbers[:], rows.words[:] = -1.0, -1
+    first = skipped or (0, 0, 0)
+    assert _number(sheet.packed(blocks, skipped)) == 6 - first[1] + 100 * (5 - first[2])
+    assert rows.numbers[first[0] :].ravel().tolist() == list(range(10 - 2 * first[0]))
+    assert rows.words[first[1] :].tolist() == list(range(10, 16 - first[1]))
+    assert (rows.numbers[: first[0]] == -1.0).all() and (rows.words[: first[1]] == -1).all()
+
+
+def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
+    sheet = Sheet(Rows, FIELDS)
+    rows = sheet.rows(sheet.blank())
+    assert not np.shares_memory(rows.numbers, rows.words)
+    assert rows.numbers.base is not rows.words.base
+    assert all(array.flags.c_contiguous and array.flags.aligned for array in rows)
+
+
+def test_a_door_leads_to_the_same_kernel() -> None:
+    arrays = Rows(np.zeros((2, 2)), np.zeros(3, dtype=np.int64), np.zeros((1, 0), dtype=complex))
+    door = Door(_number)
+    assert [door(packed(arrays)), door(packed(arrays))] == [103, 103]
+    assert arrays.numbers.tolist() == [[0.0, 1.0], [2.0, 3.0]]
