@@ -114,11 +114,15 @@ class ModeLoop:
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
             if self.leaper is not None and not self.accumulation.is_closing_in(float(self.origin)):
+                before = self.origin
                 arrived, stop = self._leap(self.leaper, target, appointment)
-                if arrived or stop:
-                    if not stop:
-                        self._mark(None)
-                        self._progress(self.origin)
+                if stop:
+                    continue
+                if self.origin != before:
+                    step_size = None
+                    self._mark(None)
+                self._progress(self.origin)
+                if arrived:
                     continue
             reach = min(self.renewal, self.accumulation.reach(float(self.origin)))
             if abs(target.minus(self.origin)) > reach:
@@ -192,8 +196,6 @@ class ModeLoop:
             self._mark(None)
             self._progress(self.origin)
         if not arrived:
-            self._mark(None)
-            self._progress(self.origin)
             return False, False
         if appointment is None:
             self._tell(self.origin)

@@ -22,6 +22,9 @@ _DEFECT = (
 )
 _WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of what there is leaves no rest behind
 _RETRIES = 30
+# So many steps in a row, each shortened so often, lead nowhere: the solution ends at the edge of where its rate has a
+# value, the root of a level that falls to zero, and each series goes back and forth over it within the tolerance.
+_CREEPING, _OFTEN = 1000, 4
 
 
 class TaylorStepper:
@@ -39,6 +42,7 @@ class TaylorStepper:
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
+        self.creeping = 0
 
     def step(self) -> Step:
         """The next step, as long as the series reaches."""
@@ -51,7 +55,7 @@ class TaylorStepper:
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
         smallest = _SMALLEST * math.ulp(abs(self.bound))
-        for _ in range(_RETRIES):
+        for retry in range(_RETRIES):
             last = h >= left - smallest  # what would be left is too short for a step of its own
             h = left if last else h
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
@@ -59,6 +63,12 @@ class TaylorStepper:
                 break
             self.flow.counters.rejected += 1
             h *= _SHORTER
+        self.creeping = self.creeping + 1 if retry >= _OFTEN else 0
+        if self.creeping == _CREEPING:
+            raise StepFailure(
+                f"{_CREEPING} steps in a row were a hundredth of what their series reach, the last {h:.3g}, "
+                f"at local time {self.s!r}"
+            )
         if not h >= _SMALLEST * math.ulp(self.s):
             raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
         s0, x0 = self.s, self.x

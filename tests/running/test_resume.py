@@ -49,6 +49,21 @@ def test_a_run_in_parts_is_the_run(scene: str, name: str, tmp_path: Path) -> Non
         assert not difference(whole, part)
 
 
+@pytest.mark.parametrize("name", ["dop853", "tsit5", "rodas5p", "taylor"])
+def test_a_run_that_is_stopped_at_any_step_of_the_general_loop_goes_on(name: str) -> None:
+    """Friction along a stop is no leap: each segment begins with the step that the one before it ended with."""
+    model = hs.Model(
+        "rub",
+        states=[hs.State("x", 0.5, "v"), hs.State("v", 0, "-2 + 8*sin(5*t) - f + p")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 1})],
+        impacts=[hs.Impact("p", gap="x", restitution=0.5)],
+    )
+    whole = hs.simulate(model, (0.0, 3.0), integrator=name)
+    for steps in range(1, 60, 4):
+        part = hs.simulate(model, (0.0, 3.0), integrator=name, limits={"steps": steps})
+        assert part.status == "limit" and not difference(whole, part.resume(limits=None)), steps
+
+
 @pytest.mark.parametrize("name", COMPILED)
 def test_a_run_goes_further(name: str) -> None:
     short = hs.simulate("dfcs", (0.0, 0.0123), integrator=name)
