@@ -55,7 +55,8 @@ class TaylorStepper:
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
         smallest = _SMALLEST * math.ulp(abs(self.bound))
-        for retry in range(_RETRIES):
+        before = self.flow.counters.rejected
+        for _ in range(_RETRIES):
             last = h >= left - smallest  # what would be left is too short for a step of its own
             h = left if last else h
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
@@ -63,7 +64,7 @@ class TaylorStepper:
                 break
             self.flow.counters.rejected += 1
             h *= _SHORTER
-        self.creeping = self.creeping + 1 if retry >= _OFTEN else 0
+        self.creeping = self.creeping + 1 if self.flow.counters.rejected >= before + _OFTEN else 0
         if self.creeping == _CREEPING:
             raise StepFailure(
                 f"{_CREEPING} steps in a row were a hundredth of what their series reach, the last {h:.3g}, "
