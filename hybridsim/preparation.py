@@ -33,6 +33,7 @@ from hybridsim.solution.run import Run
 def prepared(
     model: Model,
     t_span: Any,
+    *,
     x0: Any,
     z0: Any,
     integrator: Any,
