@@ -2,10 +2,10 @@
 
     python studies/survival.py [--moments N] [--kills N] [--seed S]      (100 and 50 make docs/studies/survival.md)
 
-Every integrator that is compiled or has a fixed step, on scenes with stick and slip, impacts that come to rest, clocks
-and discrete states, jumps of an input, sliding: a run is stopped at a random step, resumed, and compared with one that
-was never stopped: times, states, events with both their sides, status. A sweep in a child process is ended by SIGKILL
-at random moments until it is done.
+Every integrator that is compiled or has a fixed step, on scenes with stick and slip, impacts that come to rest,
+clocks and discrete states, jumps of an input, sliding, friction along a stop: a run is stopped at a random step,
+resumed, and compared with one that was never stopped: times, states, events with both their sides, status. A sweep in
+a child process is ended by SIGKILL at random moments until it is done.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ SCENES = {
     "vibrating-table": 0.15,
     "bar": 2.0,
     "thrown-block": 2.0,
+    "rubbing-stop": 5.0,
 }
 LONGER = {
     **{(name, "dfcs"): 20.0 for name in ("exact", "taylor", "dop853", "tsit5")},
@@ -51,11 +52,12 @@ LONGER = {
             "vibrating-table": 20.0,
             "bar": 20.0,
             "thrown-block": 20.0,
+            "rubbing-stop": 20.0,
         }.items()
     },
 }
 # Nothing in these has a period, of which a fixed step would be a share.
-STEPS = dict.fromkeys(("sampled-servo", "bouncing-ball", "bar", "thrown-block"), 1e-3)
+STEPS = dict.fromkeys(("sampled-servo", "bouncing-ball", "bar", "thrown-block", "rubbing-stop"), 1e-3)
 INTEGRATORS = ("exact", "taylor", "dop853", "tsit5", "rodas5p", "rk4-dichotomy", "rk4-sign", "moreau")
 FIXED = ("rk4-dichotomy", "rk4-sign", "moreau")
 FORCES, SPEEDS = 40, 25  # points of the sweep that is killed, by its two parameters

@@ -16,6 +16,7 @@ from hybridsim.engine.pieces import Pieces, Segment
 from hybridsim.engine.roots import POINTS, find_roots
 from hybridsim.engine.stepping import (
     Counters,
+    Creeping,
     Dense,
     Flow,
     Method,
@@ -115,7 +116,11 @@ class SegmentRun:
         stepper = self._start(bound, first_step)
         self.counters.restarts += 1
         while True:
-            step = stepper.step()
+            try:
+                step = stepper.step()
+            except Creeping as failure:
+                self._go_back(failure.since)
+                raise
             self.counters.steps += 1
             if self.counters.steps == 1:
                 self._check_shape(step)
@@ -142,6 +147,13 @@ class SegmentRun:
                 return arrival
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
+
+    def _go_back(self, s: float) -> None:
+        """Forget what came after the end of a step."""
+        kept = self.knots.index(s)
+        del self.knots[kept + 1 :], self.states[kept + 1 :], self.interpolants[kept:]
+        self.sightings = [seen for seen in self.sightings if seen.s <= s]
+        self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
         """Refuse dense output of another shape than the contract has; its times are not as many as there are states."""

@@ -23,6 +23,14 @@ class StepFailure(Exception):
     """The integrator cannot go on from here; the message says why."""
 
 
+class Creeping(StepFailure):
+    """The integrator has led nowhere for many steps: the solution ends at the local time `since`."""
+
+    def __init__(self, message: str, since: float) -> None:
+        super().__init__(message)
+        self.since = since
+
+
 @dataclass
 class Counters:
     """What a run has cost, summed over all restarts."""

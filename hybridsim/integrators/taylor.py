@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.series import SeriesRun
-from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
@@ -42,7 +42,8 @@ class TaylorStepper:
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
-        self.creeping = 0
+        # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
+        self.creeping, self.since, self.shortest = 0, 0.0, 0.0
 
     def step(self) -> Step:
         """The next step, as long as the series reaches."""
@@ -64,11 +65,17 @@ class TaylorStepper:
                 break
             self.flow.counters.rejected += 1
             h *= _SHORTER
-        self.creeping = self.creeping + 1 if self.flow.counters.rejected >= before + _OFTEN else 0
+        if self.flow.counters.rejected < before + _OFTEN:
+            self.creeping = 0
+        elif self.creeping and h > 0.5 * self.shortest:
+            self.creeping += 1
+        else:
+            self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
-            raise StepFailure(
-                f"{_CREEPING} steps in a row were a hundredth of what their series reach, the last {h:.3g}, "
-                f"at local time {self.s!r}"
+            raise Creeping(
+                f"{_CREEPING} steps in a row were a hundredth of what their series reach, the last {h:.3g}, and "
+                f"those since local time {self.since!r} are left out",
+                self.since,
             )
         if not h >= _SMALLEST * math.ulp(self.s):
             raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
