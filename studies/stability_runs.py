@@ -28,6 +28,7 @@ HALVINGS = 16  # of the dichotomy
 EVENTS = (
     60  # a period: ten times as many as the dead band has on these motions; with more a run is called wrong
 )
+OFFSETS = 8  # of the steps against the motion, where the worst of them is taken
 PAPER_STEPS, PAPER_EPS = 1200, 8e-4  # m/s
 
 
@@ -118,9 +119,12 @@ class Case:
         """Largest relative speed: what eps_v and v0 are shares of."""
         return float(np.abs(self.samples[2]).max())
 
-    def run(self, method: Method, steps: float, zone: float) -> hs.Solution:
-        """A run of so many steps per period from the exact motion; zone is a share of the largest speed."""
-        t0, count = float(self.orbit.t[0]), method.periods
+    def run(self, method: Method, steps: float, zone: float, offset: float = 0.0) -> hs.Solution:
+        """A run of so many steps per period from the exact motion; zone is a share of the largest speed.
+
+        offset: of the first step against the motion, as a share of a step.
+        """
+        t0, count = float(self.orbit.t[0]) + offset * self.period / steps, method.periods
         options: dict[str, Any] = {"step": self.period / steps, **dict(method.options)}
         model = self.model
         if method.law:
@@ -151,12 +155,19 @@ class Case:
         velocity = self.orbit(float(self.orbit.t[0]))[1] - self.belt_speed
         return {"f": "slip+" if velocity > 0 else "slip-"}
 
-    def verdict(self, method: Method, steps: float, zone: float = 0.0) -> tuple[float, float]:
+    def worst(self, method: Method, steps: float, zone: float) -> tuple[float, float]:
+        """The verdict with the largest error, of steps that begin at several places of the motion."""
+        found = [self.verdict(method, steps, zone, k / OFFSETS) for k in range(OFFSETS)]
+        return max(found, key=lambda one: math.inf if math.isnan(one[0]) else abs(one[0]))
+
+    def verdict(
+        self, method: Method, steps: float, zone: float = 0.0, offset: float = 0.0
+    ) -> tuple[float, float]:
         """Relative error of the amplitude, the worst period with its sign, and stops in excess a period.
 
         NaN where the run ended early: a state that is no number, or events without end.
         """
-        sol = self.run(method, steps, zone)
+        sol = self.run(method, steps, zone, offset)
         if not sol.success:
             return math.nan, math.nan
         last = method.periods[1]

@@ -25,7 +25,10 @@ import numpy as np
 import hybridsim as hs
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "survival.md"
-BAR = str(Path(hs.__file__).parent / "testing" / "scenes" / "bar.toml")
+_SCENES = Path(hs.__file__).parent / "testing" / "scenes"
+FILES = {
+    name: str(_SCENES / f"{name}.toml") for name in ("bar", "rubbing-stop")
+}  # the others are models of the package
 # Ends of the runs. A compiled loop looks at its limits between stretches of a thousand segments or of some thousand
 # fixed steps, so that a run has to be several of them long to be stopped at all.
 SCENES = {
@@ -86,7 +89,7 @@ def resumed(
 ) -> tuple[int, int, list[str]]:
     """Moments at which a run was stopped, those at which it was already done, and what differed."""
     model, span = (
-        hs.load(BAR if scene == "bar" else scene),
+        hs.load(FILES.get(scene, scene)),
         (0.0, LONGER.get((integrator, scene), SCENES[scene])),
     )
     given = {"step": STEPS[scene]} if integrator in FIXED and scene in STEPS else {}

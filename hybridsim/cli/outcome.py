@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections import Counter
 from collections.abc import Container
 from dataclasses import asdict
 from pathlib import Path
@@ -147,14 +146,16 @@ def _final(solution: Solution) -> list[tuple[str, float]]:
 
 
 def _summary(solution: Solution) -> list[str]:
+    from hybridsim.solution.summary import kinds
+
     model, stats = solution.model, solution.stats
-    kinds = Counter(event.kind for event in solution.events)
+    found = {kind: n for kind, n in kinds(solution).items() if kind != "corner"}
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
         f"  integrator   {solution.integrator}",
         f"  status       {solution.status}",
-        f"  events       {len(solution.events)}"
-        + (f" ({', '.join(f'{n} {kind}' for kind, n in kinds.items())})" if kinds else ""),
+        f"  events       {sum(found.values())}"
+        + (f" ({', '.join(f'{n} {kind}' for kind, n in found.items())})" if found else ""),
     ]
     for component, modes in _shares(solution).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())

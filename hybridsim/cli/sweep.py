@@ -92,22 +92,28 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
     import hybridsim
 
+    is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     journal = folder / "sweep.journal"
     if journal.exists():
         complain(f"going on with {journal}")
-    with Progress(session) as progress, session.stopping_gently():
-        result = hybridsim.sweep(
-            model,
-            axes,
-            args.measure,
-            mode="list" if args.list else "grid",
-            workers=args.workers,
-            warm_start=args.warm_start,
-            journal=journal,
-            progress=progress.of_steps,
-            **given,
-        )
+    try:
+        with Progress(session) as progress, session.stopping_gently():
+            result = hybridsim.sweep(
+                model,
+                axes,
+                args.measure,
+                mode="list" if args.list else "grid",
+                workers=args.workers,
+                warm_start=args.warm_start,
+                journal=journal,
+                progress=progress.of_steps,
+                **given,
+            )
+    except UsageError:
+        if is_new and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
     if not result.interrupted:
         journal.unlink()
     print(result.to_json() if args.json else result.table())

@@ -7,6 +7,7 @@ somebody asks for them.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Protocol, TypeVar
 
@@ -80,6 +81,9 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
 
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component, and of one kind if that is given."""
+
+    def kinds(self) -> Counter[str]:
+        """How many there are of each kind."""
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Instants (k, 2) and states x-, x+ (k, 2, n) of those that are transitions, from that number on."""
@@ -169,6 +173,10 @@ class OccurrenceList(list[Occurrence]):
     def chosen(self, component: str, kind: str | None) -> np.ndarray:
         """Mask of those of a component and kind."""
         return np.array([o.component == component and kind in (None, o.kind) for o in self], dtype=np.bool_)
+
+    def kinds(self) -> Counter[str]:
+        """How many there are of each kind."""
+        return Counter(o.kind for o in self)
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Instants and states of those that are transitions, from that number on."""

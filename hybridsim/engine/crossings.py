@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Any
@@ -91,6 +92,13 @@ class Crossings(Sequence[Occurrence]):
         if component not in names or kind not in (None, self._system.automata[names.index(component)].kind):
             return np.zeros(len(self), dtype=np.bool_)
         return self._places[1] == names.index(component)
+
+    def kinds(self) -> Counter[str]:
+        """How many there are of each kind."""
+        found: Counter[str] = Counter()
+        for automaton, count in zip(self._system.automata, np.bincount(self._places[1]).tolist()):
+            found[automaton.kind] += count
+        return +found
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Instants and states of those that are transitions, from that number on."""

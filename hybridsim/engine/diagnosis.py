@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.trajectory import Trajectory
 
 _GROWN = 1e6  # times the size at the start (or 1): worth saying where no step succeeds any more
+_FASTER = 10.0  # times the rate at the start: what a pole makes of it, and a fall at a constant rate does not
 _SQUARED = 1e150  # norms are sums of squares
 _NEAR, _FARTHEST = 60, 1e-5  # halvings of a probe, which reaches this share of the time so far
 
@@ -40,7 +42,8 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     rates = system.flow(s, x, p, z)
     if not np.isfinite(rates).all():
         names = [system.names[i] for i in np.flatnonzero(~np.isfinite(rates))]
-        return _said(system, "the rate of", names, x, z) + power_without_value(system, names, float(here), x)
+        why = power_without_value(system, names, float(here), x) or _division_by_zero(system, names, x)
+        return _said(system, "the rate of", names, x, z) + why
     reach = _FARTHEST * max(abs(float(here)), abs(s), 1e-300)
     for k in range(_NEAR, -1, -1):
         step = reach * 0.5**k
@@ -55,11 +58,12 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         lost = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
         if len(lost):
             return _said(system, "just after,", [system.guard_title(int(g), z) for g in lost], x, z)
-    return _steep(system, s, x, p, z, rates, first, reach)
+    return _steep(system, record, s, x, p, z, rates, first, reach)
 
 
 def _steep(
     system: System,
+    record: Trajectory,
     s: float,
     x: np.ndarray,
     p: np.ndarray,
@@ -75,11 +79,20 @@ def _steep(
     ]
     if found:
         return ", ".join(found)
-    steep = np.flatnonzero(np.abs(rates) * reach > np.maximum(first, np.abs(x)))
-    found = [f"{system.names[i]} = {x[i]:.3g} has the rate {rates[i]:.3g}" for i in steep]
     none = np.zeros(system.n)
     guards = system.series(s, x, p, z, none, 0.0).guards
+    rates_before, guards_before = np.zeros(system.n), np.zeros(len(guards))
+    if record.segments:
+        start = record.segments[0]
+        rates_before = system.flow(0.0, start.x[0], start.p, start.z)
+        guards_before = system.series(0.0, start.x[0], start.p, start.z, none, 0.0).guards[:, 0]
+    steep = np.abs(rates) * reach > np.maximum(first, np.abs(x))
+    faster = np.abs(rates) > _FASTER * np.abs(rates_before)
+    found = [
+        f"{system.names[i]} = {x[i]:.3g} has the rate {rates[i]:.3g}" for i in np.flatnonzero(steep & faster)
+    ]
     poles = system.active(z) & (np.abs(guards[:, 2]) * reach > np.abs(guards[:, 1]))
+    poles &= ~(np.abs(guards[:, 0]) <= np.abs(guards_before))
     for g in np.flatnonzero(poles & (np.abs(guards[:, 1]) * reach > np.abs(guards[:, 0]))):
         found.append(f"{system.guard_title(int(g), z)} = {guards[g, 0]:.3g} has the rate {guards[g, 1]:.3g}")
     return f"{', '.join(found)}: there may be a pole" if found else ""
@@ -106,6 +119,25 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
         if value is not None and value < 0.0:  # None: it depends on what a mode sets
             remedy = f"to go on beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
             return f": '{write(node)}' has no value for {write(base)} < 0; {remedy}, or end the run there by a monitor"
+    return ""
+
+
+def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
+    """The denominator in the rates of some states that is zero whatever the modes are; empty where there is none."""
+    from hybridsim.expr.write import write
+    from hybridsim.model.meanings import Meanings
+    from hybridsim.model.one_sided import number_of
+
+    if system.model.flow is not None:
+        return ""
+    lookup = Meanings(system.model).lookup
+    values = system.model.parameter_values() | dict(zip(system.names, x.tolist(), strict=True))
+    for rate in (state.der.tree for state in system.model.states if state.name in names and state.der):
+        for node in ast.walk(rate):
+            if not isinstance(node, ast.BinOp) or not isinstance(node.op, ast.Div):
+                continue
+            if number_of(node.right, values, lookup) == 0.0:
+                return f": it divides by {write(node.right)}, which is 0"
     return ""
 
 

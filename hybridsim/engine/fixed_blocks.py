@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from copy import copy
 from typing import Any
@@ -162,6 +163,10 @@ class StepOccurrences(Sequence[Occurrence]):
         if component not in names or kind not in (None, "transition"):
             return np.zeros(len(self), dtype=np.bool_)
         return self._components == names.index(component)
+
+    def kinds(self) -> Counter[str]:
+        """How many there are of each kind: all are transitions."""
+        return Counter({"transition": len(self)})
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Instants and states of those from that number on: nothing jumps."""

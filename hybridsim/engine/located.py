@@ -19,7 +19,7 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
     zero = np.zeros(system.n)
     series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-    located = [series.guards[g] for g in arrival.fired] + [series.monitors[k] for k in arrival.stopping]
+    located = series.guards[list(arrival.fired)].tolist() + series.monitors[list(arrival.stopping)].tolist()
     for value, slope, *_ in located:
         if slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
@@ -38,9 +38,10 @@ def coincident(system: System, origin: Instant, at: Situation, fired: tuple[int,
     together: dict[int, float] = {}
     for g in map(int, np.flatnonzero(system.active(at.z))):
         value, bound = series.guards[g], series.guard_bounds[g]
+        distance, rate = value[:2].tolist()
         leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
         if g in fired or leaves:
-            together[g] = -value[0] / value[1] if value[1] != 0.0 else 0.0
+            together[g] = -distance / rate if rate != 0.0 else 0.0
     # guards within one ulp of the time are at one place of the order
     ulp = math.ulp(max(abs(float(origin.plus(at.s))), math.ulp(1.0)))
     order: dict[int, int] = {}

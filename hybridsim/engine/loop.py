@@ -385,7 +385,8 @@ class ModeLoop:
         if (after := behind(limit, self.system, before, self.p, ahead)) is None:
             return None
         ahead, found = after
-        self.notices.accumulated([self.system.automata[c.component].name for c in found.changes])
+        series = [c for c in limit.components if c != NOBODY] or [c.component for c in found.changes]
+        self.notices.accumulated([self.system.automata[c].name for c in series])
         ended = {*limit.components, *(c.component for c in found.changes)}
         self.accumulation.forget(tuple(ended))
         self.last_limits.update(dict.fromkeys(ended, limit.time))

@@ -185,6 +185,8 @@ class SegmentRun:
     def _start(self, bound: float, first_step: float | None) -> Stepper:
         if self.system.n == 0:
             return Still(bound)
+        if not np.isfinite(self.states[0]).all():
+            raise StepFailure("the state is not finite where a mode begins")
         if first_step is not None:
             first_step = min(first_step, abs(bound))
         return self.method.start(self.flow, self.states[0], bound, self.tolerances, first_step, self.watch)
@@ -334,7 +336,7 @@ class SegmentRun:
             x = self._projected(ended)
             zero = np.zeros(self.system.n)
             series = self.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0)
-            value, slope = (series.monitors if is_monitor else series.guards)[hit.number, :2]
+            value, slope = (series.monitors if is_monitor else series.guards)[hit.number, :2].tolist()
             shift = -value / slope if slope != 0.0 else math.nan
             if not math.isfinite(shift) or abs(shift) <= 2.0 * math.ulp(s):
                 break

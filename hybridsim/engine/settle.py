@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.at_zero import at_zero
 from hybridsim.engine.candidates import all_verdicts, verdicts_on
 from hybridsim.engine.decide import (
     LEAVES,
@@ -21,6 +22,7 @@ from hybridsim.engine.decide import (
     side_after,
 )
 from hybridsim.engine.differences import DifferenceSeries
+from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
 from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
@@ -73,6 +75,7 @@ class Settling:
     def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
         """Settle `fired` guards, located at zero (with the order of their times), and resets that are due, by key."""
         located = {int(g) for g in fired}
+        lost = said_by_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
         self.fired[list(located)] = True
         self.releases.locate(located)
@@ -90,8 +93,7 @@ class Settling:
         for _ in range(limit):
             failure = strike(self, open_) or self._decide(open_)
             if failure:
-                message = self._fatal_among(located)
-                return self._stop(*(("inconsistent", message) if message else failure))
+                return self._stop(*(("inconsistent", lost) if lost else failure))
             verdicts = self._judge_all()
             leaving = {c for c, v in verdicts.items() if v == LEAVES}
             for c, v in verdicts.items():
@@ -99,7 +101,7 @@ class Settling:
                     self._note_undecided(c)
             if not leaving:
                 return self._done()
-            fatal = self._fatal(leaving)
+            fatal = said_by_leaving(self.system, self.at.z, leaving, self.sides)
             if fatal:
                 return self._stop("inconsistent", fatal)
             failure = self._transitions(leaving - surfaces, [])
@@ -205,24 +207,6 @@ class Settling:
             return  # either side will do
         mode = automaton.modes[self.at.z[component]]
         self.warnings.append(f"undecided at rounding: {automaton.name} keeps mode {mode}")
-
-    def _fatal(self, leaving: set[int]) -> str | None:
-        for c in leaving:
-            automaton = self.system.automata[c]
-            mode = int(self.at.z[c])
-            for j, g in enumerate(automaton.guards[mode]):
-                if self.sides[g] < 0 and automaton.fatal[mode][j]:
-                    return automaton.fatal[mode][j]
-        return None
-
-    def _fatal_among(self, located: set[int]) -> str | None:
-        """Message of a fatal guard that was located at zero: where nothing is admissible, it says why."""
-        for automaton in self.system.automata:
-            for guards, messages in zip(automaton.guards, automaton.fatal, strict=True):
-                for guard, message in zip(guards, messages, strict=False):
-                    if message and guard in located:
-                        return message
-        return None
 
     # -- transitions by declared choices --------------------------------------------------------------------
 
@@ -347,6 +331,8 @@ class Settling:
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._decide_cluster(cluster, open_)
+                if failure and failure[0] == "inconsistent" and (more := at_zero(self, cluster) - open_):
+                    failure = self._decide_cluster(cluster, open_ | more)
                 if failure:
                     return failure
         return None

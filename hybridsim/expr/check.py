@@ -182,7 +182,7 @@ class _Checker:
             if isinstance(argument, ast.Starred):
                 raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments.")
         count = len(node.args)
-        if count < function.least or (function.most is not None and count > function.most):
+        if not function.least <= count <= function.most:
             raise self.fail(node, f"{name} takes {function.arity}, {count} given", "correct the call.")
         return self.every(self.number, node.args)
 

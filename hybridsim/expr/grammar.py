@@ -11,18 +11,21 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class Function:
-    """A function that expressions may call: its number of arguments (``most`` None: any) and its value."""
+    """A function that expressions may call: its number of arguments and its value."""
 
     least: int
-    most: int | None
+    most: int
     value: Callable[..., float]
 
     @property
     def arity(self) -> str:
         """How many arguments, for a message."""
-        if self.most is None:
-            return f"{self.least} or more arguments"
+        if self.most > self.least:
+            return f"{self.least} to {self.most} arguments"
         return f"{self.least} argument" + ("s" if self.least > 1 else "")
+
+
+_MOST = 64  # arguments of min and max: each is a level of what they are taken apart into
 
 
 def _sign(x: float) -> float:
@@ -46,8 +49,8 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "sqrt": Function(1, 1, math.sqrt),
         "abs": Function(1, 1, math.fabs),
         "sign": Function(1, 1, _sign),
-        "min": Function(2, None, min),
-        "max": Function(2, None, max),
+        "min": Function(2, _MOST, min),
+        "max": Function(2, _MOST, max),
     }
 )
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi})

@@ -25,6 +25,7 @@ from hybridsim.expr.python_tree import python_tree
 from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
+_WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s+[A-Za-z]")  # a number and a word behind it
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
 _ADVICE = {
     "^": "write a power as **.",
@@ -121,7 +122,9 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
         raise ExpressionError(
             f"not an expression: {reason}",
             place=where.at(text, column),
-            remedy="write it as in Python, e.g. 'a*sin(omega*t) - c*v'.",
+            remedy="write the number alone: a unit stands in the field 'unit', and nothing is converted."
+            if _WITH_UNIT.match(text)
+            else "write it as in Python, e.g. 'a*sin(omega*t) - c*v'.",
         ) from None
     except (RecursionError, MemoryError):
         raise ExpressionError(
@@ -148,6 +151,8 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
     allowed = set(known)
     nodes = [n for n in ast.walk(expr.tree) if isinstance(n, ast.Name) and n.id in unknown]
     node = min(nodes, key=lambda n: n.col_offset)
+    if node.id.lower() in ("nan", "inf", "infinity"):
+        raise expr.error(f"'{node.id}' is not finite", node=node, remedy="give a finite number.")
     remedy = nearest(node.id, allowed | set(FUNCTIONS) | set(CONSTANTS))
     if "did you mean" not in remedy:
         remedy = nearest(node.id, allowed)

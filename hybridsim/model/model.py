@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from numbers import Real
 from typing import Any
 
-from hybridsim.errors import ModelError, UsageError, nearest
+from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.model.component import Component, Corner
 from hybridsim.model.contact import Contact
@@ -199,7 +199,7 @@ class Model(Declared):
         names = [parameter.name for parameter in self.parameters]
         _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
         changed = (
-            replace(p, value=parse(changes[p.name])) if p.name in changes else p for p in self.parameters
+            replace(p, value=_given(changes, p.name)) if p.name in changes else p for p in self.parameters
         )
         return self._valued(parameters=tuple(changed))
 
@@ -227,7 +227,7 @@ class Model(Declared):
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
             return tuple(
-                replace(part, start=parse(changes[part.name])) if part.name in changes else part
+                replace(part, start=_given(changes, part.name)) if part.name in changes else part
                 for part in parts
             )
 
@@ -437,6 +437,16 @@ def _content(model: Model) -> tuple[object, ...]:
     )  # fmt: skip
     words = (model.title, model.source, model.description, model.look, model.duration)
     return (model.name, *parts, *words, model.flow)
+
+
+def _given(changes: Mapping[str, Any], name: str) -> Expression:
+    """A changed value; where it is no expression, that is said of its name."""
+    try:
+        return parse(changes[name])
+    except ExpressionError as error:
+        where = error.place or Place()
+        place = replace(where, file=where.file or name)
+        raise ExpressionError(error.message, place=place, remedy=error.remedy) from None
 
 
 def _known(

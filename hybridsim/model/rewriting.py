@@ -70,6 +70,7 @@ class Rewriting:
         self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
         self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
         self.count = 0
+        self._walked: dict[tuple[object, ...], tuple[ast.expr, Here, ast.expr]] = {}
 
     def primitives(self) -> tuple[Primitive, ...]:
         """What became of each primitive, in the order in which they were met."""
@@ -77,9 +78,18 @@ class Rewriting:
         return tuple(Primitive(*key[:1], tuple(where), *key[1:], place) for key, (where, place) in found)
 
     def walk(self, node: ast.expr, here: Here) -> ast.expr:
-        """The tree with what is not smooth replaced; the very same tree where nothing is."""
+        """The tree with what is not smooth replaced; the very same tree where nothing is.
+
+        Both sides of a corner hold its argument, so that what is nested is met twice at each level: it is done once.
+        """
         if not self.meanings.moves(node):
             return node
+        key = (id(node), id(here.signs), here.where, here.untouched)
+        if key not in self._walked:
+            self._walked[key] = node, here, self._walk(node, here)  # kept alive, as their numbers are the key
+        return self._walked[key][-1]
+
+    def _walk(self, node: ast.expr, here: Here) -> ast.expr:
         match node:
             case ast.Call(func=ast.Name(id="min" | "max" as name), args=[first, second, third, *others]):
                 inner = ast.Call(node.func, [first, second], [])

@@ -11,10 +11,17 @@ if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution
 
 
+def kinds(solution: Solution) -> Counter[str]:
+    """How many events of each kind there were, corners among them; none of them is made an object for that."""
+    found: Counter[str] = Counter()
+    for block in solution._trajectory.occurrences.blocks:
+        found += block.kinds()
+    return found
+
+
 def in_words(solution: Solution) -> str:
     """How the run went, where it ended, its events by kind, its cost and its warnings."""
-    kinds = Counter(occurrence.kind for occurrence in solution._trajectory.occurrences)
-    counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())) or "none"
+    counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds(solution).items())) or "none"
     counted = "not kept" if solution._save == "nothing" else counted
     lines = [
         f"Solution of {solution.model.name} by {solution.integrator}: {solution.status}",

@@ -77,3 +77,9 @@ def test_bad_usage(hybridsim: Callable, argv: list[str], message: str) -> None:
     code, out, err = hybridsim("sweep", "dfcs", *argv)
     assert (code, out) == (2, ""), err
     assert message in err
+
+
+def test_a_sweep_that_is_refused_leaves_no_folder(hybridsim: Callable, tmp_path: Path) -> None:
+    code, _, err = hybridsim("sweep", "dfcs", "F0=20:30:3", "--measure", "amplitude.q", "--out", "q")
+    assert code == 2 and "amplitude.q" in err
+    assert not (tmp_path / "q").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from itertools import pairwise
 
 import pytest
 
@@ -180,3 +181,46 @@ def test_a_result_with_a_name_that_no_file_can_have(place: str, capsys: pytest.C
     assert main(["run", "belt", "--t-end", "0.01", "--csv", place]) == 2
     said = capsys.readouterr().err
     assert "--csv" in said and "too long" in said and len(said) < 3000
+
+
+def test_corners_inside_one_another_are_met_once_each() -> None:
+    """Both sides of an abs hold its argument: twenty inside one another were taken apart a million times and more."""
+    inner = "y - 1"
+    for _ in range(20):
+        inner = f"y - abs({inner})"
+    states = [hs.State("x", 2, f"-x*({inner})"), hs.State("y", 0, "1")]
+    sol = hs.simulate(hs.Model("nested", states), (0.0, 0.1), integrator="dop853")
+    # from y = 0 on the innermost is y - |y - 1| = 2*y - 1 < 0, the next y - (1 - 2*y) = 3*y - 1 < 0, and so on
+    assert sol.y[0, -1] == pytest.approx(_decay(0.1, 20), rel=1e-8)
+
+
+def _decay(end: float, depth: int) -> float:
+    """x of dx/dt = -x*g(t) from 2, g = t - |t - ... |t - 1||, by a sum over its linear pieces."""
+
+    def g(t: float) -> float:
+        value = t - 1
+        for _ in range(depth):
+            value = t - abs(value)
+        return value
+
+    corners = sorted({0.0, end, *(k * end / 20000 for k in range(20001))})
+    return 2 * math.exp(-math.fsum(0.5 * (b - a) * (g(a) + g(b)) for a, b in pairwise(corners)))
+
+
+def test_more_arguments_than_min_and_max_are_taken_apart_into() -> None:
+    many = ", ".join(f"{k}*x" for k in range(300))
+    with pytest.raises(hs.ModelError, match="max takes 2 to 64 arguments, 300 given"):
+        hs.Model.from_toml(f'[states]\nx = {{ start = 2, der = "max({many})" }}\n')
+
+
+@pytest.mark.parametrize("integrator", ["scipy-rk45", "dop853", "taylor"])
+def test_a_state_that_a_surface_leaves_without_a_number(integrator: str) -> None:
+    model = hs.Model.from_toml("""
+[states]
+x = { start = 2e150, der = "(t/4 - u)*x - y" }
+y = { start = 0, der = "(t/4 - u)*y + x" }
+[surfaces]
+u = "y**0.5"
+""")
+    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"seconds": 2, "steps": 5000})
+    assert sol.message

@@ -103,3 +103,19 @@ def test_a_fixed_step_is_not_above_the_longest(integrator: str) -> None:
     with pytest.raises(UsageError, match=f"max_step is 0.0001, and the fixed step of {integrator} is 0.0002"):
         hs.simulate("dfcs", SPAN, integrator=integrator, step=2e-4, max_step=1e-4)
     assert hs.simulate("dfcs", SPAN, integrator=integrator, step=1e-4, max_step=1e-4).success
+
+
+@pytest.mark.parametrize(
+    ("value", "said"), [(float("nan"), "F0: nan is not finite"), ("22 N", "F0: not an expression")]
+)
+def test_a_value_that_is_none_is_said_of_its_parameter(value: object, said: str) -> None:
+    with pytest.raises(hs.ModelError, match=said) as caught:
+        hs.simulate("dfcs", (0.0, 0.1), params={"F0": value})
+    assert "finite" in str(caught.value) or "a unit stands in the field 'unit'" in str(caught.value)
+
+
+def test_events_of_what_does_not_exist_are_refused() -> None:
+    sol = hs.simulate("dfcs", (0.0, 0.01))
+    assert len(sol.event_times("f")) == len(sol.events)
+    with pytest.raises(hs.UsageError, match="no component, monitor or schedule 'g'"):
+        sol.event_times("g")

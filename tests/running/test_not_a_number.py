@@ -128,3 +128,27 @@ def test_a_state_that_cannot_be_squared() -> None:
 def test_steps_without_end_are_refused(name: str, given: dict[str, float], what: str) -> None:
     with pytest.raises(hs.UsageError, match=rf"^{what} is 1e-\d+: from 0 to 1 it would take 1e\+\d+ steps"):
         hs.simulate("dfcs", (0.0, 1.0), integrator=name, **given)
+
+
+@pytest.mark.parametrize("name", ["cvode-bdf", "cvode-adams"])
+def test_a_fall_to_rest_is_no_pole(name: str) -> None:
+    """CVODE gives up among the last bounces, where gap and speed are next to zero and nothing grows."""
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", 1.25, "w"), hs.State("w", 0, "-10 + p")],
+        impacts=[hs.Impact("p", gap="h", restitution=0.5)],
+    )
+    sol = hs.simulate(ball, (0.0, 3.0), integrator=name)
+    assert sol.status == "step-failure" and sol.t_end == pytest.approx(1.5, abs=1e-3)
+    assert "pole" not in sol.message
+
+
+def test_what_a_rate_divides_by_is_named() -> None:
+    body = hs.Model(
+        "body",
+        parameters={"m": 1.0},
+        states=[hs.State("x", 1, "v"), hs.State("v", 0, "(-x - v)/m")],
+    )
+    for name in ("exact", "dop853", "scipy-rk45"):
+        sol = hs.simulate(body, (0.0, 1.0), params={"m": 0}, integrator=name)
+        assert sol.status == "step-failure" and "it divides by m, which is 0" in sol.message

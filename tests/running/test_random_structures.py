@@ -60,3 +60,14 @@ def test_friction_that_rises_only_near_rest_is_met_by_series() -> None:
     draw = s.draw(np.random.default_rng([SEED, 188, 41]))
     model = hs.Model.from_toml(s.toml)
     assert not distance(s, draw, run(model, draw, "taylor"), run(model, draw, "dop853"))
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-9, 1e-10])
+def test_a_relay_that_a_stick_holds_still_leaves_with_it(rtol: float) -> None:
+    """The relay's function stays at zero to rounding while the body sticks, and no step crosses it at the release."""
+    s = structure(177, SEED)
+    draw = s.draw(np.random.default_rng([SEED, 177, 30]))
+    model = hs.Model.from_toml(s.toml)
+    sol = hs.simulate(model, (0.0, END), params=draw.params, x0=draw.start, integrator="dop853", rtol=rtol)
+    assert sol.status == "finished"
+    assert judged(s, draw, sol)[0] == "agrees"

@@ -1,0 +1,29 @@
+"""What guards say whose zero ends a run, where the model has no mode to go to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from hybridsim.engine.system import System
+
+
+def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray) -> str | None:
+    """By the first of the components that leave their modes through such a guard."""
+    for c in leaving:
+        automaton, mode = system.automata[c], int(z[c])
+        for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
+            if message and sides[guard] < 0:
+                return message
+    return None
+
+
+def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
+    """By one that was located at zero, in the modes z before: where nothing is admissible, it says why."""
+    for automaton, mode in zip(system.automata, z.tolist()):
+        if mode >= 0:
+            for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
+                if message and guard in located:
+                    return message
+    return None
