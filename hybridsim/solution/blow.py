@@ -13,6 +13,8 @@ from hybridsim.model.one_sided import number_of
 from hybridsim.solution.candidate import views
 
 if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Change
+    from hybridsim.engine.system import System
     from hybridsim.model import Model
     from hybridsim.solution.candidate import GuardView
     from hybridsim.solution.stages import Stage
@@ -36,6 +38,21 @@ def restitution(model: Model, stage: Stage, c: int, blow: GuardView) -> str:
     e = declared.text if value is None or not declared.names else f"{declared.text} = {value:.6g}"
     speeds = [f"{max(speed, 0.0):.6g} {unit}".rstrip() for speed in (before, after.derivatives[1])]
     return f" with restitution {e}, the gap closing at {speeds[0]} and opening at {speeds[1]}"
+
+
+def is_struck(system: System, change: Change) -> bool:
+    """Whether a change is that of a contact that an impact strikes."""
+    automaton = system.automata[change.component]
+    return change.guard == "gap" and automaton.is_unilateral and change.source != automaton.hold
+
+
+def errors_beside(stage: Stage, c: int) -> np.ndarray:
+    """Bounds of the rounding of the states, infinite for those that no impulse around a contact can change."""
+    system, at = stage.settling.system, stage.before
+    cluster = next(cluster for cluster in system.clusters if c in cluster)
+    _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))
+    can_change = changes[[system.surface_of.index(k) for k in cluster]].any(axis=0)
+    return np.where(can_change, at.x_error, np.inf)
 
 
 def friction(stage: Stage, c: int) -> str:

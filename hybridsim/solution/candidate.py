@@ -54,7 +54,7 @@ class GuardView:
     def in_numbers(self) -> str:
         """Its value, first and second rate as they are, and what rounding of the states makes of the value."""
         numbers = zip(("g", "g'", "g''"), self.derivatives, self.units, strict=False)
-        terms = [f"{name} = {value:.3g} {unit}".rstrip() for name, value, unit in numbers]
+        terms = [f"{name} = {value + 0.0:.3g} {unit}".rstrip() for name, value, unit in numbers]
         rounding = f"{self.bounds[0]:.1g} {self.units[0]}".rstrip()
         terms[0] += f" (rounding of the states alone makes {rounding})"
         return f"{self.guard} (g = {self.text}): {', '.join(terms)}"

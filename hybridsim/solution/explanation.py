@@ -13,6 +13,7 @@ from hybridsim.engine.decide import side_after
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.errors import UsageError
 from hybridsim.model.units import units_of
+from hybridsim.solution.blow import errors_beside, is_struck
 from hybridsim.solution.candidate import candidate, views
 from hybridsim.solution.grazing import grazed
 from hybridsim.solution.one_instant import BY_RESET, changes_in_words, fired_guards
@@ -140,7 +141,12 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
         x_minus, x_plus = change.x_minus, change.x_plus  # its own round: others may go before it, or follow
     texts = {name: f" (= {reset.text})" for name, reset in resets.items() if reset.names}
     # less than the error is what rounding left of a zero, set exactly
-    changed = changes_in_words(solution.names, x_minus, x_plus, at.x_error, texts)
+    error = (
+        errors_beside(stage, change.component)
+        if change is not None and is_struck(system, change)
+        else at.x_error
+    )
+    changed = changes_in_words(solution.names, x_minus, x_plus, error, texts)
     blow = next((view for view in fired_views if view.mode == f"{event.component} {event.source}"), None)
     why = reason(solution.model, occurrence, place, decision, changed, bool(choices), blow)
     return Explanation(event, fired_views, candidates, why, state, choices)
@@ -157,6 +163,10 @@ def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
     found = settling.decision_of(c, number)
     if found is None and system.is_unilateral[c] and change.guard != BY_RESET:
         found = settling.decision_after(c, number)
+        if found is not None and any(
+            one.component == c for one in settling.changes[found.first : found.last]
+        ):
+            return None  # which has an event of its own
     return found
 
 

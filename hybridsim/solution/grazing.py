@@ -30,7 +30,7 @@ def grazed(solution: Solution, occurrence: Occurrence) -> tuple[GuardView, ...]:
         if automaton.modes[mode] != occurrence.source:
             continue
         s = occurrence.instant.minus(segment.origin)
-        error = 4.0 * UNIT * np.abs(segment.x).max(axis=0)
+        error = 4.0 * UNIT * np.maximum(np.abs(segment.x).max(axis=0), np.abs(x))
         at = Situation(s, x.copy(), segment.p, segment.z, error, abs(s) * UNIT)
         guard = automaton.guards[mode][automaton.guard_names[mode].index(occurrence.guard)]
         return tuple(views(system, at, segment.z, [guard], np.zeros(system.guard_count, int)))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from hybridsim.engine.decide import FINE
-from hybridsim.solution.blow import friction, restitution
+from hybridsim.solution.blow import errors_beside, friction, is_struck, restitution
 from hybridsim.solution.candidate import views, way
 from hybridsim.solution.one_instant import BY_RESET, changes_in_words, resets_before
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from hybridsim.solution.stages import Place
     from hybridsim.solution.watched import Decision, Look
 
-_IMPACT = ("gap", "impact")  # the guards of the changes that an impact makes
 _RULE = "the fewest modes change, and where as many do, what holds comes before what slips"
 
 
@@ -105,7 +104,8 @@ def _led(place: Place) -> tuple[list[str], list[str]]:
     resets, struck = resets_before(settling, change), _impacts(system, changes, change)
     nouns = [resets] if resets else []
     if struck and is_decided:
-        moved = changes_in_words(system.names, stage.before.x, stage.outcome.x, 2.0 * stage.before.x_error)
+        error = errors_beside(stage, change.component)
+        moved = changes_in_words(system.names, stage.before.x, stage.outcome.x, error)
         nouns.append(f"the impact of {' and '.join(struck)}" + (f" ({moved})" if moved else ""))
     return clauses, nouns
 
@@ -123,14 +123,8 @@ def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
 
 def _impacts(system: System, changes: Sequence[Change], of: Change) -> list[str]:
     """The contacts that were struck, other than the one whose change it is."""
-    return [
-        system.automata[one.component].name
-        for one in changes
-        if one.guard in _IMPACT[:1]
-        and system.is_unilateral[one.component]
-        and one.source != system.automata[one.component].hold
-        and one.component != of.component
-    ]
+    struck = [one.component for one in changes if is_struck(system, one) and one.component != of.component]
+    return [system.automata[c].name for c in struck]
 
 
 def _decided(system: System, decision: Decision, c: int) -> str:
