@@ -181,6 +181,30 @@ def test_a_contact_that_is_set_moving_names_what_did_it(by: str) -> None:
     )
 
 
+@ALL
+def test_a_belt_that_jumps_away_gives_a_contact_its_velocity(integrator: str) -> None:
+    belt = hs.Input("b", "table", times=[0, 1, 1, 3], values=[0, 0, 2, 2])
+    model = hs.Model(
+        "m", states=[hs.State("v", 0, "-f")], inputs=[belt], contacts=[rubbing(velocity="v - b")]
+    )
+    left = why(hs.simulate(model, (0, 1.5), integrator=integrator), "f", "slip-")
+    assert left.reason == (
+        "an input has a knot here (of b), where b jumps from 0 to 2, which gave it a velocity, to the side of slip-: "
+        "nothing is left to decide"
+    )
+
+
+@ALL
+def test_two_inputs_with_a_knot_at_one_instant_name_the_one_that_jumps(integrator: str) -> None:
+    ramp = hs.Input("r", "table", times=[0, 1, 3], values=[0, 0, 2])
+    states = [X, hs.State("v", 0, "-f + F + r", nominal=1)]
+    model = hs.Model("m", states=states, inputs=[ramp, FROM_0_TO_MINUS_5], contacts=[rubbing()])
+    pushed = why(hs.simulate(model, (0, 1.2), integrator=integrator), "f", "slip-")
+    assert pushed.reason.startswith(
+        "an input has a knot here (of r, F), where F jumps from 0 to -5: slip- is"
+    )
+
+
 # -- impacts ------------------------------------------------------------------------------------------------------
 
 
