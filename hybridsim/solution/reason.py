@@ -41,17 +41,17 @@ def reason(
     automaton = system.automata[c]
     after = automaton.modes[outcome.z[c]]
     led = _Led(*_led(place)) if change is not None else _Led([stage.due] if stage.due else [], [])
-    if change is not None and change.guard == BY_RESET:
+    how = change.guard if change is not None and automaton.has_surface else ""
+    if how == BY_RESET:
         is_contact = any(contact.name == automaton.name for contact in model.contacts)
         gave = "gave it a velocity" if is_contact else "moved the state off its surface"
         gave += f", to the side of {occurrence.target}: nothing is left to decide"
         return f"{led.subject or 'a reset at this instant'} {gave}"
-    if change is not None and change.guard == "impact":
+    if how == "impact":
         return f"{led.subject or 'an impact at this instant'} made its gap open: nothing is left to decide"
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
-        if (
-            after != occurrence.target and change is None
-        ):  # the run had it closer to the rounding of its own steps
+        # the run had it closer to the rounding of its own steps
+        if after != occurrence.target and change is None:
             return f"an impact after which the gap opens by less than its rounding: {occurrence.target} from here on"
         said = restitution(model, stage, c, blow) if blow else ""
         said = f"an impact{said}: its impulses change {changed}{friction(stage, c)}; {occurrence.target} just after"
@@ -133,12 +133,8 @@ def _decided(system: System, decision: Decision, c: int) -> str:
     whose = _whose(system, c, int(decision.z[c]))
     if taken is not None and taken.verdict != FINE:
         shown = _open_modes(system, taken) or whose
-        kept = (
-            "a mode is kept where it can be"
-            if fine
-            else "nothing else is better: a mode is kept where it can be"
-        )
-        return f"{shown}: a question of rounding, and {kept}"
+        better = "" if fine else "nothing else is better: "
+        return f"{shown}: a question of rounding, and {better}a mode is kept where it can be"
     if len(fine) > 1:
         return _of_several(system, decision)
     if not fine:

@@ -128,7 +128,7 @@ class Watched(Settling):
         return found
 
     def decision_of(self, component: int, number: int) -> Decision | None:
-        """The decision that made a change, by its number, or that came next of what an impact left to be decided."""
+        """The decision that made a change of a component, by its number; None where no decision did."""
         for decision in self.decisions:
             if component in decision.components and number < decision.last:
                 return decision if decision.first <= number else None

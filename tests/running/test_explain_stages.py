@@ -151,6 +151,14 @@ def test_a_decision_that_leads_to_another_one_at_its_instant(integrator: str) ->
     assert turned.reason.startswith("guard on of sw led to on: f slip- is the only mode")
 
 
+@pytest.mark.parametrize("name", ["reset", "impact", "gap"])
+def test_a_guard_may_have_the_name_of_what_an_impact_does(name: str) -> None:
+    modes = [hs.Mode("off", hs.Guard(name, "0.5 - x", hs.Choice("on"))), hs.Mode("on")]
+    component = hs.Component("sw", modes, initial="off")
+    sol = hs.simulate(hs.Model("m", states=[hs.State("x", 0, "1")], components=[component]), (0, 1))
+    assert sol.explain(0).reason == f"guard {name} leads to on"
+
+
 def test_a_guard_that_a_schedule_moved() -> None:
     model = hs.Model(
         "m",
