@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
     from hybridsim.engine.system import System
 
-_LOCATED = (
+LOCATED = (
     1e6  # times its rounding: a guard that was searched for is closer to zero, what a reset moves is not
 )
 _STEPS = 2.0  # of a method that drives its own runs: it dates events to its steps
@@ -49,17 +49,7 @@ def fired_guards(
     slopes = np.abs(system.flow(s, x, segment.p, segment.z)) if system.n else np.zeros(0)
     x_error = 4.0 * UNIT * np.abs(segment.x).max(axis=0) + s_error * slopes
     series = system.series(s, x, segment.p, segment.z, x_error, s_error)
-    return [g for g in sorted(named) if not abs(series.guards[g, 0]) > _LOCATED * series.guard_bounds[g, 0]]
-
-
-def change_of(settling: Settling, occurrence: Occurrence) -> Change | None:
-    """The change that an occurrence records, of an instant that is settled again; None where it has none."""
-    for change in settling.changes:
-        automaton = settling.system.automata[change.component]
-        modes = automaton.modes[change.source], automaton.modes[change.target]
-        if automaton.name == occurrence.component and modes == (occurrence.source, occurrence.target):
-            return change
-    return None
+    return [g for g in sorted(named) if not abs(series.guards[g, 0]) > LOCATED * series.guard_bounds[g, 0]]
 
 
 def resets_before(settling: Settling, change: Change) -> str:

@@ -1,0 +1,140 @@
+"""What is shown of a decision: guards along the flow of a mode, and the combinations of modes that were looked at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.decide import FINE, LEAVES, side_after
+from hybridsim.model.switching import ATTRACTION
+from hybridsim.model.units import rate_of, time_unit, unit_of
+
+if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Situation
+    from hybridsim.engine.system import System
+    from hybridsim.solution.watched import Decision, Look
+
+_WORDS = {FINE: "admissible", LEAVES: "not admissible"}
+_OPEN = "a question of rounding"
+
+
+@dataclass(frozen=True)
+class GuardView:
+    """A guard along the flow of one mode, at the instant of an event.
+
+    Parameters
+    ----------
+    mode, guard, text : whose guard it is, and its expression.
+    derivatives, bounds : its value and derivatives with respect to time (4,), and bounds of their rounding errors.
+    decreed : how many of them, from the first on, the event itself makes zero: they are not looked at.
+    side : its sign just after, 0 where that is a question of rounding; order : of the derivative that decides.
+    units : of the guard and its derivatives (4,), empty where they are not known.
+    """
+
+    mode: str
+    guard: str
+    text: str
+    derivatives: tuple[float, ...]
+    bounds: tuple[float, ...]
+    decreed: int
+    side: int
+    order: int
+    units: tuple[str, ...] = ("", "", "", "")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its sign just after is a question of rounding: nothing decides, and it is not zero identically."""
+        left = (*self.derivatives[self.decreed :], *self.bounds[self.decreed :])
+        return self.side == 0 and any(left)
+
+    def in_numbers(self) -> str:
+        """Its value, first and second rate as they are, and what rounding of the states makes of the value."""
+        numbers = zip(("g", "g'", "g''"), self.derivatives, self.units, strict=False)
+        terms = [f"{name} = {value + 0.0:.3g} {unit}".rstrip() for name, value, unit in numbers]
+        rounding = f"{self.bounds[0]:.1g} {self.units[0]}".rstrip()
+        terms[0] += f" (rounding of the states alone makes {rounding})"
+        return f"{self.guard} (g = {self.text}): {', '.join(terms)}"
+
+    def __str__(self) -> str:
+        if not self.is_open and self.side == 0:
+            still = "g = 0 exactly" if self.decreed else "g = 0"
+            return f"{self.guard} (g = {self.text}) stays >= 0: {still} and does not move"
+        terms = []
+        for k, (value, bound) in enumerate(zip(self.derivatives, self.bounds, strict=True)):
+            name, unit = "g" + "'" * k, f" {self.units[k]}" if self.units[k] else ""
+            if k < self.decreed:
+                terms.append(f"{name} = 0 exactly")
+            elif k == self.order:
+                terms.append(f"{name} = {value:.3g}{unit}")
+                break
+            elif math.isnan(value + bound):
+                terms.append(f"{name} is not a number")
+                break
+            else:
+                terms.append(f"{name} = 0 within rounding ({bound:.1g}{unit})")
+        sign = {1: "stays >= 0", -1: "goes negative", 0: "is undecided"}[self.side]
+        return f"{self.guard} (g = {self.text}) {sign}: {', '.join(terms)}"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Modes that could hold just after, what their guards say of it, and whether they were taken."""
+
+    modes: dict[str, str]
+    verdict: str
+    guards: tuple[GuardView, ...]
+    taken: bool = False
+
+
+def views(
+    system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
+) -> Iterable[GuardView]:
+    """Guards along the flow of the modes z, those that the event decrees to be zero taken as such."""
+    series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error)
+    time = time_unit(system.model)
+    for g in guards:
+        c = int(system.owner[g])
+        automaton, mode = system.automata[c], int(z[c])
+        j = automaton.guards[mode].index(g)
+        values, bounds = series.guards[g], series.guard_bounds[g]
+        side, order = side_after(values, bounds, int(decreed[g]))
+        declared = system.model.all_components()[c].modes[mode].guards[j].expr
+        unit = "" if declared.text.startswith(ATTRACTION) else unit_of(system.model, declared)
+        factorials = [math.factorial(k) for k in range(len(values))]
+        yield GuardView(
+            f"{automaton.name} {automaton.modes[mode]}",
+            automaton.guard_names[mode][j],
+            _in_words(declared.text),
+            tuple(float(v) * f for v, f in zip(values, factorials, strict=True)),
+            tuple(float(b) * f for b, f in zip(bounds, factorials, strict=True)),
+            int(decreed[g]),
+            int(side),
+            int(order),
+            tuple(rate_of(unit, time, k) for k in range(len(values))),
+        )
+
+
+def _in_words(text: str) -> str:
+    """The expression of a guard; that of a surface's attraction is one of the program's own."""
+    if not text.startswith(ATTRACTION):
+        return text
+    return f"pull of {text.removeprefix(ATTRACTION)}, half the sum of how fast its two sides drive towards it"
+
+
+def candidate(system: System, decision: Decision, look: Look) -> Candidate:
+    """One combination that a decision looked at, with the values that it had then."""
+    guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
+    shown = tuple(views(system, look.at, look.z, guards, look.decreed))
+    modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}
+    return Candidate(modes, _WORDS.get(look.verdict, _OPEN), shown, decision.has_taken(look))
+
+
+def way(system: System, look: Look) -> str:
+    """The modes of a combination in words."""
+    return ", ".join(
+        f"{system.automata[c].name} {system.automata[c].modes[look.z[c]]}" for c in look.components
+    )

@@ -1,0 +1,245 @@
+"""What was settled at one instant, once more and in its order: what was located, resets of monitors, what was due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.input_jumps import surfaces_jump
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.outcome import Situation
+from hybridsim.engine.rows import evaluate_rows
+from hybridsim.integrators.base import Integrator
+from hybridsim.solution.one_instant import LOCATED
+from hybridsim.solution.watched import Watched
+
+if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Change, Outcome
+    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.system import System
+    from hybridsim.engine.timepair import Instant
+    from hybridsim.solution.run import Run
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One settling at an instant.
+
+    Parameters
+    ----------
+    before : the situation that it began with.
+    fired : whether guards were located at zero.
+    due : in words, what set it off other than guards at zero; empty where nothing did.
+    """
+
+    before: Situation
+    settling: Watched
+    outcome: Outcome
+    fired: bool = False
+    due: str = ""
+
+    @property
+    def changes(self) -> list[Change]:
+        """The changes that the run records as transitions."""
+        return [c for c in self.settling.changes if not self.settling.system.is_corner[c.component]]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in the stages of its instant a recorded transition was made; no change where it was not found again."""
+
+    stage: Stage
+    change: Change | None
+
+
+def place_of(
+    run: Run, segment: Segment, together: Sequence[Occurrence], fired: list[int], occurrence: Occurrence
+) -> Place | None:
+    """The stage in which a transition was made, of all the occurrences of its instant; None where there is none."""
+    instant = _Instant(run, segment, together)
+    stages = list(instant.located(fired))
+    found, left = _matched(run.system, instant.transitions, stages)
+    if left and type(run.method).run is Integrator.run:
+        crossed = instant.crossed(stages[-1]) if stages else None
+        stages += [] if crossed is None else [crossed]
+        found, left = _matched(run.system, instant.transitions, stages)
+        stages += instant.due(stages[-1] if stages else None, left[0] if left else None)
+        found, left = _matched(run.system, instant.transitions, stages)
+    number = next(k for k, o in enumerate(instant.transitions) if o is occurrence)
+    if number in found:
+        return found[number]
+    return Place(stages[0], None) if fired else None
+
+
+def _matched(
+    system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
+) -> tuple[dict[int, Place], list[Occurrence]]:
+    """Where each recorded transition, by number, was made; and those that were not found."""
+    made = [Place(stage, change) for stage in stages for change in stage.changes]
+    found, left, start = {}, [], 0
+    for number, occurrence in enumerate(transitions):
+        for k in range(start, len(made)):
+            if _is_of(system, made[k].change, occurrence):
+                found[number], start = made[k], k + 1
+                break
+        else:
+            left.append(occurrence)
+    return found, left
+
+
+def _is_of(system: System, change: Change | None, occurrence: Occurrence) -> bool:
+    assert change is not None
+    automaton = system.automata[change.component]
+    modes = automaton.modes[change.source], automaton.modes[change.target]
+    return automaton.name == occurrence.component and modes == (occurrence.source, occurrence.target)
+
+
+class _Instant:
+    """An instant of a run: the segment that ended there, and what was recorded."""
+
+    def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
+        self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
+        self.transitions = [o for o in together if o.kind == "transition"]
+        model = self.system.model
+        names = {o.component: o.direction for o in together if o.kind == "monitor"}
+        resetting = [
+            k
+            for k, m in enumerate(model.monitors)
+            if m.name in names and ("monitor", k) in self.system.resets
+        ]
+        at = situation(self.system, segment, [])
+        self.monitors = {k: names[model.monitors[k].name] for k in resetting}
+        series = self.system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error) if resetting else None
+        self.stopping = [
+            k
+            for k in resetting
+            if series is not None
+            and not abs(series.monitors[k, 0]) > LOCATED * max(series.monitor_bounds[k, 0], math.ulp(0.0))
+        ]
+
+    def located(self, fired: list[int]) -> list[Stage]:
+        """Of guards that were located at zero, and monitors."""
+        if not (fired or self.stopping):
+            return []
+        return [self._settled(situation(self.system, self.segment, fired), fired, self.stopping, ())]
+
+    def crossed(self, stage: Stage) -> Stage | None:
+        """Of the resets of monitors that a stage carried to their other side; None where it did so to none."""
+        sides = stage.outcome.monitor_sides
+        crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] == way]
+        if not crossed:
+            return None
+        s, of = stage.before.s, stage.outcome
+        at = Situation(s, of.x.copy(), of.p, of.z.copy(), of.x_error, math.ulp(s))
+        return self._settled(at, [], crossed, ())
+
+    def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
+        """Of what was due at the instant, and what its resets led to; `first`: the first transition of it."""
+        system, segment, forward = self.system, self.segment, self.task.forward
+        names = [schedule.name for schedule in system.model.schedules]
+        scheduled = [o for o in self.together if o.kind == "scheduled"]
+        schedules = [names.index(o.component) for o in scheduled]
+        instant = self.together[0].instant
+        knots = _knots(system, segment, instant, forward)
+        if first is None or not (schedules or knots):
+            return []
+        x = (scheduled[0] if scheduled else first).x_minus
+        z = segment.z if stage is None else stage.outcome.z
+        before = segment.p if stage is None else stage.outcome.p
+        error = situation(system, segment, []).x_error
+        error[system.evaluated(z)] = 0.0
+        p = system.vector(instant, system.discrete(before), forward)
+        at = Situation(0.0, x.copy(), p, z.copy(), error, math.ulp(0.0))
+        found = self._settled(at, [], [], schedules, instant, _said_of(system, knots, instant, at, forward))
+        crossed = self.crossed(found)
+        return [found] if crossed is None else [found, crossed]
+
+    def _settled(
+        self,
+        at: Situation,
+        fired: Sequence[int],
+        monitors: Sequence[int],
+        schedules: Sequence[int],
+        instant: Instant | None = None,
+        inputs: str = "",
+    ) -> Stage:
+        """One settling; it jumps to begin with where an input carries a surface away."""
+        system, model = self.system, self.system.model
+        keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
+        before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
+        said = [
+            f"{model.monitors[k].name} crossed zero{_set_by(system, ('monitor', k), at)}" for k in monitors
+        ]
+        said += [
+            f"{model.schedules[k].name} was due at this instant{_set_by(system, ('schedule', k), at)}"
+            for k in schedules
+        ]
+        settling = Watched(system, at, at.z.copy(), self.task.forward)
+        if instant is not None:
+            settling.jumped = surfaces_jump(system, instant, at, self.task.forward)
+        outcome = settling.run(fired, list(keys))
+        return Stage(
+            before, settling, outcome, bool(fired), " and ".join([*said, *([inputs] if inputs else [])])
+        )
+
+
+def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
+    """The state before, with bounds of its rounding as the run itself has them."""
+    s, x = float(segment.s[-1]), segment.x[-1].copy()
+    s_error = 2.0 * math.ulp(s)
+    series = system.series(s, x, segment.p, segment.z, np.zeros(system.n), 0.0)
+    for value, slope, *_ in (series.guards[g] for g in fired):
+        if slope != 0.0 and math.isfinite(value / slope):
+            s_error = max(s_error, abs(value / slope))
+    slopes = np.abs(system.flow(s, x, segment.p, segment.z)) if system.n else np.zeros(0)
+    x_error = 4.0 * UNIT * np.abs(segment.x).max(axis=0) + s_error * slopes
+    held = system.evaluated(segment.z)
+    x_error[held] = UNIT * np.abs(x[held])
+    return Situation(s, x, segment.p.copy(), segment.z.copy(), x_error, s_error)
+
+
+def _set_by(system: System, key: tuple[Any, ...], at: Situation) -> str:
+    """What one reset sets, in words: from, to."""
+    if key not in system.resets:
+        return ""
+    x, p = at.x.copy(), at.p.copy()
+    system.apply_reset(key, at.s, at.x, at.p, at.z, x, p)
+    names = [*system.names, *(d.name for d in system.model.discrete)]
+    before, after = (np.concatenate([a, b[system.layout.discrete_slice]]) for a, b in ((at.x, at.p), (x, p)))
+    set_ = [names.index(name) for name in system.resets[key][1]]
+    return " and set " + ", ".join(f"{names[k]} from {before[k]:.6g} to {after[k]:.6g}" for k in set_)
+
+
+def _knots(system: System, segment: Segment, instant: Instant, forward: bool) -> list[str]:
+    """The inputs that have a knot at an instant."""
+    found = []
+    for declared, signal in zip(system.model.inputs, system.signals, strict=True):
+        knot = signal.next_knot(segment.start, forward)
+        if knot is not None and abs(knot.minus(instant)) <= 2.0 * math.ulp(float(instant)):
+            found.append(declared.name)
+    return found
+
+
+def _said_of(system: System, names: list[str], instant: Instant, at: Situation, forward: bool) -> str:
+    """That inputs have a knot, and the values of those that jump there."""
+    if not names:
+        return ""
+    vectors = (system.vector(instant, system.discrete(at.p), not forward), at.p)
+    known, values = system.quantities, []
+    for p in vectors:
+        out = np.empty((1, len(known)))
+        evaluate_rows(
+            system.address("quantities"), np.zeros(1), np.ascontiguousarray(at.x[None]), p, at.z, out
+        )
+        values.append(out[0])
+    jumps = [
+        f"{name} jumps from {values[0][k]:.6g} to {values[1][k]:.6g}"
+        for name in names
+        if name in known and values[0][k := known.index(name)] != values[1][k]
+    ]
+    said = f"an input has a knot here (of {', '.join(names)})"
+    return said + (f", where {' and '.join(jumps)}" if jumps else "")
