@@ -159,7 +159,7 @@ def carry_out(
             tolerances = cut_short(tolerances, done[-1][0])
             break  # no runaway, only more work than there is time for
         done.append((setting, measured))
-        if "rtol" not in setting.options:
+        if "rtol" not in setting.options or "cooldown" in setting.options:
             continue
         if waiting and measured.steps > scene.effort:
             tolerances = cut_short(tolerances, setting)
