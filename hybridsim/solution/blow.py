@@ -109,5 +109,7 @@ def friction(stage: Stage, c: int) -> str:
             said.append(f"the impulse of {name} is {size}, of {bound} = {limit:.6g} at most")
         else:
             does = "stops it" if abs(before) > rest else "keeps it at rest"
-            said.append(f"the impulse of {name}, {size}, {does} within its limit {bound} = {limit:.6g}")
+            is_all = abs(abs(impulse) - limit) <= _AT_LIMIT * limit
+            where = "just at" if is_all and limit else "within"
+            said.append(f"the impulse of {name}, {size}, {does} {where} its limit {bound} = {limit:.6g}")
     return f"; {' and '.join(said)}" if said else ""

@@ -72,9 +72,10 @@ class Explanation:
 
     def __str__(self) -> str:
         lines = [repr(self.event)[1:-1]]
-        is_near = self.event.kind == "near-grazing"
+        is_near, is_limit = self.event.kind == "near-grazing", self.event.guard == LIMIT
         if self.state:
-            lines.append(f"  {'there' if is_near else 'just before'}: {self.state}")
+            when = "there" if is_near else "as the last event before left it" if is_limit else "just before"
+            lines.append(f"  {when}: {self.state}")
         if self.fired:
             lines.append("  came near zero:" if is_near else "  came to zero:")
             lines += [f"    {view.mode}: {view.in_numbers() if is_near else view}" for view in self.fired]

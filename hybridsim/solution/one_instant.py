@@ -30,7 +30,7 @@ def fired_guards(
 ) -> list[int]:
     """Numbers of the guards that came to zero at one instant, in the modes of the segment before.
 
-    Not those that a reset at this instant moved: where the segment ends they are not at zero.
+    Not those that something else at this instant moved: where the segment ends they are not at zero.
     """
     named = set()
     for o in together:
@@ -40,8 +40,8 @@ def fired_guards(
         automaton, mode = system.automata[c], int(segment.z[c])
         if o.source == automaton.modes[mode] and o.guard in automaton.guard_names[mode]:
             named.add(automaton.guards[mode][automaton.guard_names[mode].index(o.guard)])
-    if not named:
-        return []
+    if not named or (len({o.component for o in together}) == 1 and not system.model.inputs):
+        return sorted(named)
     s, x = float(segment.s[-1]), segment.x[-1]
     s_error = 2.0 * math.ulp(float(np.abs(segment.s).max()))
     if type(method).run is not Integrator.run:

@@ -306,6 +306,22 @@ def test_a_contact_that_a_reset_sets_moving_is_no_question_of_rounding() -> None
     )
 
 
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_a_stop_after_the_smallest_slip_is_one_that_was_located(integrator: str) -> None:
+    """The force exceeds the limit by 1e-6 for 0.0019 s: the speeds are as small as rounding elsewhere."""
+    model = hs.Model(
+        "creeper",
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "(5.000001*sin(t) - f)/2")],
+        contacts=[hs.Contact("f", velocity="v", normal=10, law="coulomb", arguments={"mu": 0.5})],
+    )
+    stop = hs.simulate(model, (0.0, 3.0), integrator=integrator).explain(1)
+    (fired,) = stop.fired
+    # the release is where sin(t) = 5/5.000001, and the stop where the impulse above the limit is used up
+    assert (fired.mode, fired.guard, fired.side) == ("f slip+", "velocity", -1)
+    assert fired.derivatives[1] == pytest.approx(-1.5e-6, rel=1e-2)
+    assert stop.reason == "stick is the only mode that is admissible just after"
+
+
 def test_a_jump_of_an_input_past_a_guard_is_no_zero_of_it() -> None:
     step = hs.Input("u", "table", times=[0, 1, 1, 3], values=[0, 0, 5, 5])
     automaton = hs.Component("c", [hs.Mode("p", hs.Guard("g", "2 - u", "q")), hs.Mode("q")], initial="p")
