@@ -99,9 +99,8 @@ time, with an integrator drawn at random and limits of 2 seconds, 5000 steps and
 {file_rows}
 
 A *refusal* is an error that names what is wrong and where. An error *on running* is one that only the run can
-find: a method that lacks what the model needs, a start in no mode. A *hang* is what took longer than {limit:g}
-seconds by the clock, on a machine with other work: the one here takes 37 s of processor time, to differentiate
-a product of twenty factors. The others are the status of the run.
+find: a method that lacks what the model needs, a start in no mode. A *hang* would be what takes longer than {limit:g}
+seconds by the clock. The others are the status of the run.
 
 ## Command lines
 
