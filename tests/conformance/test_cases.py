@@ -22,7 +22,7 @@ REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corn
 
 NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
 QUICK = {"scipy-dop853", "scipy-rk45"}
-# They step from Python and share all that hybridsim adds to them: each scene has its turn with one or two of them,
+# They step from Python and share all that hybridsim adds to them: every second scene has its turn with one of them,
 # and the rest, some minutes, where slow tests are asked for; `python -m conformance.table` runs all of them as well.
 TURNS = [name for name in NATIVE if name not in QUICK]
 
@@ -42,7 +42,7 @@ def runs() -> list[Any]:
         for name in INTEGRATORS:
             if is_long(scene) and not integrator(name).leaps:
                 continue  # it steps from Python: hours
-            is_slow = name in TURNS and (number + TURNS.index(name)) % len(TURNS) != 0
+            is_slow = name in TURNS and (number + 2 * TURNS.index(name)) % (2 * len(TURNS)) != 0
             marks = [pytest.mark.slow] if is_slow else []
             found.append(pytest.param(scene, name, id=f"{scene.name}-{name}", marks=marks))
     return found
