@@ -39,7 +39,7 @@ def test_compiling_that_takes_a_while_is_said_once(
 ) -> None:
     monkeypatch.setattr(jit, "_told", set())
     monkeypatch.setattr(jit, "_NOTICED", 0.0)
-    numba = pytest.importorskip("numba")
+    numba = pytest.importorskip("numba")  # the compiler that is listened to
     for module in ("somebody.else", "hybridsim.engine.mine", "hybridsim.engine.mine"):
 
         def doubled(x: float) -> float:

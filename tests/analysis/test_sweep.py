@@ -314,7 +314,7 @@ if __name__ == "__main__":
 
 
 def test_the_same_by_a_dask_cluster(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
+    pytest.importorskip("distributed")  # an optional dependency, which the test extra brings
     script = tmp_path / "cluster.py"
     script.write_text(_ON_A_CLUSTER, encoding="utf-8")
     tests = str(Path(__file__).parent.parent)

@@ -118,7 +118,7 @@ def test_model_that_may_not_be_read(hybridsim: Callable, tmp_path: Path) -> None
     path.write_text("schema = 1\n")
     path.chmod(0)
     if os.access(path, os.R_OK):
-        pytest.skip("this user may read every file")
+        pytest.skip("this user may read every file")  # as root does, whom no permission stops
     code, _, err = hybridsim("run", path)
     assert code in (2, 3)
     assert "scene.toml" in err
@@ -135,7 +135,7 @@ def test_picture_where_nothing_may_be_written(hybridsim: Callable, tmp_path: Pat
     folder = tmp_path / "closed"
     folder.mkdir(mode=0o500)
     if os.access(folder, os.W_OK):
-        pytest.skip("this user may write everywhere")
+        pytest.skip("this user may write everywhere")  # as root does, whom no permission stops
     code, _, err = hybridsim("run", "dfcs", "--plot", folder / "out.png")
     assert code == 2
     assert "may not be written" in err
