@@ -5,12 +5,14 @@
     python scripts/figures.py --done PAGE ...    a person has brought these up to date with what the commands print
 
 The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a hash of the
-package's sources; the site says at the foot of each page whether they are the sources that it was built from.
+package's sources without docstrings; the site says at the foot of each page whether they are the sources that it was
+built from.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import datetime
 import hashlib
 import json
@@ -28,13 +30,28 @@ TABLE, NOTES = ROOT / "docs" / "figures.toml", ROOT / "docs" / "figures.json"
 OF_RESULTS = (".py", ".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
 
 
+def without_docstrings(source: bytes) -> bytes:
+    """The text of a module but for its docstrings, which no figure depends on."""
+    lines = source.splitlines()
+    for node in ast.walk(ast.parse(source)):
+        if (
+            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+            and ast.get_docstring(node) is not None
+        ):
+            text = node.body[0]
+            for line in range(text.lineno - 1, text.end_lineno or text.lineno):
+                lines[line] = b""
+    return b"\n".join(line for line in lines if line.strip())
+
+
 def sources() -> str:
     """Hash of the package: equal where every figure would come out alike."""
     digest = hashlib.sha256()
     package = ROOT / "hybridsim"
     for path in sorted(p for p in package.rglob("*") if p.suffix in OF_RESULTS):
+        content = path.read_bytes()
         digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(path.read_bytes())
+        digest.update(without_docstrings(content) if path.suffix == ".py" else content)
     return digest.hexdigest()[:12]
 
 
