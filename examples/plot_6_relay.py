@@ -1,0 +1,29 @@
+r"""
+A relay that slides
+===================
+
+A relay on :math:`s = x + v/2` drives a mass. Where both fields point at the surface :math:`s = 0`
+the state slides along it (Filippov): there is no chattering, and the motion on it is :math:`\dot x
+= -2x`.
+"""
+
+import math
+
+import hybridsim as hs
+from hybridsim import plot
+
+model = hs.Model(
+    "relay",
+    states=[hs.State("x", 2.0, "v"), hs.State("v", 0.0, "-3*s")],
+    surfaces=[hs.SwitchingSurface("s", "x + v/2")],
+)
+sol = hs.simulate(model, (0, 4))
+for piece in sol.modes["s"]:
+    print(f"{piece.mode:8s} from t = {piece.t0:.12f}")
+
+# %%
+# On the surface the state decays as exp(-2 t), exactly.
+
+began = sol.modes["s"][-1].t0
+print("x(4) =", sol(4.0)[0], "expected", sol(began)[0] * math.exp(-2 * (4 - began)))
+plot.save(plot.phase_portrait(sol, "x", "v"), "relay.png")

@@ -1,0 +1,20 @@
+"""
+How little model is enough?
+===========================
+
+:func:`hybridsim.advise` holds simpler models against the full one and names the simplest that
+answers a question within a tolerance, here the amplitude of a forced oscillator within 1 %.
+"""
+
+import hybridsim as hs
+from hybridsim import plot
+
+advice = hs.advise("dfcs", quantity="amplitude.x", tol=0.01, params={"F0": 60.0})
+print(advice.table())
+plot.save(plot.advice(advice), "advice.png")
+
+# %%
+# How the amplitude and the time in stick depend on the frequency, for three loads on the contact:
+
+response = hs.frequency_response("dfcs", [100.0 + 20 * i for i in range(61)], {"N": [20, 40, 60]})
+plot.save(response.plot(over="omega"), "response.png")
