@@ -101,6 +101,12 @@ def test_every_module_has_its_floor() -> None:
     assert not outside, f"give these a place in FLOORS: {outside}"
 
 
+def test_the_page_on_floors_has_them_all_in_this_order() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "explanation" / "floors.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`.*?`) \|", page, re.MULTILINE)
+    assert tuple(name.strip("`") for row in rows for name in row.split(", ")) == FLOORS
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports_point_down_only(path: Path) -> None:
     floor = floor_of(path)
