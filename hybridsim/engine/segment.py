@@ -59,6 +59,11 @@ class Arrival:
     entered: str = ""
 
 
+# Of a step that says otherwise than the field at its start this part is tried: the first tenth of it is a step of
+# its own, and what it finds there is found again.
+_SHORTER = 0.1
+
+
 class Still:
     """The stepper of a model without continuous states: one step to the bound, nothing moves."""
 
@@ -200,6 +205,8 @@ class SegmentRun:
         """Search a step; where something stops the segment, return the step up to there and the arrival."""
         found = self.locator.search(step)
         first = self._first_stop(found)
+        if first is not None and self._has_not_moved(step, *first):
+            return self._examine(stepper, stepper.restep(step, step.s0 + _SHORTER * (step.s1 - step.s0)))
         passed = [hit for hit in found.crossings if self._is_recorded(hit, first)]
         located = []
         for hit, is_monitor in [*((hit, True) for hit in passed), *([first] if first else [])]:
@@ -225,6 +232,20 @@ class SegmentRun:
                 return ended, Arrival(ended.s1, x, stopping=(hit.number,))
             return ended, Arrival(ended.s1, x, fired=(hit.number,))
         return self._at_step_end(stepper, step, found)
+
+    def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
+        """Whether a guard leaves early in the first step, where its own series has not taken it from zero yet.
+
+        The step says otherwise than the field at its start, as a long step of a stiff method does where the motion
+        grows away from the surface: a shorter one is to be searched.
+        """
+        order = 0 if is_monitor else int(self.watch.orders[hit.number])
+        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER:
+            return False
+        x = self.flow.project(np.zeros(1), step.x0[None, :])[0]
+        series = self.system.series(0.0, x, self.flow.p, self.flow.z, self.rounding(), 0.0)
+        g, s = hit.number, abs(hit.theta * step.s1)
+        return bool(abs(series.guards[g, order]) * s**order <= series.guard_bounds[g, 0])
 
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))

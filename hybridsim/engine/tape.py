@@ -147,7 +147,6 @@ class TapeBuilder:
 
         one = self._constant(1.0)
         simple: Mapping[Any, int] = {
-            sp.exp: EXP,
             sp.Abs: ABS,
             sp.sign: SIGN,
             sp.Not: NOT,
@@ -161,6 +160,8 @@ class TapeBuilder:
             sp.GreaterThan: (LESS_EQUAL, True),
         }
         kind = e.func
+        if isinstance(e, sp.exp):
+            return self._op(rows, EXP, a[0])
         if kind in simple:
             return self._op(rows, simple[kind], a[0])
         if kind in chained:

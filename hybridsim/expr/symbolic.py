@@ -16,6 +16,22 @@ def _absolute(u: Any) -> Any:
     return sympy.Abs(u) if u.is_extended_real else sympy.Max(u, -u)
 
 
+class exp(sympy.exp):  # noqa: N801  printers of SymPy go by the name
+    """exp(u) whose sum u stays whole: SymPy makes exp(2000)*exp(-1000*v) of exp(2000 - 1000*v), which is no double."""
+
+    @classmethod
+    def eval(cls, arg: Any) -> Any:
+        """Value or simpler form, but for sums."""
+        return None if arg.is_Add else super().eval(arg)
+
+    def as_base_exp(self) -> tuple[Any, Any]:
+        """Itself, so that a product merges it with its equals alone."""
+        return self, sympy.Integer(1)
+
+    def _eval_power(self, other: Any) -> Any:
+        return self.func(self.args[0] * other) if other.is_real else None
+
+
 _FUNCTIONS: dict[str, Any] = {
     "sin": sympy.sin,
     "cos": sympy.cos,
@@ -27,7 +43,7 @@ _FUNCTIONS: dict[str, Any] = {
     "sinh": sympy.sinh,
     "cosh": sympy.cosh,
     "tanh": sympy.tanh,
-    "exp": sympy.exp,
+    "exp": exp,
     "log": sympy.log,
     "sqrt": sympy.sqrt,
     "abs": _absolute,

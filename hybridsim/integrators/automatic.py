@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.linear_modes import what_is_not_linear
+from hybridsim.engine.outcome import Situation
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.engine.rosenbrock_step import linearise
+from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import advance
 from hybridsim.engine.timepair import Instant
@@ -60,7 +62,18 @@ def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[f
 
 def _steps_for_stability(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> float:
     """Steps to which stability alone would hold an explicit method."""
-    return abs(span[1] - span[0]) * _fastest_decay(system, x0, np.maximum(z0, 0), span[0]) / _STABLE
+    per_rate = abs(span[1] - span[0]) / _STABLE
+    steps = per_rate * _fastest_decay(system, x0, np.maximum(z0, 0), span[0])
+    if steps > _MANY and (z0 < 0).any():  # a law may be steep on the side on which the motion is not
+        steps = per_rate * _fastest_decay(system, x0, _modes_at_start(system, x0, z0, span), span[0])
+    return steps
+
+
+def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> np.ndarray:
+    """The modes in which the run begins; the first of each component that cannot be decided."""
+    p = system.vector(Instant(span[0]), system.discrete_start)
+    at = Situation(0.0, x0.copy(), p, z0.copy(), np.zeros(system.n), 0.0)
+    return np.maximum(Settling(system, at, z0.copy(), span[1] >= span[0]).run((), ()).z, 0)
 
 
 def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> float:

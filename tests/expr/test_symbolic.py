@@ -68,3 +68,12 @@ def test_powers_of_constants_do_not_grow() -> None:
     expr = parse("(((10/9)**60/557)**60)**60*x")
     form = to_sympy(expr, SYMBOLS)
     assert len(str(form)) < 60
+
+
+def test_an_exponent_with_a_number_stays_whole() -> None:
+    """exp(2000) is no double, and exp(2000 - 1000*x) is 1 at x = 2."""
+    form = to_sympy(parse("0.3*exp(-(x - 2.0)/0.001) + 1/exp(x + 900)"), SYMBOLS)
+    slope = sympy.diff(form, SYMBOLS["x"], 2)
+    for e in (form, slope):
+        assert max(abs(float(number)) for number in e.atoms(sympy.Number)) <= 1e6
+    assert float(form.subs(SYMBOLS["x"], 2)) == pytest.approx(0.3)

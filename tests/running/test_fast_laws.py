@@ -67,3 +67,40 @@ def test_a_law_that_is_steep_only_where_the_body_stops(integrator: str, v_s: flo
     assert [(e.component, e.target) for e in sol.events][-1] == ("f", "stick")
     assert sol.events[-1].t == pytest.approx(stop, abs=3e-7)
     assert len(sol.events) == (2 if watched else 1)
+
+
+def on_belt(velocity: str, start: float, rate: str) -> hs.Model:
+    """A mass on a spring, on a belt of speed 2, under friction that falls within 1 mm/s; v as the velocity is measured."""
+    law = {"mu_s": 0.4, "mu_k": 0.25, "v_s": 1e-3}
+    return hs.Model(
+        "on-belt",
+        states=[hs.State("x", 0, rate, nominal=1), hs.State("v", start, "-x - f", nominal=1)],
+        contacts=[hs.Contact("f", velocity, "10", "stribeck-exponential", law)],
+    )
+
+
+@pytest.mark.parametrize("integrator", ["auto", *LOCATED])
+def test_a_steep_law_of_a_velocity_with_a_number_in_it(integrator: str) -> None:
+    """exp(-(v - 2)/v_s) is no product with exp(2000): the same motion as where v is measured from the belt."""
+    runs = [
+        hs.simulate(model, (0, 20), integrator=integrator, rtol=1e-8)
+        for model in (on_belt("v - 2.0", 0.0, "v"), on_belt("v", -2.0, "v + 2"))
+    ]
+    assert [sol.status for sol in runs] == ["finished", "finished"]
+    fixed, moving = ([(e.source, e.target) for e in sol.events] for sol in runs)
+    assert fixed == moving
+    # the law falls by 1.5 N within 1 mm/s of each release, which multiplies errors of rtol by thousands
+    assert runs[0].event_times("f") == pytest.approx(runs[1].event_times("f"), abs=1e-4)
+
+
+@pytest.mark.parametrize(("belt", "takes"), [(0.3, "dop853"), (-0.3, "dop853")])
+def test_auto_looks_at_the_side_on_which_the_motion_is(belt: float, takes: str) -> None:
+    """The law is steep as exp(30) on the side of slip where the body is not."""
+    law = hs.FrictionLaw("falls", slip="N*(0.3 - 0.1*exp(-v/0.01))", stick="0.2*N")
+    model = hs.Model(
+        "on-belt",
+        parameters={"belt": belt},
+        states=[hs.State("x", 0, "v", nominal=1), hs.State("v", 0, "-x - f", nominal=1)],
+        contacts=[hs.Contact("f", "v - belt", "10", law)],
+    )
+    assert hs.simulate(model, (0, 20)).integrator == takes
