@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,10 +31,26 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 
 
+def with_monitors(system: System, at: Situation, arrival: Arrival, sides: np.ndarray) -> Arrival:
+    """The arrival with all monitors that reset and cross zero at its instant, so that their resets see one state.
+
+    sides are those of the monitors just before.
+    """
+    resetting = [k for k, m in enumerate(system.model.monitors) if m.action == "reset" and sides[k] != 0]
+    if not set(resetting).difference(arrival.stopping):
+        return arrival
+    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+    stopping = set(arrival.stopping)
+    for k in resetting:
+        value, bound = series.monitors[k], series.monitor_bounds[k]
+        wanted = {"up": 1, "down": -1, "both": -int(sides[k])}[system.model.monitors[k].direction]
+        if abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] == wanted == -sides[k]:
+            stopping.add(k)
+    return replace(arrival, stopping=tuple(sorted(stopping)))
+
+
 def coincident(system: System, origin: Instant, at: Situation, fired: tuple[int, ...]) -> dict[int, int]:
     """The located guards and those that are zero with them and leave, with the order of their times."""
-    if not fired:
-        return {}
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     together: dict[int, float] = {}
     for g in map(int, np.flatnonzero(system.active(at.z))):

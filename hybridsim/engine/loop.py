@@ -16,7 +16,7 @@ from hybridsim.engine.gathering import behind, closed_now, holds_several
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import Gauge, LimitReached
-from hybridsim.engine.located import coincident, situation
+from hybridsim.engine.located import coincident, situation, with_monitors
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
@@ -268,7 +268,10 @@ class ModeLoop:
         sides = segment.locator.monitor_sides
         x_minus = arrival.x
         if arrival.fired or arrival.stopping:
-            outcome = self._settle_located(situation(self.system, arrival, segment), arrival)
+            at = situation(self.system, arrival, segment)
+            if self.forward:
+                arrival = with_monitors(self.system, at, arrival, sides)
+            outcome = self._settle_located(at, arrival)
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
@@ -290,10 +293,10 @@ class ModeLoop:
 
     def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
-        fired = coincident(self.system, self.origin, at, arrival.fired)
+        resets = [("monitor", k) for k in arrival.stopping if self.system.model.monitors[k].action == "reset"]
+        fired = coincident(self.system, self.origin, at, arrival.fired) if arrival.fired or resets else {}
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
-        resets = [("monitor", k) for k in arrival.stopping]
         return Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, sides: np.ndarray, done: tuple[int, ...]) -> Outcome:

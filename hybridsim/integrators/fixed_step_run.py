@@ -301,7 +301,7 @@ class FixedStepRun:
     def _monitor_events(
         self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray
     ) -> bool:
-        stop = False
+        stop, resetting = False, []
         for k in crossed:
             monitor = self.system.model.monitors[k]
             if {"up": 1, "down": -1, "both": directions[k]}[monitor.direction] != directions[k]:
@@ -309,11 +309,13 @@ class FixedStepRun:
             occurrence = Occurrence(instant, "monitor", monitor.name, "", "", "", int(directions[k]), x, x)
             self.record.occurrences.append(occurrence)
             if monitor.action == "reset":
-                stop = self._settle(instant, (), (), x, monitors=(int(k),)) or stop
+                resetting.append(int(k))
             elif monitor.action == "terminate":
                 self.record.status = "terminated"
                 self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
                 stop = True
+        if resetting:  # all of one instant, so that they read one state
+            stop = self._settle(instant, (), (), x, monitors=tuple(resetting)) or stop
         return stop
 
     def _settle(

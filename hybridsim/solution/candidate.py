@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.decide import FINE, LEAVES, side_after
+from hybridsim.expr.parse import substitute
+from hybridsim.model.rewriting import VARIABLE
 from hybridsim.model.switching import ATTRACTION
 from hybridsim.model.units import rate_of, time_unit, unit_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.outcome import Situation
     from hybridsim.engine.system import System
+    from hybridsim.expr import Expression
     from hybridsim.solution.watched import Decision, Look
 
 _WORDS = {FINE: "admissible", LEAVES: "not admissible"}
@@ -102,7 +105,7 @@ def views(
         j = automaton.guards[mode].index(g)
         values, bounds = series.guards[g], series.guard_bounds[g]
         side, order = side_after(values, bounds, int(decreed[g]))
-        declared = system.model.all_components()[c].modes[mode].guards[j].expr
+        declared = _as_in(system, z, system.model.all_components()[c].modes[mode].guards[j].expr)
         unit = "" if declared.text.startswith(ATTRACTION) else unit_of(system.model, declared)
         factorials = [math.factorial(k) for k in range(len(values))]
         yield GuardView(
@@ -116,6 +119,15 @@ def views(
             int(order),
             tuple(rate_of(unit, time, k) for k in range(len(values))),
         )
+
+
+def _as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
+    """An expression with what stands for its corners on the sides of the modes z."""
+    modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
+    while corners := {name for name in expression.names if name.startswith(VARIABLE)}:
+        values = {name: mode.set[name] for mode in modes for name in corners & mode.set.keys()}
+        expression = substitute(expression, values)
+    return expression
 
 
 def _in_words(text: str) -> str:

@@ -164,3 +164,30 @@ def test_a_monitor_whose_reset_falls_on_a_tick_is_recorded(integrator: str) -> N
     assert [e.t for e in sol.events if e.component == "r"] == pytest.approx([0.5, 1.5], abs=1e-12)
     assert [e.t for e in sol.events if e.component == "c"] == [0, 0.5, 1, 1.5]
     assert sol(1.75)[0] == pytest.approx(-0.25, abs=1e-12)
+
+
+@pytest.mark.parametrize("integrator", LOCATING)
+@pytest.mark.parametrize("names", ["ab", "ba"])
+def test_monitors_that_set_one_state_to_two_values_end_the_run(integrator: str, names: str) -> None:
+    """In any order of declaration, as guards and schedules do."""
+    texts = {
+        name: f'[monitors.{name}]\nexpr = "x - 0.5"\naction = "reset"\nreset = {{ y = "{value}" }}\n'
+        for name, value in (("a", 1), ("b", 2))
+    }
+    falling = '[states]\nx = { start = 1, der = "-1" }\ny = { start = 0, der = "0" }\n'
+    sol = hs.simulate(model(falling + "".join(texts[name] for name in names)), (0, 1), integrator=integrator)
+    assert sol.status == "inconsistent"
+    assert "set y to" in sol.message
+    assert sol.t[-1] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", LOCATING)
+def test_a_guard_and_a_monitor_at_one_instant_read_the_state_before_both(integrator: str) -> None:
+    text = (
+        '[states]\nx = { start = 1, der = "-1" }\ny = { start = 0, der = "0" }\nz = { start = 5, der = "0" }\n'
+        '[monitors.m]\nexpr = "2*x - 1"\naction = "reset"\nreset = { y = "1" }\n'
+        '[modes.a]\ninitial = true\n'
+        'guards.g = { expr = "x - 0.5", then = [{ to = "b", reset = { z = "y" } }] }\n[modes.b]\n'
+    )
+    sol = hs.simulate(model(text), (0, 1), integrator=integrator)
+    assert sol(1.0)[1:].tolist() == [1.0, 0.0]

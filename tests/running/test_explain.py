@@ -328,3 +328,16 @@ def test_a_jump_of_an_input_past_a_guard_is_no_zero_of_it() -> None:
     model = hs.Model("jump", states=[hs.State("x", 0, "1")], inputs=[step], components=[automaton])
     why = hs.simulate(model, (0, 2)).explain(0)
     assert not why.fired and "an input has a knot here (of u)" in why.reason
+
+
+def test_a_corner_in_a_load_is_shown_as_what_it_is_on_its_side() -> None:
+    model = hs.Model(
+        "loaded",
+        states=[hs.State("x", 0, "v", nominal=1), hs.State("v", 0, "-x - f", nominal=1)],
+        contacts=[hs.Contact("f", "v - 0.3", "10 + abs(x)", "static-kinetic", {"mu_s": 0.5, "mu_k": 0.2})],
+    )
+    sol = hs.simulate(model, (0, 40))
+    released = next(k for k, event in enumerate(sol.events) if event.source == "stick")
+    text = str(sol.explain(released))
+    assert "10 + x" in text
+    assert "__" not in text

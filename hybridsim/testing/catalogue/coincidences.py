@@ -84,6 +84,14 @@ def scenes() -> tuple[Scene, ...]:
             tol_t=1e-12,
         ),
         Scene(
+            "exchange",
+            "swap",
+            (0.0, 2.0),
+            Truth(((1.0, "one"), (1.0, "two")), ((0.5, (0.5, 1.0, 2.0)), (2.0, (2.0, 2.0, 1.0)))),
+            needs("monitors"),
+            tol_t=1e-12,
+        ),
+        Scene(
             "endless-cascade",
             "cascade",
             (0.0, 2.0),
