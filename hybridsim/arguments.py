@@ -69,12 +69,25 @@ def time_span(t_span: Any) -> tuple[float, float]:
     if not is_row(t_span):
         raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
     ends = [number(t, "a time of t_span", remedy) for t in t_span]
+    if len(ends) > 2:
+        remedy += "; the times at which states are wanted go to t_eval"
     if len(ends) != 2:
-        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
+        given = repr(t_span) if len(ends) < 5 else f"{len(ends)} times from {ends[0]!r} to {ends[-1]!r}"
+        raise UsageError(f"t_span is {given}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
         remedy = "give two finite numbers; a monitor can end a run early"
         raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
     return ends[0], ends[1]
+
+
+def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
+    """The remedy for an unknown state: the near ones, else all in the order in which a sequence gives them."""
+    remedy = nearest(name, states + discrete, kind="states")
+    if "did you mean" in remedy or not states or len(states) > 12:
+        return remedy
+    return f"known states, in this order: {', '.join(states)}" + "".join(
+        f"; {d} (discrete)" for d in discrete
+    )
 
 
 def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
@@ -97,7 +110,7 @@ def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
         if name not in names + discrete:
             raise UsageError(
                 f"x0 names {name!r}, which is no state of model {model.name}",
-                remedy=nearest(str(name), names + discrete, kind="states"),
+                remedy=_states_in_order(str(name), names, discrete),
             )
         found[name] = number(
             value, f"x0 of {name}", f"give a number; an expression goes to model.with_start({name}=...)"

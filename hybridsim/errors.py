@@ -146,7 +146,10 @@ class ModelError(HybridsimError):
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
         """One error out of many: the only one itself, or a list of all, by line, under a title."""
-        found = sorted((single for error in errors for single in error.errors), key=_line)
+        every = {
+            str(single): single for error in errors for single in error.errors
+        }  # a fault met twice is one
+        found = sorted(every.values(), key=_line)
         if len(found) == 1:
             return found[0]
         message = "\n".join([f"{title}: {len(found)} errors", *(str(error) for error in found)])

@@ -74,7 +74,7 @@ def test_collected_errors() -> None:
     assert str(both).splitlines() == ["model m: 2 errors", "m:1: first", "m:2: second"]
     assert ModelError.collect([one], "model m") is one
     assert one.errors == (one,)
-    assert ModelError.collect([both, one], "more").errors == (one, one, two)
+    assert ModelError.collect([both, one], "more").errors == (one, two)  # a fault met twice is one
 
 
 def test_errors_travel_between_processes_whole() -> None:

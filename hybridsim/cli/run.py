@@ -16,7 +16,7 @@ examples:
   hybridsim run dfcs
   hybridsim run dfcs -p F0=22 -p 'omega=0.64*sqrt(k/m)' --t-end 20T --plot out.png
   hybridsim run my.toml --integrator cvode-bdf --rtol 1e-10 --csv out.csv --json > out.json
-  hybridsim run belt --t-end 1e5 --limit seconds=60 --save belt.hsol
+  hybridsim run belt --t-end 1e4 --limit events=500 --save belt.hsol
 """
 
 

@@ -16,7 +16,7 @@ def _absolute(u: Any) -> Any:
     return sympy.Abs(u) if u.is_extended_real else sympy.Max(u, -u)
 
 
-class exp(sympy.exp):  # noqa: N801  printers of SymPy go by the name
+class exp(sympy.exp):  # named as what SymPy's printers know
     """exp(u) whose sum u stays whole: SymPy makes exp(2000)*exp(-1000*v) of exp(2000 - 1000*v), which is no double."""
 
     @classmethod

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from hybridsim.model.declared import Declared
 
 
+_MOVES = "; what depends on time or place is for a Model, to which system.to_model() is a beginning"
+
+
 def finite(part: Declared, what: str, value: Any) -> float:
     """A finite number, or the part's error that names it."""
     try:
@@ -18,7 +21,7 @@ def finite(part: Declared, what: str, value: Any) -> float:
     except (TypeError, ValueError):
         number = np.nan
     if not np.isfinite(number):
-        raise part._fault(f"{what} is {value!r}", "give finite numbers")
+        raise part._fault(f"{what} is {value!r}", "give finite numbers" + _MOVES * isinstance(value, str))
     return number
 
 

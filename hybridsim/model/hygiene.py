@@ -15,6 +15,7 @@ from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
 from hybridsim.model.smoothing import smoothing_of
+from hybridsim.model.velocity_powers import velocity_powers
 
 if TYPE_CHECKING:
     from hybridsim.model.component import Component, Mode
@@ -43,11 +44,20 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Cautions about a valid model, those about guards first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode. Nothing
-    is reported that the form of an expression does not show. The guards of contacts and surfaces are made by the
-    program and not looked at.
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode; a
+    fractional power of a contact's velocity. Nothing is reported that the form of an expression does not show. The
+    guards of contacts and surfaces are made by the program and not looked at.
     """
-    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *jumps_of(model))
+    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *jumps_of(model), *_of_powers(model))
+
+
+def _of_powers(model: Model) -> Iterator[Caution]:
+    for power in velocity_powers(model):
+        message = (
+            f"'{power.text}' in {power.where} has no series where contact {power.contact} sticks: every integrator "
+            "that locates events refuses it"
+        )
+        yield Caution(message, power.place, f"{power.remedy}; or run it by moreau")
 
 
 def jumps_of(model: Model) -> tuple[Caution, ...]:

@@ -51,8 +51,14 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     >>> hs.load("dfcs").parameter_values()["N"]
     40.0
     """
-    if not isinstance(name_or_path, str | os.PathLike):
-        raise UsageError(f"the model is {name_or_path!r}", remedy="give a Model, a name or a path")
+    given: object = name_or_path
+    if not isinstance(given, str | os.PathLike):
+        remedy = "give a Model, a name or a path"
+        if hasattr(given, "to_model"):
+            remedy = "hs.simulate takes it as it is; here give its ordinary model, system.to_model()"
+        elif callable(given):
+            remedy = "a function f(t, x) of the rates makes a model with names: hs.Model(states={'x': 1.0}, flow=f)"
+        raise UsageError(f"the model is {given!r}", remedy=remedy)
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)

@@ -103,7 +103,7 @@ class Scope:
                 kind = "the time" if name == TIME else f"the {self.kinds[name]}"
                 remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
                 raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
-            require_names(expr, allowed)
+            self._require(expr, allowed)
             if boolean and not expr.is_boolean:
                 raise expr.error(f"'{expr.text}' is a number", remedy="a condition is needed, e.g. 'x > 0'.")
             if expr.is_boolean and not boolean:
@@ -111,6 +111,16 @@ class Scope:
         except ExpressionError as fault:
             place = fault.place or Place(text=expr.text)
             self.errors.append(ExpressionError(f"{what}: {fault.message}", place=place, remedy=fault.remedy))
+
+    def _require(self, expr: Expression, allowed: frozenset[str]) -> None:
+        """See to it that every name is known; a force is the name of a contact, which a newcomer has to be told."""
+        try:
+            require_names(expr, allowed)
+        except ExpressionError as fault:
+            if self.model.contacts or "did you mean" in (fault.remedy or ""):
+                raise
+            hint = "A friction force is the name of a contact: hs.Contact, or [contacts.NAME] in a file."
+            raise ExpressionError(fault.message, place=fault.place, remedy=f"{fault.remedy} {hint}") from None
 
     def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
         """The same for a law, which sees its own names and nothing of the model."""

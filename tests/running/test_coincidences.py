@@ -186,7 +186,7 @@ def test_a_guard_and_a_monitor_at_one_instant_read_the_state_before_both(integra
     text = (
         '[states]\nx = { start = 1, der = "-1" }\ny = { start = 0, der = "0" }\nz = { start = 5, der = "0" }\n'
         '[monitors.m]\nexpr = "2*x - 1"\naction = "reset"\nreset = { y = "1" }\n'
-        '[modes.a]\ninitial = true\n'
+        "[modes.a]\ninitial = true\n"
         'guards.g = { expr = "x - 0.5", then = [{ to = "b", reset = { z = "y" } }] }\n[modes.b]\n'
     )
     sol = hs.simulate(model(text), (0, 1), integrator=integrator)

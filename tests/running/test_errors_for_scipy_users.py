@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridsim as hs
+from hybridsim.model.hygiene import warnings_of
 
 
 @pytest.mark.parametrize(
@@ -40,3 +41,33 @@ def test_keywords_that_are_the_same() -> None:
 def test_what_a_mechanical_system_does_not_take(keyword: str) -> None:
     with pytest.raises(hs.UsageError, match=f"a MechanicalSystem takes no {keyword}\n"):
         hs.simulate(hs.two_blocks_on_belt(), (0, 0.01), **{keyword: {}})
+
+
+def test_what_is_no_model_is_told_what_to_make_of_it() -> None:
+    with pytest.raises(hs.UsageError) as fault:
+        hs.simulate(lambda t, x: x, (0, 1))
+    assert "hs.Model(states=" in str(fault.value)
+    for ask in (hs.steady_state, hs.linearize):
+        with pytest.raises(hs.UsageError) as fault:
+            ask(hs.two_blocks_on_belt())
+        assert "system.to_model()" in str(fault.value)
+    with pytest.raises(hs.UsageError) as fault:
+        hs.simulate("dfcs", [0.1 * k for k in range(50)])
+    assert "50 times" in str(fault.value) and "t_eval" in str(fault.value)
+
+
+def test_a_force_without_a_contact_is_told_where_it_comes_from() -> None:
+    with pytest.raises(hs.ModelError) as fault:
+        hs.Model("m", states=[hs.State("x", 0, "v"), hs.State("v", 0, "-x - friction")]).validate()
+    assert "[contacts.NAME]" in str(fault.value)
+
+
+def test_check_says_who_refuses_a_fractional_power_of_a_velocity() -> None:
+    law = hs.FrictionLaw("power", slip="N*(0.3 + (abs(v)/0.1)**1.5)", stick="0.4*N")
+    model = hs.Model(
+        "m",
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "-x - f")],
+        contacts=[hs.Contact("f", "v", "10", law)],
+    )
+    told = [caution for caution in warnings_of(model) if "no series" in caution.message]
+    assert told and all("moreau" in caution.remedy for caution in told)

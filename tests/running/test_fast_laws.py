@@ -70,7 +70,7 @@ def test_a_law_that_is_steep_only_where_the_body_stops(integrator: str, v_s: flo
 
 
 def on_belt(velocity: str, start: float, rate: str) -> hs.Model:
-    """A mass on a spring, on a belt of speed 2, under friction that falls within 1 mm/s; v as the velocity is measured."""
+    """A mass on a spring, on a belt of speed 2, under friction that falls within 1 mm/s."""
     law = {"mu_s": 0.4, "mu_k": 0.25, "v_s": 1e-3}
     return hs.Model(
         "on-belt",
