@@ -24,6 +24,7 @@ _TANGENT = (
 )
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
+_SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
 
 
 class CvodeStepper:
@@ -55,14 +56,17 @@ class CvodeStepper:
         at = flow.system.layout.phases_at
         self.rates = np.asarray(flow.system.rates)
         self.phases = flow.p[at : at + len(self.rates)]
-        atol = np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
+        # its norm is the root of a mean, within which one of n errors may be sqrt(n) times the tolerance
+        share = 1.0 / np.sqrt(flow.n + len(self.rates))
+        rtol = max(share * tolerances.rtol, min(tolerances.rtol, _SMALLEST))
+        atol = share * np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
         # a fresh start is of order 1: it cannot take up the step of before an event, only one that a user asks for
         first = first_step if first_step == tolerances.first_step else None
         self.solver = CVODE(
             self._rhs(),
             jacfn=self._jacobian() if method == "BDF" else None,
             method=method,
-            rtol=tolerances.rtol,
+            rtol=rtol,
             atol=atol,
             first_step=first or 0.0,
             max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,

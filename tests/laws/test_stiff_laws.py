@@ -26,11 +26,9 @@ def reference(
     return found.y.T
 
 
-def compare(
-    model: hs.Model, integrator: str, t: list[float], expected: np.ndarray, rtol: float = 1e-8
-) -> None:
+def compare(model: hs.Model, integrator: str, t: list[float], expected: np.ndarray) -> None:
     """Each state to 1e-6 of its largest value at these times."""
-    sol = hs.simulate(model, (0, t[-1]), integrator=integrator, rtol=rtol)
+    sol = hs.simulate(model, (0, t[-1]), integrator=integrator, rtol=1e-8)
     assert sol.success, sol.message
     found = np.array([sol(time) for time in t])
     scale = np.abs(expected).max(axis=0)
@@ -87,8 +85,7 @@ def test_rate_and_state(integrator: str) -> None:
 
     t = [0.5, 1.0, 2.0, 4.0]
     expected = reference(rates, [mu_0 * normal / k, v_0, length / v_0], t, "Radau")
-    # CVODE bounds the error of a step: at rtol 1e-8 that of the run is 1.05e-6 here, in the velocity
-    compare(model, integrator, t, expected, rtol=1e-9 if integrator == "cvode-bdf" else 1e-8)
+    compare(model, integrator, t, expected)
 
 
 @pytest.mark.parametrize("integrator", STIFF)

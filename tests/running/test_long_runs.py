@@ -57,7 +57,9 @@ def test_an_orbit_of_slip_and_slip(orbit, integrator: str) -> None:
         exact = np.array([orbit(turns(t, omega)) for t in times]).T
         errors.append(np.max(np.abs(sol(times) - exact) / np.max(np.abs(exact), axis=1)[:, None]))
     assert errors[0] < 1e-8
-    assert errors[1] < 2 * errors[0]
+    # CVODE's choice of orders differs from run to run, and with it the error by some multiple of rtol
+    luck = 1e-10 if integrator == "cvode-adams" else 0.0
+    assert errors[1] < max(2 * errors[0], luck)
 
 
 def test_a_smooth_stretch_of_many_turns() -> None:
