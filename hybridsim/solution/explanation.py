@@ -21,10 +21,14 @@ from hybridsim.solution.reason import reason
 from hybridsim.solution.stages import place_of, situation
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from hybridsim.engine.outcome import Situation
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
     from hybridsim.model.component import Choice
+    from hybridsim.model.monitor import Monitor
+    from hybridsim.model.schedule import Schedule
     from hybridsim.solution.candidate import Candidate, GuardView
     from hybridsim.solution.event import Event
     from hybridsim.solution.solution import Solution
@@ -108,9 +112,9 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     happened = [o for o in solution._trajectory.occurrences if o.kind != "corner"]
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
-        return Explanation(event, near, (), _of_another_kind(event), _state(solution, event))
+        return Explanation(event, near, (), _of_another_kind(solution, event), _state(solution, event))
     if event.kind != "transition":
-        return Explanation(event, (), (), _of_another_kind(event))
+        return Explanation(event, (), (), _of_another_kind(solution, event))
     occurrence = happened[number]
     together = [o for o in happened if o.instant == occurrence.instant]
     segment = _segment_before(solution, occurrence)
@@ -252,16 +256,25 @@ def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]
     return tuple(lines)
 
 
-def _of_another_kind(event: Event) -> str:
+def _of_another_kind(solution: Solution, event: Event) -> str:
     if event.kind == "monitor":
         way = "rose" if event.direction > 0 else "fell"
-        return f"the monitor {event.component} {way} through zero; it changes no mode"
+        sets = _sets(event, solution.model.monitors)
+        return f"the monitor {event.component} {way} through zero; it changes no mode" + sets
     if event.kind == "scheduled":
-        return f"the schedule {event.component} was due; it was stepped to, not searched for"
+        sets = _sets(event, solution.model.schedules)
+        return f"the schedule {event.component} was due; it was stepped to, not searched for" + sets
     return (
         f"guard {event.guard} of {event.component} came within rounding of zero and turned back: no event, "
         "but a slightly different run may have one here"
     )
+
+
+def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
+    """What the reset of a monitor or a schedule sets, as it is declared; a clock has none that is declared."""
+    part = next((part for part in parts if part.name == event.component), None)
+    values = ", ".join(f"{name} = {value.text}" for name, value in part.reset.items()) if part else ""
+    return f"; it sets {values}" if values else ""
 
 
 def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | None:

@@ -341,3 +341,14 @@ def test_a_corner_in_a_load_is_shown_as_what_it_is_on_its_side() -> None:
     text = str(sol.explain(released))
     assert "10 + x" in text
     assert "__" not in text
+
+
+def test_a_schedule_and_a_monitor_say_what_they_set() -> None:
+    text = (
+        'schema = 1\nname = "s"\n[states]\nx = { start = 0, der = "1" }\n[discrete]\nF = 0\n'
+        '[schedules.kick]\ntimes = [0.3]\nreset = { F = "0.5 + x" }\n'
+        '[monitors.m]\nexpr = "x - 0.6"\naction = "reset"\nreset = { F = "0" }\n'
+    )
+    sol = hs.simulate(hs.Model.from_toml(text), (0, 1))
+    assert "it sets F = 0.5 + x" in str(sol.explain(0))
+    assert "it sets F = 0" in str(sol.explain(1))
