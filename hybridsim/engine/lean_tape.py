@@ -36,7 +36,7 @@ from hybridsim.engine.tape import (
 ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
 
 CONSTANT, LINEAR, SERIES = range(3)  # what a register is in time
-_PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
+PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
 _ONE = (
     COPY,
     NEG,
@@ -88,11 +88,11 @@ def twins_of(tape: dict[str, Any]) -> dict[int, int]:
             for op, *given, out in branch:
                 for kind in (below, above):
                     kind[out] = _kind(op, [kind.get(r, CONSTANT) for r in given[: _registers(op)]])
-                    if op in _PAIRED:
+                    if op in PAIRED:
                         kind[out + 1] = kind[out]
-                if op in _PAIRED:
+                if op in PAIRED:
                     paired.add(out)
-                for r in (out, out + 1) if op in _PAIRED else (out,):
+                for r in (out, out + 1) if op in PAIRED else (out,):
                     found.setdefault(r, []).append((below[r], above[r]))
         for out, seen in found.items():
             least[out], most[out] = min(low for low, _ in seen), max(high for _, high in seen)
@@ -124,10 +124,10 @@ def lean(
             continue
         kinds = [kind.get(r, CONSTANT) for r in (a, b, c)[:count]]
         kind[out] = _kind(op, kinds)
-        if op in _PAIRED:
+        if op in PAIRED:
             kind[out + 1] = kind[out]
         if kind[out] == CONSTANT:
-            for r in (out, out + 1) if op in _PAIRED else (out,):
+            for r in (out, out + 1) if op in PAIRED else (out,):
                 same[r] = twins.get(r, r)
                 kind[same[r]] = CONSTANT
             constant_rows.append((op, a, b, c, same[out]))
@@ -155,7 +155,7 @@ def has_corners(tape: dict[str, Any]) -> bool:
             if op >= ABS and max(deciding) != CONSTANT:
                 return True
             kind[out] = max(_kind(op, kinds), kind.get(out, CONSTANT))
-            if op in _PAIRED:
+            if op in PAIRED:
                 kind[out + 1] = kind[out]
     return False
 
@@ -196,7 +196,7 @@ def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int
     kept = []
     for row in reversed(rows):
         out = row[4]
-        if out in wanted or (row[0] in (*_PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
+        if out in wanted or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
             kept.append(row)
             wanted |= set(row[1:4])  # flags among them only keep a row too many
     return kept[::-1]

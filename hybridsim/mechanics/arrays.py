@@ -14,7 +14,8 @@ VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that r
 DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop came back
 
 
-COUNT, DOFS, CONS, ORDER, NODE, FIRED = range(6)  # numbers that a kernel reached by its address is given
+# numbers that a kernel reached by its address is given; FIRST: where a run of neighbours begins, -1 where it is none
+COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
 AT, LONGEST, RTOL, LENGTH = range(4)  # and real ones; the length of a stretch comes back
 EXPAND, STRETCH, DECIDE = range(3)  # these kernels
 
@@ -91,6 +92,8 @@ class Room(NamedTuple):
     exits: np.ndarray
     kinds: np.ndarray
     line: np.ndarray
+    masks: np.ndarray
+    sums: np.ndarray
 
 
 class Record(NamedTuple):

@@ -17,7 +17,8 @@ from hybridsim.engine.decide import open_question, side_after
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import AT, DECIDE, FIRED, INCONSISTENT, NODE, STICK, UPPER, VELOCITY
 from hybridsim.mechanics.clusters import factorise, project
-from hybridsim.mechanics.expansion import base_coefficient, base_speed, expanded, gather, value_and_slope
+from hybridsim.mechanics.expansion import base_coefficient, base_speed, expanded, gather
+from hybridsim.mechanics.polynomials import value_and_slope
 
 _SHORT = 4  # order of the series in q that decide: accelerations and their first two derivatives
 _UNIT = 2.0**-53

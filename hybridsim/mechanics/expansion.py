@@ -10,9 +10,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.eight import whole_vectors
 from hybridsim.engine.jit import call_kernel, inlined, kernel
-from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, ORDER, STICK
-from hybridsim.mechanics.lanes import advance_lanes
+from hybridsim.engine.lean_tape import PAIRED
+from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
+from hybridsim.mechanics.lanes import advance_lanes, clear
+from hybridsim.mechanics.polynomials import shift, value_and_slope
+from hybridsim.mechanics.runs import clear_beside, expand_run
 
 
 @kernel
@@ -21,6 +25,7 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
 
     The nodes around them get their series about tau. Returns how many coordinates and contacts the patch has.
     """
+    state.whole[FIRST] = -1
     room.stamp[-1] += 1
     now, nd, nc = room.stamp[-1], 0, 0
     for i in range(count):
@@ -53,32 +58,13 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
     return nd, nc
 
 
-@inlined
-def value_and_slope(series: Any, d: float) -> tuple[float, float]:
-    """A polynomial and its derivative at d (Horner)."""
-    value, slope = series[series.shape[0] - 1], 0.0
-    for k in range(series.shape[0] - 2, -1, -1):
-        slope = slope * d + value
-        value = value * d + series[k]
-    return value, slope
-
-
 @kernel
-def shift(series: Any, d: float, top: int, out: Any) -> None:
-    """Coefficients 0..top of a polynomial about d (Horner's scheme, again and again)."""
-    last = series.shape[0] - 1
-    for k in range(last + 1):
-        out[k] = series[k]
-    if d == 0.0:
-        return
-    for k in range(top + 1):
-        for i in range(last - 1, k - 1, -1):
-            out[i] += d * out[i + 1]
-
-
-@kernel
-def whole(plant: Any, state: Any, room: Any) -> tuple[int, int]:
+def whole(plant: Any, state: Any, room: Any, top: int) -> tuple[int, int]:
     """The patch of all nodes, at the origin of the step."""
+    state.whole[FIRST] = -1
+    if plant.offsets.shape[0] > 0:
+        state.whole[FIRST] = 0
+        clear_beside(plant, room, plant.dof_node.shape[0], top)
     n, m = plant.dof_node.shape[0], plant.con_node.shape[0]
     for j in range(plant.node_dof.shape[0] - 1):
         room.nodes[j] = j
@@ -132,39 +118,53 @@ def _lanes(plant: Any, laws: Any, state: Any, room: Any, nc: int, orders: int) -
             if state.mode[c] != STICK and plant.tape[c, 0 if state.mode[c] > 0 else 1] == t:
                 room.lane[used] = i
                 used += 1
-        n, first = used - room.lane_ptr[t], room.lane_ptr[t]
-        size = laws.registers[t] * orders * n
-        for i in range(at, at + size):
-            room.V[i] = 0.0
-        for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
-            spot = at + laws.par_reg[i] * orders * n
-            for j in range(n):
-                room.V[spot + j] = plant.par[room.cons[room.lane[first + j]], i - laws.par_ptr[t]]
-        for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
-            spot = at + laws.number_reg[i] * orders * n
-            for j in range(n):
-                room.V[spot + j] = laws.number_val[i]
-        if n > 0:
-            rows = laws.constant_rows[laws.constant_ptr[t] : laws.constant_ptr[t + 1]]
-            advance_lanes(rows, room.V, at, orders, n, 0)
-        at += size
+        if used > room.lane_ptr[t]:
+            at = constants(plant, laws, room, t, used, orders)
     room.lane_ptr[tapes], room.place[tapes] = used, at
+
+
+@kernel
+def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) -> int:
+    """Put the constants of the contacts in lanes lane_ptr[t]..last - 1 into a tape's registers; where these end."""
+    first, at = room.lane_ptr[t], room.place[t]
+    count = last - first
+    n = whole_vectors(count)
+    length = orders * n
+    for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
+        spot = at + laws.constant_rows[i, 4] * length
+        pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1
+        clear(room.V, spot, pair * length)
+    for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
+        spot = at + laws.par_reg[i] * length
+        clear(room.V, spot, length)
+        for j in range(n):
+            c = room.cons[room.lane[first + min(j, count - 1)]]
+            room.V[spot + j] = plant.par[c, i - laws.par_ptr[t]]
+    for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
+        spot = at + laws.number_reg[i] * length
+        clear(room.V, spot, length)
+        for j in range(n):
+            room.V[spot + j] = laws.number_val[i]
+    rows = laws.constant_rows[laws.constant_ptr[t] : laws.constant_ptr[t + 1]]
+    advance_lanes(rows, room.V, at, orders, n, 0)
+    return at + laws.registers[t] * length
 
 
 @inlined
 def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k: int) -> None:
     """Coefficient k of the forces of all that slips, from that of the relative velocities."""
     for t in range(laws.registers.shape[0]):
-        first, n, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
-        if n == 0:
+        first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
+        if count == 0:
             continue
+        n = whole_vectors(count)
         speed = at + (laws.speed[t] * orders + k) * n
         for j in range(n):
-            i = room.lane[first + j]
+            i = room.lane[first + min(j, count - 1)]
             room.V[speed + j] = state.mode[room.cons[i]] * room.R[k, i]
         advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, orders, n, k)
         out = at + (laws.out[t] * orders + k) * n
-        for j in range(n):
+        for j in range(count):
             i = room.lane[first + j]
             room.F[k, i] = state.mode[room.cons[i]] * room.V[out + j]
 
@@ -272,6 +272,9 @@ def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
     """Series of the gathered patch: Q (positions), R (relative velocities), F (forces); see `expanded`."""
     count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau = state.real[AT]
+    if state.whole[FIRST] >= 0:
+        expand_run(plant, laws, state, room, count, top)
+        return 0
     _angles(plant, state, room, tau, top)
     _lanes(plant, laws, state, room, nc, top + 1)
     for k in range(top - 1):

@@ -1,7 +1,8 @@
 """A tape run for many contacts at once: one interpreter, one row of numbers for each register and order.
 
 The recurrences are those of `hybridsim.engine.taylor`; here the innermost loop goes over contacts (lanes), so that the
-interpreter's own cost is shared among them.
+interpreter's own cost is shared among them. Lanes come in whole vectors: those beyond the last contact are copies of
+its lane.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.eight import WIDTH, load, splat, store
 from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
@@ -38,27 +40,38 @@ from hybridsim.engine.tape import (
 
 
 @inlined
-def _product(V: Any, out: int, a: int, b: int, k: int, first: int, last: int, n: int, factor: float) -> None:
-    """V[out] += factor * sum_{i=first}^{last} a_i b_{k-i}; a, b, out are places of coefficient 0 (out: of k)."""
-    total = V[out : out + n]
-    for i in range(first, last + 1):
-        _add_product(total, V[a + i * n : a + i * n + n], V[b + (k - i) * n : b + (k - i) * n + n], n, factor)
-
-
-@inlined
-def _add_product(total: Any, x: Any, y: Any, n: int, factor: float) -> None:
-    """total += factor x y, lane by lane; views of their own, so that the loop becomes one of vectors."""
-    for j in range(n):
-        total[j] += factor * (x[j] * y[j])
+def _product(V: Any, z: int, a: int, b: int, count: int, n: int, factor: float) -> None:
+    """V[z] += factor * sum_{i<count} V[a + i n] V[b - i n], lane by lane; a: of its first coefficient, b: of its last."""
+    weight = splat(factor)
+    for j in range(0, n, WIDTH):
+        total = load(V, z + j)
+        for i in range(count):
+            total = total + weight * (load(V, a + i * n + j) * load(V, b - i * n + j))
+        store(V, z + j, total)
 
 
 @inlined
 def _weighted(V: Any, out: int, a: int, b: int, k: int, last: int, n: int, factor: float) -> None:
-    """V[out] += factor * sum_{i=1}^{last} i a_i b_{k-i}."""
-    total = V[out : out + n]
-    for i in range(1, last + 1):
-        x, y = V[a + i * n : a + i * n + n], V[b + (k - i) * n : b + (k - i) * n + n]
-        _add_product(total, x, y, n, factor * i)
+    """V[out] += factor * sum_{i=1}^{last} i a_i b_{k-i}; a, b: places of coefficient 0."""
+    for j in range(0, n, WIDTH):
+        total = load(V, out + j)
+        for i in range(1, last + 1):
+            total = total + splat(factor * i) * (load(V, a + i * n + j) * load(V, b + (k - i) * n + j))
+        store(V, out + j, total)
+
+
+@inlined
+def clear(V: Any, at: int, length: int) -> None:
+    """Zeros from a place on, in whole vectors."""
+    for i in range(at, at + length, WIDTH):
+        store(V, i, splat(0.0))
+
+
+@inlined
+def _fill(V: Any, z: int, n: int, value: float) -> None:
+    """One number in every lane."""
+    for j in range(0, n, WIDTH):
+        store(V, z + j, splat(value))
 
 
 @kernel
@@ -92,76 +105,90 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int, n: int) -> None:
     """Order k >= 1 of the operations that follow a differential equation; places of coefficient 0."""
     o, o2 = out + k * n, out2 + k * n
-    for j in range(n):
-        V[o + j] = 0.0
+    _fill(V, o, n, 0.0)
     if op == EXP:
         _weighted(V, o, a, out, k, k, n, 1.0 / k)
     elif op == INTEGRAL:
         _weighted(V, o, out, a, k, k - 1, n, -1.0 / k)
-        for j in range(n):
-            V[o + j] = (V[b + k * n + j] + V[o + j]) / V[a + j]
+        for j in range(0, n, WIDTH):
+            store(V, o + j, (load(V, b + k * n + j) + load(V, o + j)) / load(V, a + j))
     else:
-        for j in range(n):
-            V[o2 + j] = 0.0
+        _fill(V, o2, n, 0.0)
         _weighted(V, o, a, out2, k, k, n, 1.0 / k)
         if op == TANGENT:
-            _product(V, o2, out, out, k, 0, k, n, 1.0 if flag == 0 else -1.0)
+            _product(V, o2, out, out + k * n, k + 1, n, 1.0 if flag == 0 else -1.0)
         else:
             _weighted(V, o2, a, out, k, k, n, (1.0 if op == SINHCOSH else -1.0) / k)
 
 
+@inlined
+def _quotient(V: Any, z: int, x: int, out: int, b: int, k: int, n: int) -> None:
+    """V[z] = (V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: places of coefficient 0."""
+    for j in range(0, n, WIDTH):
+        total = load(V, x + j)
+        for i in range(k):
+            total = total - load(V, out + i * n + j) * load(V, b + (k - i) * n + j)
+        store(V, z + j, total / load(V, b + j))
+
+
+@inlined
+def _shifted(V: Any, z: int, x: int, c: int, k: int, n: int, signs: tuple[float, float]) -> None:
+    """V[z] = a series and a constant, with their signs."""
+    for j in range(0, n, WIDTH):
+        total = splat(signs[0]) * load(V, x + j)
+        if k == 0:
+            total = total + splat(signs[1]) * load(V, c + j)
+        store(V, z + j, total)
+
+
 @kernel
 def advance_lanes(rows: Any, V: Any, base: int, orders: int, n: int, k: int) -> None:
-    """Coefficient k of every operation for n lanes; register r has its coefficient k at base + (r*orders + k)*n."""
-    size = orders * n
+    """Coefficient k of every operation for n lanes; register r has its coefficient k at base + (r*orders + k)*n.
+
+    n is a whole number of vectors.
+    """
+    length = orders * n
     for r in range(rows.shape[0]):
         op, flag, kind = rows[r, 0], rows[r, 2], rows[r, 3]
-        a, b, out = base + rows[r, 1] * size, base + rows[r, 2] * size, base + rows[r, 4] * size
-        o, at, bt = out + k * n, a + k * n, b + k * n
-        z, x, y, c = V[o : o + n], V[at : at + n], V[bt : bt + n], V[b : b + n]
+        a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
+        z, x, y = out + k * n, a + k * n, b + k * n
         if op == SCALE:
-            for j in range(n):
-                z[j] = x[j] * c[j]
-        elif op == ADD:
-            for j in range(n):
-                z[j] = x[j] + y[j]
-        elif op == SUB:
-            for j in range(n):
-                z[j] = x[j] - y[j]
-        elif op == MUL:
-            for j in range(n):
-                z[j] = 0.0
-            _product(V, o, a, b, k, 0, k, n, 1.0)
-        elif op == DIVIDE_BY:
-            for j in range(n):
-                z[j] = x[j] / c[j]
+            for j in range(0, n, WIDTH):
+                store(V, z + j, load(V, x + j) * load(V, b + j))
         elif op == DIV:
-            for j in range(n):
-                z[j] = x[j]
-            _product(V, o, out, b, k, 0, k - 1, n, -1.0)
-            for j in range(n):
-                z[j] /= c[j]
+            _quotient(V, z, x, out, b, k, n)
+        elif op == MUL:
+            _fill(V, z, n, 0.0)
+            _product(V, z, a, y, k + 1, n, 1.0)
+        elif op == ADD:
+            for j in range(0, n, WIDTH):
+                store(V, z + j, load(V, x + j) + load(V, y + j))
+        elif op == SUB:
+            for j in range(0, n, WIDTH):
+                store(V, z + j, load(V, x + j) - load(V, y + j))
+        elif op == DIVIDE_BY:
+            for j in range(0, n, WIDTH):
+                store(V, z + j, load(V, x + j) / load(V, b + j))
         elif op == NEG:
-            for j in range(n):
-                z[j] = -x[j]
-        elif op in (ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB):
-            sign, other = -1.0 if op == CONSTANT_SUB else 1.0, -1.0 if op == SUB_CONSTANT else 1.0
-            for j in range(n):
-                z[j] = sign * x[j]
-            if k == 0:
-                for j in range(n):
-                    z[j] += other * c[j]
+            for j in range(0, n, WIDTH):
+                store(V, z + j, splat(-1.0) * load(V, x + j))
+        elif op == ADD_CONSTANT:
+            _shifted(V, z, x, b, k, n, (1.0, 1.0))
+        elif op == SUB_CONSTANT:
+            _shifted(V, z, x, b, k, n, (1.0, -1.0))
+        elif op == CONSTANT_SUB:
+            _shifted(V, z, x, b, k, n, (-1.0, 1.0))
         elif op == SQRT:
-            if k == 0:
+            for j in range(n):
+                if k == 0:
+                    V[z + j] = math.sqrt(V[x + j]) if V[x + j] >= 0.0 else math.nan
+                else:
+                    V[z + j] = 0.5 * V[x + j]
+            if k > 0:
+                _product(V, z, out + n, out + (k - 1) * n, k - 1, n, -0.5)
                 for j in range(n):
-                    z[j] = math.sqrt(x[j]) if x[j] >= 0.0 else math.nan
-            else:
-                for j in range(n):
-                    z[j] = 0.5 * x[j]
-                _product(V, o, out, out, k, 1, k - 1, n, -0.5)
-                for j in range(n):
-                    z[j] = 0.0 if V[out + j] == 0.0 and z[j] == 0.0 else z[j] / V[out + j]
+                    V[z + j] = 0.0 if V[out + j] == 0.0 and V[z + j] == 0.0 else V[z + j] / V[out + j]
         elif k == 0:
-            _leading(op, V, a, b, flag, kind, out, out + size, n)
+            _leading(op, V, a, b, flag, kind, out, out + length, n)
         else:
-            _higher(op, V, a, b, flag, out, out + size, k, n)
+            _higher(op, V, a, b, flag, out, out + length, k, n)

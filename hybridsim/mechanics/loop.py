@@ -15,7 +15,9 @@ from hybridsim.engine.timepair import phase_of, two_sum
 from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END
 from hybridsim.mechanics.clusters import project
 from hybridsim.mechanics.decision import decided
-from hybridsim.mechanics.expansion import expanded, gather, shift, value_and_slope, whole
+from hybridsim.mechanics.expansion import expanded, gather, whole
+from hybridsim.mechanics.polynomials import shift, value_and_slope
+from hybridsim.mechanics.runs import gather_run
 from hybridsim.mechanics.steps import first_leaf, set_time, stretched
 
 # flags: a step is to be begun; it is the last; radius of patches; events at one instant; node of the last event
@@ -41,7 +43,7 @@ def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, contr
     _hold(plant, state, room)
     count = plant.node_dof.shape[0] - 1
     state.origin[:] = 0.0
-    nd, nc = whole(plant, state, room)
+    nd, nc = whole(plant, state, room, top)
     expanded(plant, laws, state, room, count, nd, nc, 0.0, top)
     limit = min(left, longest)
     h = stretched(plant, laws, state, room, limit, rtol)
@@ -166,7 +168,9 @@ def _restart(
         count, outer = _grow(plant, room, j, radius, nodes // 2)
         if not (0 <= count <= nodes // 2 and left > 0.0):
             return 0
-        nd, nc = gather(plant, state, room, count, tau, top)
+        nd = nc = count
+        if not gather_run(plant, state, room, count, tau, top):
+            nd, nc = gather(plant, state, room, count, tau, top)
         expanded(plant, laws, state, room, count, nd, nc, tau, top)
         outside = 0.0
         if outer < count and 2 * radius + 2 <= top:

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from hybridsim.engine.scalar_tape import ScalarTape, is_same, scalar_tape
 from hybridsim.errors import ModelError, UsageError
 from hybridsim.expr.evaluate import evaluate
+from hybridsim.mechanics.bands import in_bands
 from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
 
 MOST_COUPLED = 3000  # coordinates coupled in the mass matrix whose inverse is made: 72 MB
@@ -32,7 +33,7 @@ class Plant(NamedTuple):
     rate, amplitudes of sine and cosine. base: (m, 3) constant, sine, cosine of the base's speed; base_rate: -1
     where it is constant. limits (m, 2), smooth (m, 2): most force in stick, forward and backward, and whether
     that at the onset of slip agrees with it by algebra. tape (m, 2): number of the tape of slip. par (m, p):
-    its constants. unit: contacts with one weight only.
+    its constants. unit: contacts with one weight only. offsets, bands: `hybridsim.mechanics.bands`.
     """
 
     node_dof: np.ndarray
@@ -67,6 +68,8 @@ class Plant(NamedTuple):
     tape: np.ndarray
     par: np.ndarray
     unit: np.ndarray
+    offsets: np.ndarray
+    bands: np.ndarray
 
 
 class Laws(NamedTuple):
@@ -135,12 +138,15 @@ def build(system: MechanicalSystem) -> Built:
     laws, tape, par, is_linear = law_tapes(ordered)
     base, base_rate = bases(ordered, rates)
     limits, smooth = stick_limits(ordered)
+    single = count == n == m and not rates and len(laws.registers) == 1
+    single = single and W.nnz == B.nnz == n and bool((np.diff(node_con) == 1).all())
+    banded = in_bands(K, C, B, W, single, base[:, 0], still, par)
     plant = Plant(
         integers(node_dof), integers(node_con), integers(node_of), integers(con_node),
         *parts(K), *parts(C), *parts(B), *parts(W),
         integers(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
         *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates, dtype=float),
-        base, base_rate, limits, smooth, tape, par, integers(np.diff(W.indptr) == 1),
+        base, base_rate, limits, smooth, tape, par, integers(np.diff(W.indptr) == 1), *banded,
     )  # fmt: skip
     return Built(plant, laws, dofs, contacts, is_linear)
 

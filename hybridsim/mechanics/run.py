@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from hybridsim.engine.eight import WIDTH, room_for
 from hybridsim.engine.jit import call_kernel, kernel, kernel_address
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
@@ -177,7 +178,7 @@ def new_state(built: Built, order: int) -> State:
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
         tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
         flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
-        kernels=np.zeros(3, **ints), whole=np.zeros(6, **ints), real=np.zeros(4),
+        kernels=np.zeros(3, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
     )  # fmt: skip
 
 
@@ -189,15 +190,18 @@ def new_room(built: Built, order: int) -> Room:
     columns, tapes = order + 1, len(laws.registers)
     registers = int(laws.registers.max(initial=0))
     ints: dict[str, Any] = {"dtype": np.int64}
+    beside = WIDTH + int(abs(plant.offsets).max(initial=0))  # lanes of what stands beside a run
+    wide = -(-(max(n, m) + 2 * beside) // WIDTH) * WIDTH
     return Room(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
-        lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints), Q=np.zeros((columns, n)),
-        R=np.zeros((columns, m)), F=np.zeros((columns, m)), acc=np.zeros(n),
+        lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints), 
+        Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(n),
         trig=np.zeros((len(plant.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
-        place=np.zeros(tapes + 1, **ints), V=np.zeros(registers * m * (columns + 1)), poly=np.zeros(columns),
+        place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
+        V=room_for(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
         bern=np.zeros(columns), stack=np.zeros((64, columns + 2)), before=np.zeros(m, **ints),
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(columns),
+        line=np.zeros(columns), masks=room_for(2, wide), sums=room_for(3, wide),
     )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.eight import whole_vectors
 from hybridsim.engine.jit import inlined, kernel
 from hybridsim.mechanics.lanes import advance_lanes
 
@@ -124,13 +125,16 @@ def slip_forces(plant: Any, laws: Any, room: Any) -> None:
     for c in range(nc):
         room.up[c], room.down[c] = plant.onset[c, 0], plant.onset[c, 1]
     for t in range(laws.registers.shape[0]):
-        n = 0
+        count = 0
         for c in range(nc):
             if room.speed[c] != 0.0 and plant.tape[c, 0 if room.speed[c] > 0.0 else 1] == t:
-                room.lane[n] = c
-                n += 1
-        if n == 0:
+                room.lane[count] = c
+                count += 1
+        if count == 0:
             continue
+        n = whole_vectors(count)
+        for j in range(count, n):
+            room.lane[j] = room.lane[count - 1]
         for i in range(laws.registers[t] * n):
             room.V[i] = 0.0
         for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
@@ -145,7 +149,7 @@ def slip_forces(plant: Any, laws: Any, room: Any) -> None:
         for j in range(n):
             room.V[laws.speed[t] * n + j] = abs(room.speed[room.lane[j]])
         advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, 1, n, 0)
-        for j in range(n):
+        for j in range(count):
             c, value = room.lane[j], room.V[laws.out[t] * n + j]
             if room.speed[c] > 0.0:
                 room.up[c] = value

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.eight import WIDTH, larger, load, size, splat, store, whole_vectors
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import (
@@ -63,11 +64,11 @@ def reach(
     for k in range(top - 1, top + 1):
         largest_q, largest_v = 0.0, 0.0
         for a in range(nd):
-            x, size = room.dofs[a], abs(room.Q[k, a])
-            if not size < math.inf:
+            x, term = room.dofs[a], abs(room.Q[k, a])
+            if not term < math.inf:
                 return math.nan
-            at_q = size / (state.tolerance[0, x] + rtol * abs(room.Q[0, a]))
-            at_v = k * size / (state.tolerance[1, x] + rtol * abs(room.Q[1, a]))
+            at_q = term / (state.tolerance[0, x] + rtol * abs(room.Q[0, a]))
+            at_v = k * term / (state.tolerance[1, x] + rtol * abs(room.Q[1, a]))
             largest_q, largest_v = max(largest_q, at_q), max(largest_v, at_v)
         if largest_q * h**k > 1.0:
             h = largest_q ** (-1.0 / k)
@@ -87,24 +88,45 @@ def reach(
 
 
 @kernel
-def _exit_of(room: Any, size: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
-    """First time in (0, h] at which the polynomial in room.poly[:size] goes negative, in units of h.
+def _exit_of(room: Any, terms: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
+    """First time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
 
     Where it is zero all along it does not. On a short stretch a touch is passed if it is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
-    for k in range(size):
+    for k in range(terms):
         room.poly[k] *= power
         total += abs(room.poly[k])
         end += room.poly[k]
         power *= h
     if total == 0.0:
         return NEVER, 1.0
-    error = 2.0 * (abs(room.poly[size - 1]) + abs(room.poly[size - 2])) + 8.0 * _UNIT * total + slack
-    outcome, theta = first_exit(room.poly[:size], error, order, room.bern, room.stack, 0)
+    error = 2.0 * (abs(room.poly[terms - 1]) + abs(room.poly[terms - 2])) + 8.0 * _UNIT * total + slack
+    outcome, theta = first_exit(room.poly[:terms], error, order, room.bern, room.stack, 0)
     if outcome == OPEN and is_short and end > error:
         outcome = NEVER
     return outcome, theta
+
+
+@kernel
+def _bound_rest(series: Any, sums: Any, row: int, nc: int, last: int, h: float) -> None:
+    """Of each contact, the sum of the sizes of the terms 1..last of a series over a time h."""
+    wide, step = series.shape[1], splat(h)
+    for i in range(0, nc, WIDTH):
+        total = splat(0.0)
+        for k in range(last, 0, -1):
+            total = (total + size(load(series, k * wide + i))) * step
+        store(sums, row * wide + i, total)
+
+
+@inlined
+def _is_far(series: Any, i: int, last: int, lead: float, rest: float, power: float, h: float, most: float) -> bool:
+    """Whether a guard that begins at `lead` stays above what `first_exit` would ask of it, whatever its terms do.
+
+    rest: the sum of their sizes; power: h**last; most: size of what its value at the start is a difference of.
+    """
+    error = 2.0 * (abs(series[last, i]) * power + abs(series[last - 1, i]) * (power / h))
+    return lead - rest > error + 16.0 * _UNIT * (most + rest)
 
 
 @kernel
@@ -112,15 +134,21 @@ def isolate(
     plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
     """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
+    _bound_rest(room.R, room.sums, 0, nc, top - 1, h)
+    _bound_rest(room.F, room.sums, 1, nc, top - 2, h)
+    power = h ** (top - 2)
     for i in range(nc):
         c = room.cons[i]
         room.exits[i], room.kinds[i] = OPEN_END, VELOCITY
         fresh = state.stamp[c] == tau
         if state.mode[c] != STICK:
-            sigma = float(state.mode[c])
+            sigma, order = float(state.mode[c]), state.decree[c, 0] if fresh else 0
+            lead = sigma * room.R[0, i]
+            if order == 0 and _is_far(room.R, i, top - 1, lead, room.sums[0, i], power * h, h, lead):
+                continue
             for k in range(top):
                 room.poly[k] = sigma * room.R[k, i]
-            outcome, theta = _exit_of(room, top, h, state.decree[c, 0] if fresh else 0, 0.0, is_short)
+            outcome, theta = _exit_of(room, top, h, order, 0.0, is_short)
             if outcome == OPEN:
                 return OPEN, theta
             if outcome == FOUND:
@@ -128,15 +156,15 @@ def isolate(
         elif state.held[c] == 0:
             for side in range(2):
                 sigma = 1.0 if side == 0 else -1.0
-                limit = plant.limits[c, side]
-                size = abs(room.F[0, i])
+                limit, order = plant.limits[c, side], state.decree[c, side] if fresh else 0
+                most = max(limit, abs(room.F[0, i]))
+                lead = limit - sigma * room.F[0, i]
+                if order == 0 and _is_far(room.F, i, top - 2, lead, room.sums[1, i], power, h, most):
+                    continue
                 for k in range(top - 1):
                     room.poly[k] = -sigma * room.F[k, i]
                 room.poly[0] += limit
-                slack = 8.0 * _UNIT * max(limit, size)
-                outcome, theta = _exit_of(
-                    room, top - 1, h, state.decree[c, side] if fresh else 0, slack, is_short
-                )
+                outcome, theta = _exit_of(room, top - 1, h, order, 8.0 * _UNIT * most, is_short)
                 if outcome == OPEN:
                     return OPEN, theta
                 if outcome == FOUND and theta * h < room.exits[i]:
@@ -145,35 +173,48 @@ def isolate(
 
 
 @kernel
-def _law_holds(plant: Any, laws: Any, state: Any, room: Any, h: float, top: int, rtol: float) -> bool:
+def _at_ends(room: Any, nc: int, h: float, top: int) -> None:
+    """Relative velocities and forces at the end, or at the exits, and the largest terms of these: to room.sums."""
+    R, F, sums = room.R, room.F, room.sums
+    wide = R.shape[1]
+    for i in range(whole_vectors(nc)):
+        sums[0, i] = min(h, room.exits[i]) if i < nc else 0.0
+    for i in range(0, nc, WIDTH):
+        d, velocity = load(sums, i), splat(0.0)
+        for k in range(top - 1, -1, -1):
+            velocity = velocity * d + load(R, k * wide + i)
+        force, largest, power = splat(0.0), splat(0.0), splat(1.0)
+        for k in range(top - 1):
+            term = load(F, k * wide + i) * power
+            force = force + term
+            largest = larger(largest, size(term))
+            power = power * d
+        store(sums, i, velocity)
+        store(sums, wide + i, force)
+        store(sums, 2 * wide + i, largest)
+
+
+@kernel
+def _law_holds(
+    plant: Any, laws: Any, state: Any, room: Any, nc: int, h: float, top: int, rtol: float
+) -> bool:
     """Whether the forces of what slips are what their laws say at the end of the patch's series, or at their exits."""
-    used = 0
+    _at_ends(room, nc, h, top)
     for t in range(laws.registers.shape[0]):
-        first, n = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t]
-        if n == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
+        first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
+        if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
             continue
-        orders, at = top + 1, room.place[t]
-        for r in range(laws.registers[t]):  # order 0 of the registers, one after another
-            for j in range(n):
-                room.V[room.place[-1] + used + r * n + j] = room.V[at + r * orders * n + j]
-        base = room.place[-1] + used
+        n = whole_vectors(count)  # order 0 of the registers is done anew, and nothing needs the old one any more
+        speed, out = at + laws.speed[t] * (top + 1) * n, at + laws.out[t] * (top + 1) * n
         for j in range(n):
+            i = room.lane[first + min(j, count - 1)]
+            room.V[speed + j] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
+        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, top + 1, n, 0)
+        for j in range(count):
             i = room.lane[first + j]
-            d, v = min(h, room.exits[i]), 0.0
-            for k in range(top - 1, -1, -1):
-                v = v * d + room.R[k, i]
-            room.V[base + laws.speed[t] * n + j] = max(state.mode[room.cons[i]] * v, 0.0)
-        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, base, 1, n, 0)
-        for j in range(n):
-            i = room.lane[first + j]
-            d, f, size, power = min(h, room.exits[i]), 0.0, 0.0, 1.0
-            for k in range(top - 1):
-                term = room.F[k, i] * power
-                f += term
-                size = max(size, abs(term))
-                power *= d
-            law = state.mode[room.cons[i]] * room.V[base + laws.out[t] * n + j]
-            if not abs(f - law) <= (_DEFECT * rtol + 64.0 * _UNIT) * size:
+            mode = state.mode[room.cons[i]]
+            off = abs(room.sums[1, i] - mode * room.V[out + j])
+            if mode != STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * room.sums[2, i]:
                 return False
     return True
 
@@ -193,7 +234,7 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
             continue
         if outcome == OPEN:  # a touch: what comes within rounding and is not certainly negative does not fire
             state.counts[5] += 1
-        if _law_holds(plant, laws, state, room, h, top, rtol):
+        if _law_holds(plant, laws, state, room, nc, h, top, rtol):
             state.real[LENGTH] = h
             return 0
         h *= 0.5

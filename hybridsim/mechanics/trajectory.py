@@ -9,7 +9,8 @@ import numpy as np
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import phase_of
 from hybridsim.mechanics.clusters import factorise, project
-from hybridsim.mechanics.expansion import expanded, value_and_slope, whole
+from hybridsim.mechanics.expansion import expanded, whole
+from hybridsim.mechanics.polynomials import value_and_slope
 
 
 @kernel
@@ -74,7 +75,7 @@ def quantities(
                 project(plant, state, room, j, 0.0, out[i, n:])
         for x in range(n):
             state.x[0, x], state.x[1, x] = out[i, x], out[i, n + x]
-        nd, nc = whole(plant, state, room)
+        nd, nc = whole(plant, state, room, 2)
         expanded(plant, laws, state, room, nodes, nd, nc, 0.0, 2)
         for c in range(nc):
             forces[i, c], velocities[i, c] = room.F[0, c], room.R[0, c]
