@@ -92,7 +92,7 @@ class Room(NamedTuple):
     exits: np.ndarray
     kinds: np.ndarray
     line: np.ndarray
-    masks: np.ndarray
+    strips: np.ndarray
     sums: np.ndarray
 
 

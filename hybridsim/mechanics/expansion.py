@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.eight import whole_vectors
+from hybridsim.engine.eight import WIDTH, whole_vectors
 from hybridsim.engine.jit import call_kernel, inlined, kernel
-from hybridsim.engine.lean_tape import PAIRED
 from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
-from hybridsim.mechanics.lanes import advance_lanes, clear
+from hybridsim.mechanics.lanes import advance_lanes, clear_constants, lane_place
 from hybridsim.mechanics.polynomials import shift, value_and_slope
 from hybridsim.mechanics.runs import clear_beside, expand_run
 
@@ -126,28 +125,18 @@ def _lanes(plant: Any, laws: Any, state: Any, room: Any, nc: int, orders: int) -
 @kernel
 def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) -> int:
     """Put the constants of the contacts in lanes lane_ptr[t]..last - 1 into a tape's registers; where these end."""
-    first, at = room.lane_ptr[t], room.place[t]
-    count = last - first
-    n = whole_vectors(count)
-    length = orders * n
-    for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
-        spot = at + laws.constant_rows[i, 4] * length
-        pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1
-        clear(room.V, spot, pair * length)
+    first, at, block = room.lane_ptr[t], room.place[t], laws.registers[t] * orders * WIDTH
+    count, rows = last - first, laws.constant_rows
+    for i in range(at, at + whole_vectors(count) // WIDTH * block, block):
+        clear_constants(laws, room, t, i, orders)
     for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
-        spot = at + laws.par_reg[i] * length
-        clear(room.V, spot, length)
-        for j in range(n):
+        for j in range(whole_vectors(count)):
             c = room.cons[room.lane[first + min(j, count - 1)]]
-            room.V[spot + j] = plant.par[c, i - laws.par_ptr[t]]
-    for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
-        spot = at + laws.number_reg[i] * length
-        clear(room.V, spot, length)
-        for j in range(n):
-            room.V[spot + j] = laws.number_val[i]
-    rows = laws.constant_rows[laws.constant_ptr[t] : laws.constant_ptr[t + 1]]
-    advance_lanes(rows, room.V, at, orders, n, 0)
-    return at + laws.registers[t] * length
+            place = lane_place(at, block, laws.par_reg[i], orders, 0, j)
+            room.V[place] = plant.par[c, i - laws.par_ptr[t]]
+    for i in range(at, at + whole_vectors(count) // WIDTH * block, block):
+        advance_lanes(rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room, i, orders, 0)
+    return at + whole_vectors(count) // WIDTH * block
 
 
 @inlined
@@ -155,18 +144,18 @@ def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k
     """Coefficient k of the forces of all that slips, from that of the relative velocities."""
     for t in range(laws.registers.shape[0]):
         first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
-        if count == 0:
-            continue
-        n = whole_vectors(count)
-        speed = at + (laws.speed[t] * orders + k) * n
-        for j in range(n):
+        block = laws.registers[t] * orders * WIDTH
+        for j in range(whole_vectors(count)):
             i = room.lane[first + min(j, count - 1)]
-            room.V[speed + j] = state.mode[room.cons[i]] * room.R[k, i]
-        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, orders, n, k)
-        out = at + (laws.out[t] * orders + k) * n
+            place = lane_place(at, block, laws.speed[t], orders, k, j)
+            room.V[place] = state.mode[room.cons[i]] * room.R[k, i]
+        for j in range(0, count, WIDTH):
+            place = at + j // WIDTH * block
+            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room, place, orders, k)
         for j in range(count):
             i = room.lane[first + j]
-            room.F[k, i] = state.mode[room.cons[i]] * room.V[out + j]
+            force = room.V[lane_place(at, block, laws.out[t], orders, k, j)]
+            room.F[k, i] = state.mode[room.cons[i]] * force
 
 
 @inlined

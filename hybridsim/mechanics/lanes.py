@@ -1,8 +1,8 @@
 """A tape run for many contacts at once: one interpreter, one row of numbers for each register and order.
 
-The recurrences are those of `hybridsim.engine.taylor`; here the innermost loop goes over contacts (lanes), so that the
-interpreter's own cost is shared among them. Lanes come in whole vectors: those beyond the last contact are copies of
-its lane.
+The recurrences are those of `hybridsim.engine.taylor`; here each operation is done for eight contacts (lanes), so that
+the interpreter's own cost is shared among them. Each eight have a block of their own: its registers one behind the
+other, of each its coefficients. Lanes beyond the last contact are copies of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
     DIVIDE_BY,
+    PAIRED,
     SCALE,
     SINCOS_LINEAR,
     SUB_CONSTANT,
@@ -40,27 +41,6 @@ from hybridsim.engine.tape import (
 
 
 @inlined
-def _product(V: Any, z: int, a: int, b: int, count: int, n: int, factor: float) -> None:
-    """V[z] += factor * sum_{i<count} V[a + i n] V[b - i n], lane by lane; a: of its first coefficient, b: of its last."""
-    weight = splat(factor)
-    for j in range(0, n, WIDTH):
-        total = load(V, z + j)
-        for i in range(count):
-            total = total + weight * (load(V, a + i * n + j) * load(V, b - i * n + j))
-        store(V, z + j, total)
-
-
-@inlined
-def _weighted(V: Any, out: int, a: int, b: int, k: int, last: int, n: int, factor: float) -> None:
-    """V[out] += factor * sum_{i=1}^{last} i a_i b_{k-i}; a, b: places of coefficient 0."""
-    for j in range(0, n, WIDTH):
-        total = load(V, out + j)
-        for i in range(1, last + 1):
-            total = total + splat(factor * i) * (load(V, a + i * n + j) * load(V, b + (k - i) * n + j))
-        store(V, out + j, total)
-
-
-@inlined
 def clear(V: Any, at: int, length: int) -> None:
     """Zeros from a place on, in whole vectors."""
     for i in range(at, at + length, WIDTH):
@@ -68,16 +48,34 @@ def clear(V: Any, at: int, length: int) -> None:
 
 
 @inlined
-def _fill(V: Any, z: int, n: int, value: float) -> None:
-    """One number in every lane."""
-    for j in range(0, n, WIDTH):
-        store(V, z + j, splat(value))
+def lane_place(at: int, block: int, register: int, orders: int, k: int, lane: int) -> int:
+    """Where coefficient k of a register has its number for a lane."""
+    return at + (lane // WIDTH) * block + (register * orders + k) * WIDTH + lane % WIDTH
+
+
+@inlined
+def _product(V: Any, a: int, b: int, first: int, last: int) -> Any:
+    """sum_{i=first}^{last} a_i b_{first + last - i}; a: place of coefficient `first`, b: of `last`."""
+    total = splat(0.0)
+    for _ in range(first, last + 1):
+        total = total + load(V, a) * load(V, b)
+        a, b = a + WIDTH, b - WIDTH
+    return total
+
+
+@inlined
+def _weighted(V: Any, a: int, b: int, k: int, last: int) -> Any:
+    """sum_{i=1}^{last} i a_i b_{k-i}; a, b: places of coefficient 0."""
+    total = splat(0.0)
+    for i in range(1, last + 1):
+        total = total + splat(float(i)) * (load(V, a + i * WIDTH) * load(V, b + (k - i) * WIDTH))
+    return total
 
 
 @kernel
-def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: int, n: int) -> None:
+def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: int) -> None:
     """Order 0 of the operations that follow a differential equation."""
-    for j in range(n):
+    for j in range(WIDTH):
         u = V[a + j]
         if op == EXP:
             V[o + j] = math.inf if u >= 709.0 else math.exp(u)
@@ -88,6 +86,8 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
         elif op == TANGENT:
             y = math.tan(u) if flag == 0 else math.tanh(u)
             V[o + j], V[o2 + j] = y, 1.0 + (y * y if flag == 0 else -y * y)
+        elif op == SQRT:
+            V[o + j] = math.sqrt(u) if u >= 0.0 else math.nan
         elif op == INTEGRAL:
             v, y = V[b + j], math.nan
             if kind == LOG and v > 0.0:
@@ -102,93 +102,98 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 
 
 @kernel
-def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int, n: int) -> None:
+def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int) -> None:
     """Order k >= 1 of the operations that follow a differential equation; places of coefficient 0."""
-    o, o2 = out + k * n, out2 + k * n
-    _fill(V, o, n, 0.0)
+    o, o2, share = out + k * WIDTH, out2 + k * WIDTH, splat(1.0 / k)
     if op == EXP:
-        _weighted(V, o, a, out, k, k, n, 1.0 / k)
+        store(V, o, share * _weighted(V, a, out, k, k))
     elif op == INTEGRAL:
-        _weighted(V, o, out, a, k, k - 1, n, -1.0 / k)
-        for j in range(0, n, WIDTH):
-            store(V, o + j, (load(V, b + k * n + j) + load(V, o + j)) / load(V, a + j))
+        store(V, o, (load(V, b + k * WIDTH) - share * _weighted(V, out, a, k, k - 1)) / load(V, a))
+    elif op == SQRT:
+        half = splat(0.5)
+        store(V, o, half * load(V, a + k * WIDTH) - half * _product(V, out + WIDTH, o - WIDTH, 1, k - 1))
+        for j in range(WIDTH):
+            V[o + j] = 0.0 if V[out + j] == 0.0 and V[o + j] == 0.0 else V[o + j] / V[out + j]
     else:
-        _fill(V, o2, n, 0.0)
-        _weighted(V, o, a, out2, k, k, n, 1.0 / k)
+        store(V, o, share * _weighted(V, a, out2, k, k))
         if op == TANGENT:
-            _product(V, o2, out, out + k * n, k + 1, n, 1.0 if flag == 0 else -1.0)
+            square = _product(V, out, o, 0, k)
+            store(V, o2, square if flag == 0 else splat(-1.0) * square)
         else:
-            _weighted(V, o2, a, out, k, k, n, (1.0 if op == SINHCOSH else -1.0) / k)
+            change = share * _weighted(V, a, out, k, k)
+            store(V, o2, change if op == SINHCOSH else splat(-1.0) * change)
 
 
 @inlined
-def _quotient(V: Any, z: int, x: int, out: int, b: int, k: int, n: int) -> None:
-    """V[z] = (V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: places of coefficient 0."""
-    for j in range(0, n, WIDTH):
-        total = load(V, x + j)
-        for i in range(k):
-            total = total - load(V, out + i * n + j) * load(V, b + (k - i) * n + j)
-        store(V, z + j, total / load(V, b + j))
+def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
+    """(V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: places of coefficient 0.
+
+    The newest coefficient of b comes last, and nothing is divided by b_0 after it: a processor that works ahead has all
+    else done by then.
+    """
+    inverse, total = splat(1.0) / load(V, b), load(V, x)
+    b += WIDTH
+    for i in range(out + (k - 1) * WIDTH, out - 1, -WIDTH):
+        total = total - load(V, i) * load(V, b)
+        b += WIDTH
+    return total * inverse
 
 
 @inlined
-def _shifted(V: Any, z: int, x: int, c: int, k: int, n: int, signs: tuple[float, float]) -> None:
-    """V[z] = a series and a constant, with their signs."""
-    for j in range(0, n, WIDTH):
-        total = splat(signs[0]) * load(V, x + j)
-        if k == 0:
-            total = total + splat(signs[1]) * load(V, c + j)
-        store(V, z + j, total)
+def _with_constant(op: int, x: Any, c: Any) -> Any:
+    """Order 0 of a series and a constant."""
+    if op == ADD_CONSTANT:
+        return x + c
+    return x - c if op == SUB_CONSTANT else c - x
 
 
 @kernel
-def advance_lanes(rows: Any, V: Any, base: int, orders: int, n: int, k: int) -> None:
-    """Coefficient k of every operation for n lanes; register r has its coefficient k at base + (r*orders + k)*n.
+def advance_lanes(rows: Any, first: int, last: int, room: Any, base: int, orders: int, k: int) -> None:
+    """Coefficient k of the operations first..last - 1 for the eight lanes of a block that begins at a base in room.V.
 
-    n is a whole number of vectors.
+    Register r has its coefficient k at base + (r*orders + k)*WIDTH.
     """
-    length = orders * n
-    for r in range(rows.shape[0]):
-        op, flag, kind = rows[r, 0], rows[r, 2], rows[r, 3]
+    V, length = room.V, orders * WIDTH
+    for r in range(first, last):
+        op = rows[r, 0]
         a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
-        z, x, y = out + k * n, a + k * n, b + k * n
+        z, x, y = out + k * WIDTH, a + k * WIDTH, b + k * WIDTH
         if op == SCALE:
-            for j in range(0, n, WIDTH):
-                store(V, z + j, load(V, x + j) * load(V, b + j))
+            store(V, z, load(V, x) * load(V, b))
+        elif ADD_CONSTANT <= op <= CONSTANT_SUB:
+            value = load(V, x)
+            if k == 0:
+                value = _with_constant(op, value, load(V, b))
+            elif op == CONSTANT_SUB:
+                value = splat(-1.0) * value
+            store(V, z, value)
         elif op == DIV:
-            _quotient(V, z, x, out, b, k, n)
+            store(V, z, _quotient(V, x, out, b, k))
         elif op == MUL:
-            _fill(V, z, n, 0.0)
-            _product(V, z, a, y, k + 1, n, 1.0)
+            store(V, z, _product(V, a, y, 0, k))
         elif op == ADD:
-            for j in range(0, n, WIDTH):
-                store(V, z + j, load(V, x + j) + load(V, y + j))
+            store(V, z, load(V, x) + load(V, y))
         elif op == SUB:
-            for j in range(0, n, WIDTH):
-                store(V, z + j, load(V, x + j) - load(V, y + j))
+            store(V, z, load(V, x) - load(V, y))
         elif op == DIVIDE_BY:
-            for j in range(0, n, WIDTH):
-                store(V, z + j, load(V, x + j) / load(V, b + j))
+            store(V, z, load(V, x) / load(V, b))
         elif op == NEG:
-            for j in range(0, n, WIDTH):
-                store(V, z + j, splat(-1.0) * load(V, x + j))
-        elif op == ADD_CONSTANT:
-            _shifted(V, z, x, b, k, n, (1.0, 1.0))
-        elif op == SUB_CONSTANT:
-            _shifted(V, z, x, b, k, n, (1.0, -1.0))
-        elif op == CONSTANT_SUB:
-            _shifted(V, z, x, b, k, n, (-1.0, 1.0))
-        elif op == SQRT:
-            for j in range(n):
-                if k == 0:
-                    V[z + j] = math.sqrt(V[x + j]) if V[x + j] >= 0.0 else math.nan
-                else:
-                    V[z + j] = 0.5 * V[x + j]
-            if k > 0:
-                _product(V, z, out + n, out + (k - 1) * n, k - 1, n, -0.5)
-                for j in range(n):
-                    V[z + j] = 0.0 if V[out + j] == 0.0 and V[z + j] == 0.0 else V[z + j] / V[out + j]
+            store(V, z, splat(-1.0) * load(V, x))
         elif k == 0:
-            _leading(op, V, a, b, flag, kind, out, out + length, n)
+            _leading(op, V, a, b, rows[r, 2], rows[r, 3], out, out + length)
         else:
-            _higher(op, V, a, b, flag, out, out + length, k, n)
+            _higher(op, V, a, b, rows[r, 2], out, out + length, k)
+
+
+@kernel
+def clear_constants(laws: Any, room: Any, t: int, base: int, orders: int) -> None:
+    """Zeros in the registers of a block that do not move with the orders, and its numbers."""
+    length = orders * WIDTH
+    for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
+        pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1
+        clear(room.V, base + laws.constant_rows[i, 4] * length, pair * length)
+    for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
+        clear(room.V, base + laws.par_reg[i] * length, length)
+    for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
+        clear(room.V, base + laws.number_reg[i] * length, length)
+        store(room.V, base + laws.number_reg[i] * length, splat(laws.number_val[i]))

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from math import comb
 from typing import Any
 
+import numpy as np
+
+from hybridsim.engine.eight import WIDTH, load, splat, store
 from hybridsim.engine.jit import inlined, kernel
+
+TERMS = 32  # the most that a series has: 31 for a relative tolerance of 1e-15
+_CHOICES = np.array([[float(comb(i, k)) for k in range(TERMS)] for i in range(TERMS)])
 
 
 @inlined
@@ -19,12 +26,22 @@ def value_and_slope(series: Any, d: float) -> tuple[float, float]:
 
 @kernel
 def shift(series: Any, d: float, top: int, out: Any) -> None:
-    """Coefficients 0..top of a polynomial about d (Horner's scheme, again and again)."""
+    """Coefficients 0..top of a polynomial about d: sum_i series_i C(i, k) d**(i - k).
+
+    out: room for 3 TERMS numbers; behind the result are the powers, d**(last - m) at m, and zeros.
+    """
     last = series.shape[0] - 1
-    for k in range(last + 1):
-        out[k] = series[k]
     if d == 0.0:
+        for k in range(last + 1):
+            out[k] = series[k]
         return
-    for k in range(top + 1):
-        for i in range(last - 1, k - 1, -1):
-            out[i] += d * out[i + 1]
+    power = 1.0
+    for m in range(last, -1, -1):
+        out[TERMS + m] = power
+        power *= d
+    for k in range(0, top + 1, WIDTH):
+        total = splat(0.0)
+        for i in range(k, last + 1):
+            weights = load(_CHOICES, i * TERMS + k) * load(out, TERMS + last - i + k)
+            total = total + splat(series[i]) * weights
+        store(out, k, total)

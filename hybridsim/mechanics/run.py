@@ -35,6 +35,7 @@ from hybridsim.mechanics.decision import decide
 from hybridsim.mechanics.expansion import expand
 from hybridsim.mechanics.loop import FRESH, LAST, RADIUS, WHERE, run
 from hybridsim.mechanics.plant import Built
+from hybridsim.mechanics.polynomials import TERMS
 from hybridsim.mechanics.steps import stretch
 
 STATUS = {
@@ -203,5 +204,5 @@ def new_room(built: Built, order: int) -> Room:
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(columns), masks=room_for(2, wide), sums=room_for(3, wide),
+        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(3, wide),
     )  # fmt: skip

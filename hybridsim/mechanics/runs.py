@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.eight import WIDTH, choose, load, put, splat, store, whole_vectors
-from hybridsim.engine.jit import kernel
-from hybridsim.mechanics.arrays import FIRST, STICK
+from hybridsim.engine.jit import inlined, kernel
+from hybridsim.mechanics.arrays import FIRST
 from hybridsim.mechanics.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WEIGHT
-from hybridsim.mechanics.lanes import advance_lanes, clear
+from hybridsim.mechanics.lanes import advance_lanes, clear, clear_constants
 from hybridsim.mechanics.polynomials import shift, value_and_slope
 
-_SLIP, _BESIDE = 0, 1  # rows of masks: direction of slip of what is in the run, and what stands beside it
+# Of a strip, the rows: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
+# base; what a force does; what holds; constant acceleration; diagonals.
+_SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range(8)
 
 
 @kernel
@@ -56,74 +58,77 @@ def clear_beside(plant: Any, room: Any, count: int, top: int) -> None:
         clear(room.Q, k * wide + count, after)
 
 
+@inlined
+def _height(plant: Any) -> int:
+    return (plant.bands.shape[0] - VALUES - plant.par.shape[1] + _DIAGONALS) * WIDTH
+
+
 @kernel
-def _masks(plant: Any, laws: Any, state: Any, room: Any, first: int, count: int, orders: int) -> None:
-    """Who slips which way; and the constants of the law, in lanes that are all contacts."""
-    n, wide, size = whole_vectors(count), room.Q.shape[1], plant.bands.shape[1]
-    length = orders * n
-    for a in range(n):
-        room.masks[_SLIP, a] = float(state.mode[first + a]) if a < count else 0.0
-        room.masks[_BESIDE, a] = 0.0 if a < count else 1.0
+def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: int, orders: int) -> None:
+    """Put what belongs to each eight of the run side by side: strips, and the constants of the law, all contacts lanes."""
+    size, block, height = plant.bands.shape[1], laws.registers[0] * orders * WIDTH, _height(plant)
+    strips, bands, V = room.strips, plant.bands, room.V
+    diagonals, parameters = VALUES + plant.par.shape[1], laws.par_reg.shape[0]
+    room.lane_ptr[0], room.lane_ptr[1], room.place[0] = 0, count, 0
     for a in range(count):
         room.lane[a] = a
-    room.lane_ptr[0], room.lane_ptr[1], room.place[0], room.place[1] = 0, count, 0, laws.registers[0] * length
-    for i in range(laws.constant_rows.shape[0]):
-        clear(room.V, laws.constant_rows[i, 4] * length, length)
-    for i in range(laws.par_reg.shape[0]):
-        spot = laws.par_reg[i] * length
-        clear(room.V, spot, length)
-        for a in range(0, n, WIDTH):
-            store(room.V, spot + a, load(plant.bands, (VALUES + i) * size + first + a))
-    for i in range(laws.number_reg.shape[0]):
-        spot = laws.number_reg[i] * length
-        clear(room.V, spot, length)
-        for a in range(0, n, WIDTH):
-            store(room.V, spot + a, splat(laws.number_val[i]))
-    advance_lanes(laws.constant_rows, room.V, 0, orders, n, 0)
+    for g in range(whole_vectors(count) // WIDTH):
+        s, x = g * height, first + g * WIDTH
+        for i in range(WIDTH):
+            inside = g * WIDTH + i < count
+            strips[s + _SLIP * WIDTH + i] = float(state.mode[x + i]) if inside else 0.0
+            strips[s + _BESIDE * WIDTH + i] = 0.0 if inside else 1.0
+        slip, weight = load(strips, s + _SLIP * WIDTH), load(bands, WEIGHT * size + x)
+        store(strips, s + _FORWARD * WIDTH, slip * weight)
+        store(strips, s + _BASE * WIDTH, slip * load(bands, BASE * size + x))
+        store(strips, s + _MOBILITY * WIDTH, load(bands, MOBILITY * size + x))
+        store(strips, s + _HOLDING * WIDTH, load(bands, HOLDING * size + x) * weight)
+        store(strips, s + _STILL * WIDTH, load(bands, STILL * size + x))
+        for i in range(diagonals, bands.shape[0]):
+            store(strips, s + (_DIAGONALS + i - diagonals) * WIDTH, load(bands, i * size + x))
+        clear_constants(laws, room, 0, g * block, orders)
+        for i in range(parameters):
+            store(V, g * block + laws.par_reg[i] * orders * WIDTH, load(bands, (VALUES + i) * size + x))
+        advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], room, g * block, orders, 0)
 
 
 @kernel
 def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: int) -> None:
     """Series of the run that was gathered: Q (positions), R (relative velocities), F (forces)."""
-    first, n, orders = state.whole[FIRST], whole_vectors(count), top + 1
-    _masks(plant, laws, state, room, first, count, orders)
-    Q, R, F, V, bands, masks, offsets = room.Q, room.R, room.F, room.V, plant.bands, room.masks, plant.offsets
-    wide, size, zero = Q.shape[1], bands.shape[1], splat(0.0)
-    diagonals = VALUES + plant.par.shape[1]
-    damped = bands.shape[0] > diagonals + offsets.shape[0]
-    speed, out = laws.speed[0] * orders * n, laws.out[0] * orders * n
-    for k in range(top):
-        row, step = k * wide, splat(k + 1.0)
-        for a in range(0, n, WIDTH):
-            slip = load(masks, a)
-            relative = load(bands, WEIGHT * size + first + a) * load(Q, row + wide + a) * step
+    orders = top + 1
+    _lay_out(plant, laws, state, room, state.whole[FIRST], count, orders)
+    Q, R, F, V, strips, offsets = room.Q, room.R, room.F, room.V, room.strips, plant.offsets
+    wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
+    height, block = _height(plant), laws.registers[0] * orders * WIDTH
+    damped = plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts
+    speed, out = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH
+    for k in range(top - 1):
+        step, share = splat(k + 1.0), splat(1.0 / ((k + 1.0) * (k + 2.0)))
+        for g in range(whole_vectors(count) // WIDTH):
+            s, v, row = g * height, g * block, k * wide + g * WIDTH
+            slip = load(strips, s + _SLIP * WIDTH)
+            forward = load(strips, s + _FORWARD * WIDTH) * step * load(Q, row + wide)
+            change = zero
             if k == 0:
-                relative = relative - load(bands, BASE * size + first + a)
-            relative = choose(slip, relative, zero)
-            store(R, row + a, relative)
-            store(V, speed + k * n + a, slip * relative)
-        if k == top - 1:
-            break
-        advance_lanes(laws.rows, V, 0, orders, n, k)
-        divisor = splat((k + 1.0) * (k + 2.0))
-        for a in range(0, n, WIDTH):
-            slip = load(masks, a)
-            force = choose(slip, slip * load(V, out + k * n + a), zero)
-            change = load(bands, STILL * size + first + a) if k == 0 else zero
-            for s in range(offsets.shape[0]):
-                place = (diagonals + s) * size + first + a
-                change = change - load(bands, place) * load(Q, row + a + offsets[s])
-            change = change - load(bands, MOBILITY * size + first + a) * force
+                forward = forward - load(strips, s + _BASE * WIDTH)
+                change = load(strips, s + _STILL * WIDTH)
+            store(V, v + speed + k * WIDTH, forward)
+            store(R, row, slip * forward)
+            place = s + _DIAGONALS * WIDTH
+            for i in range(shifts):
+                change = change - load(strips, place + i * WIDTH) * load(Q, row + offsets[i])
             if damped:
                 total = zero
-                for s in range(offsets.shape[0]):
-                    place = (diagonals + offsets.shape[0] + s) * size + first + a
-                    total = total + load(bands, place) * load(Q, row + wide + a + offsets[s])
+                for i in range(shifts):
+                    total = total + load(strips, place + (shifts + i) * WIDTH) * load(Q, row + wide + offsets[i])
                 change = change - step * total
-            holding = load(bands, HOLDING * size + first + a) * (
-                load(bands, WEIGHT * size + first + a) * change
-            )
-            store(F, row + a, choose(slip, force, holding))
-            beside = load(masks, wide + a)
-            kept = choose(beside, load(Q, row + 2 * wide + a), zero)
-            store(Q, row + 2 * wide + a, choose(slip, change / divisor, kept))
+            advance_lanes(laws.rows, 0, law, room, v, orders, k)
+            force = slip * load(V, v + out + k * WIDTH)
+            change = change - load(strips, s + _MOBILITY * WIDTH) * choose(slip, force, zero)
+            store(F, row, choose(slip, force, load(strips, s + _HOLDING * WIDTH) * change))
+            kept = choose(load(strips, s + _BESIDE * WIDTH), load(Q, row + 2 * wide), zero)
+            store(Q, row + 2 * wide, choose(slip, change * share, kept))
+    for g in range(whole_vectors(count) // WIDTH):
+        row = (top - 1) * wide + g * WIDTH
+        forward = load(strips, g * height + _FORWARD * WIDTH) * splat(float(top)) * load(Q, row + wide)
+        store(R, row, load(strips, g * height + _SLIP * WIDTH) * forward)

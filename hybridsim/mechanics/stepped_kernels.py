@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.eight import whole_vectors
+from hybridsim.engine.eight import WIDTH, whole_vectors
 from hybridsim.engine.jit import inlined, kernel
-from hybridsim.mechanics.lanes import advance_lanes
+from hybridsim.mechanics.lanes import advance_lanes, clear_constants, lane_place
 
 HOLDS, ABOVE, BELOW = 0, 1, -1  # of a contact: stick, slip forward, slip backward; of an impact: closed, open
 FORCING, DAMPING, FRICTION, BASES, IMPACTS = range(5)  # works
@@ -121,7 +121,7 @@ def base_at(plant: Any, c: int, t: float) -> float:
 @kernel
 def slip_forces(plant: Any, laws: Any, room: Any) -> None:
     """Forces of slip, forward and backward, at the relative velocities; at rest on the side where these are not."""
-    nc, at = room.speed.shape[0], 0
+    nc = room.speed.shape[0]
     for c in range(nc):
         room.up[c], room.down[c] = plant.onset[c, 0], plant.onset[c, 1]
     for t in range(laws.registers.shape[0]):
@@ -132,25 +132,19 @@ def slip_forces(plant: Any, laws: Any, room: Any) -> None:
                 count += 1
         if count == 0:
             continue
-        n = whole_vectors(count)
-        for j in range(count, n):
-            room.lane[j] = room.lane[count - 1]
-        for i in range(laws.registers[t] * n):
-            room.V[i] = 0.0
-        for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
-            for j in range(n):
-                room.V[laws.par_reg[i] * n + j] = plant.par[room.lane[j], i - laws.par_ptr[t]]
-        for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
-            for j in range(n):
-                room.V[laws.number_reg[i] * n + j] = laws.number_val[i]
-        advance_lanes(
-            laws.constant_rows[laws.constant_ptr[t] : laws.constant_ptr[t + 1]], room.V, at, 1, n, 0
-        )
-        for j in range(n):
-            room.V[laws.speed[t] * n + j] = abs(room.speed[room.lane[j]])
-        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, 1, n, 0)
+        block = laws.registers[t] * WIDTH
+        for at in range(0, whole_vectors(count) // WIDTH * block, block):
+            clear_constants(laws, room, t, at, 1)
+        for j in range(whole_vectors(count)):
+            c = room.lane[min(j, count - 1)]
+            for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
+                room.V[lane_place(0, block, laws.par_reg[i], 1, 0, j)] = plant.par[c, i - laws.par_ptr[t]]
+            room.V[lane_place(0, block, laws.speed[t], 1, 0, j)] = abs(room.speed[c])
+        for at in range(0, whole_vectors(count) // WIDTH * block, block):
+            advance_lanes(laws.constant_rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room, at, 1, 0)
+            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room, at, 1, 0)
         for j in range(count):
-            c, value = room.lane[j], room.V[laws.out[t] * n + j]
+            c, value = room.lane[j], room.V[lane_place(0, block, laws.out[t], 1, 0, j)]
             if room.speed[c] > 0.0:
                 room.up[c] = value
             else:

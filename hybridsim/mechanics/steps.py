@@ -23,7 +23,7 @@ from hybridsim.mechanics.arrays import (
     UPPER,
     VELOCITY,
 )  # fmt: skip
-from hybridsim.mechanics.lanes import advance_lanes
+from hybridsim.mechanics.lanes import advance_lanes, lane_place
 
 _UNIT = 2.0**-53
 _DEFECT = 100.0  # as in the taylor integrator: how far the law may be from its series, in tolerances
@@ -204,16 +204,19 @@ def _law_holds(
         first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
         if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
             continue
-        n = whole_vectors(count)  # order 0 of the registers is done anew, and nothing needs the old one any more
-        speed, out = at + laws.speed[t] * (top + 1) * n, at + laws.out[t] * (top + 1) * n
-        for j in range(n):
+        orders = top + 1
+        block = laws.registers[t] * orders * WIDTH
+        for j in range(whole_vectors(count)):
             i = room.lane[first + min(j, count - 1)]
-            room.V[speed + j] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
-        advance_lanes(laws.rows[laws.row_ptr[t] : laws.row_ptr[t + 1]], room.V, at, top + 1, n, 0)
+            place = lane_place(at, block, laws.speed[t], orders, 0, j)
+            room.V[place] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
+        for j in range(0, count, WIDTH):  # order 0 is done anew, and nothing needs the old one any more
+            place = at + j // WIDTH * block
+            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room, place, orders, 0)
         for j in range(count):
             i = room.lane[first + j]
             mode = state.mode[room.cons[i]]
-            off = abs(room.sums[1, i] - mode * room.V[out + j])
+            off = abs(room.sums[1, i] - mode * room.V[lane_place(at, block, laws.out[t], orders, 0, j)])
             if mode != STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * room.sums[2, i]:
                 return False
     return True
