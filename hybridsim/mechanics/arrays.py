@@ -23,8 +23,8 @@ EXPAND, STRETCH, DECIDE = range(3)  # these kernels
 class State(NamedTuple):
     """Where a run is; P1 = order + 1.
 
-    x: (2, n) positions and velocities at the origin of the present step. series (n, P1): of each coordinate, from the
-    node's origin (within the step). mode (m,): 0 stick, else direction of slip. held (m,): -1 or +1 where the
+    x: (2, n) positions and velocities at the origin of the present step. series (P1, n): of each coordinate, from the
+    node's origin (within the step); both in whole vectors. mode (m,): 0 stick, else direction of slip. held (m,): -1 or +1 where the
     force of a contact at rest stays at its limit because others hold it. decree (m, 2), stamp (m,): leading
     coefficients of its guards that are zero just after an event, and when. until, guard (m,): next exit and
     its kind. pinv: pseudo-inverses of the Delassus matrices of what sticks, node by node. holds (nn,): how

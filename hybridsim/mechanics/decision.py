@@ -18,7 +18,7 @@ from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import AT, DECIDE, FIRED, INCONSISTENT, NODE, STICK, UPPER, VELOCITY
 from hybridsim.mechanics.clusters import factorise, project
 from hybridsim.mechanics.expansion import base_coefficient, base_speed, expanded, gather
-from hybridsim.mechanics.polynomials import value_and_slope
+from hybridsim.mechanics.polynomials import state_at
 
 _SHORT = 4  # order of the series in q that decide: accelerations and their first two derivatives
 _UNIT = 2.0**-53
@@ -81,10 +81,10 @@ def _stop_at(plant: Any, state: Any, j: int, tau: float) -> None:
     """Replace the series of a node by position and velocity at tau."""
     d = tau - state.origin[j]
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-        value, slope = value_and_slope(state.series[x], d)
-        for k in range(state.series.shape[1]):
-            state.series[x, k] = 0.0
-        state.series[x, 0], state.series[x, 1] = value, slope
+        value, slope = state_at(state.series, x, d)
+        for k in range(state.series.shape[0]):
+            state.series[k, x] = 0.0
+        state.series[0, x], state.series[1, x] = value, slope
     state.origin[j] = tau
 
 
@@ -94,7 +94,7 @@ def _is_zero(plant: Any, state: Any, c: int, tau: float) -> bool:
     base = base_speed(plant, state, c, tau)
     total, size = -base, abs(base)
     for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-        term = plant.w_val[e] * state.series[plant.w_col[e], 1]
+        term = plant.w_val[e] * state.series[1, plant.w_col[e]]
         total += term
         size += abs(term)
     return abs(total) <= _TERMS * _UNIT * size
@@ -105,10 +105,10 @@ def _set_velocities(plant: Any, state: Any, room: Any, j: int, tau: float) -> No
     """Make the velocities of a node meet the constraints of what is in stick."""
     factorise(plant, state, room, j)
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-        state.x[1, x] = state.series[x, 1]
+        state.x[1, x] = state.series[1, x]
     project(plant, state, room, j, tau, state.x[1])
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-        state.series[x, 1] = state.x[1, x]
+        state.series[1, x] = state.x[1, x]
 
 
 @kernel

@@ -14,7 +14,7 @@ from hybridsim.engine.eight import WIDTH, whole_vectors
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
 from hybridsim.mechanics.lanes import advance_lanes, clear_constants, lane_place
-from hybridsim.mechanics.polynomials import shift, value_and_slope
+from hybridsim.mechanics.polynomials import shift, state_at
 from hybridsim.mechanics.runs import clear_beside, expand_run
 
 
@@ -33,7 +33,7 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
         d = tau - state.origin[j]
         for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
             room.loc[x], room.dofs[nd] = nd, x
-            value, slope = value_and_slope(state.series[x], d)
+            value, slope = state_at(state.series, x, d)
             room.Q[0, nd], room.Q[1, nd] = value, slope
             nd += 1
         for c in range(plant.node_con[j], plant.node_con[j + 1]):
@@ -50,7 +50,7 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
             d = tau - state.origin[other]
             for x in range(plant.node_dof[other], plant.node_dof[other + 1]):
                 room.loc[x] = lane
-                shift(state.series[x], d, top, room.line)
+                shift(state.series, x, d, top, room.line)
                 for k in range(top + 1):
                     room.Q[k, lane] = room.line[k]
                 lane += 1

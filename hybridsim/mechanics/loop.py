@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from hybridsim.engine.eight import WIDTH, load, store
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.timepair import phase_of, two_sum
 from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END
 from hybridsim.mechanics.clusters import project
 from hybridsim.mechanics.decision import decided
 from hybridsim.mechanics.expansion import expanded, gather, whole
-from hybridsim.mechanics.polynomials import shift, value_and_slope
+from hybridsim.mechanics.polynomials import shift, states_at
 from hybridsim.mechanics.runs import gather_run
 from hybridsim.mechanics.steps import first_leaf, set_time, stretched
 
@@ -52,9 +53,9 @@ def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, contr
     state.flags[LAST] = 1 if h >= left else 0
     state.clock[2] = left if h >= left else h
     half = state.tree.shape[0] // 2
-    for x in range(nd):
-        for k in range(top + 1):
-            state.series[x, k] = room.Q[k, x]
+    for k in range(top + 1):
+        for x in range(0, nd, WIDTH):
+            store(state.series, k * state.series.shape[1] + x, load(room.Q, k * room.Q.shape[1] + x))
     for c in range(nc):
         state.until[c], state.guard[c] = room.exits[c], room.kinds[c]
         state.tree[half + c] = state.until[c]
@@ -76,8 +77,8 @@ def _keep(plant: Any, state: Any, room: Any, record: Any, count: int, tau: float
         record.piece[at, 0], record.piece[at, 1] = j, row
         record.start[at, 0], record.start[at, 1], record.start[at, 2] = state.clock[0], state.clock[1], tau
         for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            for k in range(state.series.shape[1]):
-                record.series[row, k] = state.series[x, k]
+            for k in range(state.series.shape[0]):
+                record.series[row, k] = state.series[k, x]
             row += 1
         record.used[0], record.used[1] = at + 1, row
 
@@ -129,7 +130,7 @@ def _changes_outside(
         j = room.nodes[i]
         d = tau - state.origin[j]
         for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            shift(state.series[x], d, top, room.line)
+            shift(state.series, x, d, top, room.line)
             position, velocity, power = 0.0, 0.0, 1.0
             for k in range(2, top + 1):
                 difference = abs(room.Q[k, room.loc[x]] - room.line[k])
@@ -149,7 +150,7 @@ def _changes_outside(
                     for f in range(plant.c_ptr[y], plant.c_ptr[y + 1]):
                         if plant.c_col[f] == x:
                             push += abs(plant.c_val[f]) * velocity
-                    value, slope = abs(state.series[y, 0]), abs(state.series[y, 1])
+                    value, slope = abs(state.series[0, y]), abs(state.series[1, y])
                     worst = max(worst, 0.5 * push * h * h / (state.tolerance[0, y] + rtol * value))
                     worst = max(worst, push * h / (state.tolerance[1, y] + rtol * slope))
     return worst
@@ -185,9 +186,9 @@ def _restart(
     h = stretched(plant, laws, state, room, left, rtol)
     if not h > 0.0:
         return -1
-    for a in range(nd):
-        for k in range(top + 1):
-            state.series[room.dofs[a], k] = room.Q[k, a]
+    for k in range(top + 1):
+        for a in range(nd):
+            state.series[k, room.dofs[a]] = room.Q[k, a]
     for i in range(nc):
         c = room.cons[i]
         state.until[c], state.guard[c] = tau + room.exits[i], room.kinds[i]
@@ -218,12 +219,17 @@ def _note(plant: Any, state: Any, room: Any, record: Any, j: int, tau: float, fi
 
 
 @kernel
-def _end_step(plant: Any, state: Any, tau: float) -> None:
+def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
     """All positions and velocities at tau, which becomes the origin."""
     for j in range(plant.node_dof.shape[0] - 1):
-        d = tau - state.origin[j]
         for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            state.x[0, x], state.x[1, x] = value_and_slope(state.series[x], d)
+            room.acc[x] = tau - state.origin[j]
+    for x in range(0, plant.dof_node.shape[0], WIDTH):
+        value, slope = states_at(state.series, x, load(room.acc, x))
+        store(room.sums, x, value)
+        store(room.sums, room.sums.shape[1] + x, slope)
+    for x in range(plant.dof_node.shape[0]):
+        state.x[0, x], state.x[1, x] = room.sums[0, x], room.sums[1, x]
     for c in range(plant.con_node.shape[0]):
         state.stamp[c] = 0.0 if state.stamp[c] == tau else -1.0  # zeros by decree hold at this instant only
     high, error = two_sum(state.clock[0], tau)
@@ -251,7 +257,7 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
             state.flags[FRESH] = 0
         tau = state.tree[1]
         if tau > state.clock[2]:
-            _end_step(plant, state, state.clock[2])
+            _end_step(plant, state, room, state.clock[2])
             if state.flags[LAST]:
                 state.clock[0], state.clock[1] = target[0], target[1]
             continue
@@ -269,4 +275,4 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
         if done < 0:
             return LOST
         if done == 0:
-            _end_step(plant, state, tau)
+            _end_step(plant, state, room, tau)

@@ -24,16 +24,37 @@ def value_and_slope(series: Any, d: float) -> tuple[float, float]:
     return value, slope
 
 
+@inlined
+def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
+    """The polynomial in a column, and its derivative, at d (Horner)."""
+    value, slope = series[series.shape[0] - 1, x], 0.0
+    for k in range(series.shape[0] - 2, -1, -1):
+        slope = slope * d + value
+        value = value * d + series[k, x]
+    return value, slope
+
+
+@inlined
+def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
+    """The same for eight columns, each at its own d."""
+    wide = series.shape[1]
+    value, slope = load(series, (series.shape[0] - 1) * wide + x), splat(0.0)
+    for k in range(series.shape[0] - 2, -1, -1):
+        slope = slope * d + value
+        value = value * d + load(series, k * wide + x)
+    return value, slope
+
+
 @kernel
-def shift(series: Any, d: float, top: int, out: Any) -> None:
-    """Coefficients 0..top of a polynomial about d: sum_i series_i C(i, k) d**(i - k).
+def shift(series: Any, x: int, d: float, top: int, out: Any) -> None:
+    """Coefficients 0..top of the polynomial in column x about d: sum_i series_i C(i, k) d**(i - k).
 
     out: room for 3 TERMS numbers; behind the result are the powers, d**(last - m) at m, and zeros.
     """
     last = series.shape[0] - 1
     if d == 0.0:
         for k in range(last + 1):
-            out[k] = series[k]
+            out[k] = series[k, x]
         return
     power = 1.0
     for m in range(last, -1, -1):
@@ -43,5 +64,5 @@ def shift(series: Any, d: float, top: int, out: Any) -> None:
         total = splat(0.0)
         for i in range(k, last + 1):
             weights = load(_CHOICES, i * TERMS + k) * load(out, TERMS + last - i + k)
-            total = total + splat(series[i]) * weights
+            total = total + splat(series[i, x]) * weights
         store(out, k, total)

@@ -92,7 +92,7 @@ class MechanicalRun:
     def _settle_start(self, *packs: Any) -> int:
         """Modes at the start: by the sign of what moves, decided where it does not."""
         plant, state = self.built.plant, self.state
-        state.series[:, :2] = state.x.T
+        state.series[:2, : len(plant.dof_node)] = state.x
         for r, rate in enumerate(plant.rates):
             state.phase[r] = phase_of(state.clock[0], 0.0, rate, 0.0)
         weights = csr_array(
@@ -106,7 +106,7 @@ class MechanicalRun:
             if code := call_from_python(state.kernels[DECIDE], *packs):
                 state.flags[WHERE] = j
                 return code
-        state.x[:] = state.series[:, :2].T
+        state.x[:] = state.series[:2, : len(plant.dof_node)]
         return DONE
 
     @property
@@ -173,7 +173,7 @@ def new_state(built: Built, order: int) -> State:
     leaves = 1 << max(m, 1).bit_length()
     ints: dict[str, Any] = {"dtype": np.int64}
     return State(
-        x=np.zeros((2, n)), series=np.zeros((n, order + 1)), origin=np.zeros(nodes), mode=np.zeros(m, **ints),
+        x=np.zeros((2, n)), series=room_for(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes), mode=np.zeros(m, **ints),
         held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
         until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(plant.g_val), 1)),
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
@@ -196,7 +196,7 @@ def new_room(built: Built, order: int) -> Room:
     return Room(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
         lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints), 
-        Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(n),
+        Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(wide),
         trig=np.zeros((len(plant.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
         place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
         V=room_for(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
@@ -204,5 +204,5 @@ def new_room(built: Built, order: int) -> Room:
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(3, wide),
+        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(4, wide),
     )  # fmt: skip

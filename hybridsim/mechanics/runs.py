@@ -13,7 +13,7 @@ from hybridsim.engine.jit import inlined, kernel
 from hybridsim.mechanics.arrays import FIRST
 from hybridsim.mechanics.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WEIGHT
 from hybridsim.mechanics.lanes import advance_lanes, clear, clear_constants
-from hybridsim.mechanics.polynomials import shift, value_and_slope
+from hybridsim.mechanics.polynomials import shift, state_at
 
 # Of a strip, the rows: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
 # base; what a force does; what holds; constant acceleration; diagonals.
@@ -35,14 +35,13 @@ def gather_run(plant: Any, state: Any, room: Any, count: int, tau: float, top: i
         x = first + a
         room.loc[x], room.dofs[a], room.lcon[x], room.cons[a] = a, x, a, x
         room.stamp[x] = now
-        value, slope = value_and_slope(state.series[x], tau - state.origin[x])
-        room.Q[0, a], room.Q[1, a] = value, slope
+        room.Q[0, a], room.Q[1, a] = state_at(state.series, x, tau - state.origin[x])
     for x in range(first, last + 1):
         for e in range(plant.near_ptr[x], plant.near_ptr[x + 1]):
             other = plant.near[e]
             if room.stamp[other] != now:
                 room.stamp[other], room.loc[other] = now, count
-                shift(state.series[other], tau - state.origin[other], top, room.line)
+                shift(state.series, other, tau - state.origin[other], top, room.line)
                 for k in range(top + 1):
                     put(room.Q, k * wide + other - first, room.line[k])
     return True

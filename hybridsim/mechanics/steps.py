@@ -60,15 +60,23 @@ def reach(
     plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
 ) -> float:
     """The time over which the last two terms of each series stay below its tolerance; NaN where one is no number."""
-    h = longest
+    h, Q, wide = longest, room.Q, room.Q.shape[1]
+    for a in range(nd):
+        x = room.dofs[a]
+        room.sums[0, a] = state.tolerance[0, x] + rtol * abs(Q[0, a])
+        room.sums[1, a] = state.tolerance[1, x] + rtol * abs(Q[1, a])
+    for a in range(nd, whole_vectors(nd)):
+        room.sums[0, a] = room.sums[1, a] = 1.0
     for k in range(top - 1, top + 1):
+        for a in range(0, nd, WIDTH):
+            term = size(load(Q, k * wide + a))
+            store(room.sums, 2 * wide + a, term / load(room.sums, a))
+            store(room.sums, 3 * wide + a, term / load(room.sums, wide + a))
         largest_q, largest_v = 0.0, 0.0
         for a in range(nd):
-            x, term = room.dofs[a], abs(room.Q[k, a])
-            if not term < math.inf:
+            at_q, at_v = room.sums[2, a], k * room.sums[3, a]
+            if not at_q + at_v < math.inf:
                 return math.nan
-            at_q = term / (state.tolerance[0, x] + rtol * abs(room.Q[0, a]))
-            at_v = k * term / (state.tolerance[1, x] + rtol * abs(room.Q[1, a]))
             largest_q, largest_v = max(largest_q, at_q), max(largest_v, at_v)
         if largest_q * h**k > 1.0:
             h = largest_q ** (-1.0 / k)
