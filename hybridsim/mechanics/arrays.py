@@ -93,6 +93,7 @@ class Room(NamedTuple):
     kinds: np.ndarray
     line: np.ndarray
     strips: np.ndarray
+    W: np.ndarray
     sums: np.ndarray
 
 

@@ -50,7 +50,7 @@ def clear(V: Any, at: int, length: int) -> None:
 @inlined
 def lane_place(at: int, block: int, register: int, orders: int, k: int, lane: int) -> int:
     """Where coefficient k of a register has its number for a lane."""
-    return at + (lane // WIDTH) * block + (register * orders + k) * WIDTH + lane % WIDTH
+    return at + (lane >> 3) * block + (register * orders + k) * WIDTH + (lane & 7)
 
 
 @inlined
@@ -148,12 +148,12 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 
 
 @kernel
-def advance_lanes(rows: Any, first: int, last: int, room: Any, base: int, orders: int, k: int) -> None:
-    """Coefficient k of the operations first..last - 1 for the eight lanes of a block that begins at a base in room.V.
+def advance_lanes(rows: Any, first: int, last: int, V: Any, base: int, orders: int, k: int) -> None:
+    """Coefficient k of the operations first..last - 1 for the eight lanes of a block that begins at a base in V.
 
     Register r has its coefficient k at base + (r*orders + k)*WIDTH.
     """
-    V, length = room.V, orders * WIDTH
+    length = orders * WIDTH
     for r in range(first, last):
         op = rows[r, 0]
         a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
@@ -186,14 +186,14 @@ def advance_lanes(rows: Any, first: int, last: int, room: Any, base: int, orders
 
 
 @kernel
-def clear_constants(laws: Any, room: Any, t: int, base: int, orders: int) -> None:
+def clear_constants(laws: Any, V: Any, t: int, base: int, orders: int) -> None:
     """Zeros in the registers of a block that do not move with the orders, and its numbers."""
     length = orders * WIDTH
     for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
         pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1
-        clear(room.V, base + laws.constant_rows[i, 4] * length, pair * length)
+        clear(V, base + laws.constant_rows[i, 4] * length, pair * length)
     for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
-        clear(room.V, base + laws.par_reg[i] * length, length)
+        clear(V, base + laws.par_reg[i] * length, length)
     for i in range(laws.number_ptr[t], laws.number_ptr[t + 1]):
-        clear(room.V, base + laws.number_reg[i] * length, length)
-        store(room.V, base + laws.number_reg[i] * length, splat(laws.number_val[i]))
+        clear(V, base + laws.number_reg[i] * length, length)
+        store(V, base + laws.number_reg[i] * length, splat(laws.number_val[i]))

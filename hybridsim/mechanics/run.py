@@ -204,5 +204,6 @@ def new_room(built: Built, order: int) -> Room:
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(4, wide),
+        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(4, max(wide, 2 * WIDTH)),
+        W=room_for(1, (registers * columns + 1) * wide if len(plant.offsets) else 1)[0],
     )  # fmt: skip

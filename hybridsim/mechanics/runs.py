@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.eight import WIDTH, choose, load, put, splat, store, whole_vectors
+from hybridsim.engine.eight import WIDTH, choose, larger, load, put, size, splat, store, whole_vectors
 from hybridsim.engine.jit import inlined, kernel
 from hybridsim.mechanics.arrays import FIRST
 from hybridsim.mechanics.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WEIGHT
-from hybridsim.mechanics.lanes import advance_lanes, clear, clear_constants
+from hybridsim.mechanics.lanes import advance_lanes, clear
 from hybridsim.mechanics.polynomials import shift, state_at
 
 # Of a strip, the rows: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
@@ -64,31 +64,32 @@ def _height(plant: Any) -> int:
 
 @kernel
 def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: int, orders: int) -> None:
-    """Put what belongs to each eight of the run side by side: strips, and the constants of the law, all contacts lanes."""
-    size, block, height = plant.bands.shape[1], laws.registers[0] * orders * WIDTH, _height(plant)
-    strips, bands, V = room.strips, plant.bands, room.V
+    """Put what belongs to each eight of the run side by side: strips, and the constants of the law.
+
+    All contacts are lanes. Of what does not move the higher coefficients are zero from the beginning.
+    """
+    length, block, height = plant.bands.shape[1], laws.registers[0] * orders * WIDTH, _height(plant)
+    strips, bands, W = room.strips, plant.bands, room.W
     diagonals, parameters = VALUES + plant.par.shape[1], laws.par_reg.shape[0]
-    room.lane_ptr[0], room.lane_ptr[1], room.place[0] = 0, count, 0
-    for a in range(count):
-        room.lane[a] = a
     for g in range(whole_vectors(count) // WIDTH):
         s, x = g * height, first + g * WIDTH
         for i in range(WIDTH):
             inside = g * WIDTH + i < count
             strips[s + _SLIP * WIDTH + i] = float(state.mode[x + i]) if inside else 0.0
             strips[s + _BESIDE * WIDTH + i] = 0.0 if inside else 1.0
-        slip, weight = load(strips, s + _SLIP * WIDTH), load(bands, WEIGHT * size + x)
+        slip, weight = load(strips, s + _SLIP * WIDTH), load(bands, WEIGHT * length + x)
         store(strips, s + _FORWARD * WIDTH, slip * weight)
-        store(strips, s + _BASE * WIDTH, slip * load(bands, BASE * size + x))
-        store(strips, s + _MOBILITY * WIDTH, load(bands, MOBILITY * size + x))
-        store(strips, s + _HOLDING * WIDTH, load(bands, HOLDING * size + x) * weight)
-        store(strips, s + _STILL * WIDTH, load(bands, STILL * size + x))
+        store(strips, s + _BASE * WIDTH, slip * load(bands, BASE * length + x))
+        store(strips, s + _MOBILITY * WIDTH, load(bands, MOBILITY * length + x))
+        store(strips, s + _HOLDING * WIDTH, load(bands, HOLDING * length + x) * weight)
+        store(strips, s + _STILL * WIDTH, load(bands, STILL * length + x))
         for i in range(diagonals, bands.shape[0]):
-            store(strips, s + (_DIAGONALS + i - diagonals) * WIDTH, load(bands, i * size + x))
-        clear_constants(laws, room, 0, g * block, orders)
+            store(strips, s + (_DIAGONALS + i - diagonals) * WIDTH, load(bands, i * length + x))
         for i in range(parameters):
-            store(V, g * block + laws.par_reg[i] * orders * WIDTH, load(bands, (VALUES + i) * size + x))
-        advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], room, g * block, orders, 0)
+            store(W, g * block + laws.par_reg[i] * orders * WIDTH, load(bands, (VALUES + i) * length + x))
+        for i in range(laws.number_reg.shape[0]):
+            store(W, g * block + laws.number_reg[i] * orders * WIDTH, splat(laws.number_val[i]))
+        advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], W, g * block, orders, 0)
 
 
 @kernel
@@ -96,7 +97,7 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
     """Series of the run that was gathered: Q (positions), R (relative velocities), F (forces)."""
     orders = top + 1
     _lay_out(plant, laws, state, room, state.whole[FIRST], count, orders)
-    Q, R, F, V, strips, offsets = room.Q, room.R, room.F, room.V, room.strips, plant.offsets
+    Q, R, F, W, strips, offsets = room.Q, room.R, room.F, room.W, room.strips, plant.offsets
     wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
     height, block = _height(plant), laws.registers[0] * orders * WIDTH
     damped = plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts
@@ -111,7 +112,7 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
             if k == 0:
                 forward = forward - load(strips, s + _BASE * WIDTH)
                 change = load(strips, s + _STILL * WIDTH)
-            store(V, v + speed + k * WIDTH, forward)
+            store(W, v + speed + k * WIDTH, forward)
             store(R, row, slip * forward)
             place = s + _DIAGONALS * WIDTH
             for i in range(shifts):
@@ -121,8 +122,8 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
                 for i in range(shifts):
                     total = total + load(strips, place + (shifts + i) * WIDTH) * load(Q, row + wide + offsets[i])
                 change = change - step * total
-            advance_lanes(laws.rows, 0, law, room, v, orders, k)
-            force = slip * load(V, v + out + k * WIDTH)
+            advance_lanes(laws.rows, 0, law, W, v, orders, k)
+            force = slip * load(W, v + out + k * WIDTH)
             change = change - load(strips, s + _MOBILITY * WIDTH) * choose(slip, force, zero)
             store(F, row, choose(slip, force, load(strips, s + _HOLDING * WIDTH) * change))
             kept = choose(load(strips, s + _BESIDE * WIDTH), load(Q, row + 2 * wide), zero)
@@ -131,3 +132,23 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
         row = (top - 1) * wide + g * WIDTH
         forward = load(strips, g * height + _FORWARD * WIDTH) * splat(float(top)) * load(Q, row + wide)
         store(R, row, load(strips, g * height + _SLIP * WIDTH) * forward)
+
+
+@kernel
+def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, orders: int, share: float) -> bool:
+    """Whether the forces in room.sums are what the law says at the velocities there, to a share of their terms."""
+    sums, W, strips = room.sums, room.W, room.strips
+    wide, height, block = sums.shape[1], _height(plant), laws.registers[0] * orders * WIDTH
+    speed, out, zero, worst = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH, splat(0.0), splat(0.0)
+    for g in range(whole_vectors(count) // WIDTH):
+        a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
+        store(W, g * block + speed, larger(slip * load(sums, a), zero))
+        advance_lanes(laws.rows, 0, laws.rows.shape[0], W, g * block, orders, 0)
+        off = size(load(sums, wide + a) - slip * load(W, g * block + out))
+        beyond = off - splat(share) * load(sums, 2 * wide + a)
+        worst = worst + choose(slip, larger(beyond, zero) + zero * beyond, zero)  # no number where that is none
+    store(sums, 0, worst)
+    for i in range(WIDTH):
+        if not sums[0, i] <= 0.0:
+            return False
+    return True

@@ -12,6 +12,7 @@ from hybridsim.mechanics.arrays import (
     AT,
     CONS,
     DOFS,
+    FIRST,
     LENGTH,
     LONGEST,
     LOWER,
@@ -24,6 +25,7 @@ from hybridsim.mechanics.arrays import (
     VELOCITY,
 )  # fmt: skip
 from hybridsim.mechanics.lanes import advance_lanes, lane_place
+from hybridsim.mechanics.runs import law_holds_in_run
 
 _UNIT = 2.0**-53
 _DEFECT = 100.0  # as in the taylor integrator: how far the law may be from its series, in tolerances
@@ -55,6 +57,20 @@ def first_leaf(tree: Any) -> int:
     return i - half
 
 
+@inlined
+def _largest(room: Any, first: Any, second: Any, total: Any) -> tuple[float, float, bool]:
+    """The largest number of each of two vectors, and whether those of a third are finite."""
+    wide = room.sums.shape[1]
+    store(room.sums, 2 * wide, first)
+    store(room.sums, 2 * wide + WIDTH, second)
+    store(room.sums, 3 * wide, total)
+    one, other, is_finite = 0.0, 0.0, True
+    for i in range(WIDTH):
+        one, other = max(one, room.sums[2, i]), max(other, room.sums[2, WIDTH + i])
+        is_finite = is_finite and room.sums[3, i] < math.inf
+    return one, other, is_finite
+
+
 @kernel
 def reach(
     plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
@@ -66,32 +82,34 @@ def reach(
         room.sums[0, a] = state.tolerance[0, x] + rtol * abs(Q[0, a])
         room.sums[1, a] = state.tolerance[1, x] + rtol * abs(Q[1, a])
     for a in range(nd, whole_vectors(nd)):
-        room.sums[0, a] = room.sums[1, a] = 1.0
+        room.sums[0, a] = room.sums[1, a] = math.inf
     for k in range(top - 1, top + 1):
+        largest, fastest, total = splat(0.0), splat(0.0), splat(0.0)
         for a in range(0, nd, WIDTH):
             term = size(load(Q, k * wide + a))
-            store(room.sums, 2 * wide + a, term / load(room.sums, a))
-            store(room.sums, 3 * wide + a, term / load(room.sums, wide + a))
-        largest_q, largest_v = 0.0, 0.0
-        for a in range(nd):
-            at_q, at_v = room.sums[2, a], k * room.sums[3, a]
-            if not at_q + at_v < math.inf:
-                return math.nan
-            largest_q, largest_v = max(largest_q, at_q), max(largest_v, at_v)
+            at_q, at_v = term / load(room.sums, a), term / load(room.sums, wide + a)
+            largest, fastest, total = larger(at_q, largest), larger(at_v, fastest), total + (at_q + at_v)
+        largest_q, largest_v, is_finite = _largest(room, largest, fastest, total)
+        largest_v *= k
+        if not is_finite:
+            return math.nan
         if largest_q * h**k > 1.0:
             h = largest_q ** (-1.0 / k)
         if largest_v * h ** (k - 1) > 1.0:
             h = largest_v ** (-1.0 / (k - 1))
+    for i in range(whole_vectors(nc)):
+        room.sums[0, i] = math.inf
+    for i in range(nc):
+        c = room.cons[i]
+        if state.mode[c] == STICK:
+            room.sums[0, i] = rtol * max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
     for k in range(top - 3, top - 1):
-        largest = 0.0
-        for i in range(nc):
-            c = room.cons[i]
-            if state.mode[c] == STICK:
-                scale = rtol * max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
-                if abs(room.F[k, i]) > largest * scale:
-                    largest = abs(room.F[k, i]) / scale
-        if largest * h**k > 1.0:
-            h = largest ** (-1.0 / k)
+        largest = splat(0.0)
+        for i in range(0, nc, WIDTH):
+            largest = larger(size(load(room.F, k * wide + i)) / load(room.sums, i), largest)
+        most, _, _ = _largest(room, largest, largest, largest)
+        if most * h**k > 1.0:
+            h = most ** (-1.0 / k)
     return h
 
 
@@ -118,23 +136,26 @@ def _exit_of(room: Any, terms: int, h: float, order: int, slack: float, is_short
 
 @kernel
 def _bound_rest(series: Any, sums: Any, row: int, nc: int, last: int, h: float) -> None:
-    """Of each contact, the sum of the sizes of the terms 1..last of a series over a time h."""
-    wide, step = series.shape[1], splat(h)
+    """Of each contact the sums of the terms 1..last of a series over a time h that are positive, and that are not."""
+    wide, step, zero = series.shape[1], splat(h), splat(0.0)
     for i in range(0, nc, WIDTH):
-        total = splat(0.0)
-        for k in range(last, 0, -1):
-            total = (total + size(load(series, k * wide + i))) * step
-        store(sums, row * wide + i, total)
+        above, below, power = zero, zero, step
+        for k in range(1, last + 1):
+            term = power * load(series, k * wide + i)
+            positive = larger(term, zero)
+            above, below, power = above + positive, below + (term - positive), power * step
+        store(sums, row * wide + i, above)
+        store(sums, (row + 1) * wide + i, below)
 
 
 @inlined
-def _is_far(series: Any, i: int, last: int, lead: float, rest: float, power: float, h: float, most: float) -> bool:
+def _is_far(series: Any, i: int, last: int, lead: float, fall: float, power: float, h: float, most: float) -> bool:
     """Whether a guard that begins at `lead` stays above what `first_exit` would ask of it, whatever its terms do.
 
-    rest: the sum of their sizes; power: h**last; most: size of what its value at the start is a difference of.
+    fall: the sum of those that are negative (each is there by a part only); power: h**last; most: size of all terms.
     """
     error = 2.0 * (abs(series[last, i]) * power + abs(series[last - 1, i]) * (power / h))
-    return lead - rest > error + 16.0 * _UNIT * (most + rest)
+    return lead + fall > error + 24.0 * _UNIT * most
 
 
 @kernel
@@ -143,7 +164,7 @@ def isolate(
 ) -> tuple[int, float]:
     """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
     _bound_rest(room.R, room.sums, 0, nc, top - 1, h)
-    _bound_rest(room.F, room.sums, 1, nc, top - 2, h)
+    _bound_rest(room.F, room.sums, 2, nc, top - 2, h)
     power = h ** (top - 2)
     for i in range(nc):
         c = room.cons[i]
@@ -152,7 +173,9 @@ def isolate(
         if state.mode[c] != STICK:
             sigma, order = float(state.mode[c]), state.decree[c, 0] if fresh else 0
             lead = sigma * room.R[0, i]
-            if order == 0 and _is_far(room.R, i, top - 1, lead, room.sums[0, i], power * h, h, lead):
+            above, below = room.sums[0, i], room.sums[1, i]
+            fall = below if sigma > 0.0 else -above
+            if order == 0 and _is_far(room.R, i, top - 1, lead, fall, power * h, h, lead + above - below):
                 continue
             for k in range(top):
                 room.poly[k] = sigma * room.R[k, i]
@@ -167,7 +190,9 @@ def isolate(
                 limit, order = plant.limits[c, side], state.decree[c, side] if fresh else 0
                 most = max(limit, abs(room.F[0, i]))
                 lead = limit - sigma * room.F[0, i]
-                if order == 0 and _is_far(room.F, i, top - 2, lead, room.sums[1, i], power, h, most):
+                above, below = room.sums[2, i], room.sums[3, i]
+                fall = -above if side == 0 else below
+                if order == 0 and _is_far(room.F, i, top - 2, lead, fall, power, h, most + above - below):
                     continue
                 for k in range(top - 1):
                     room.poly[k] = -sigma * room.F[k, i]
@@ -208,6 +233,9 @@ def _law_holds(
 ) -> bool:
     """Whether the forces of what slips are what their laws say at the end of the patch's series, or at their exits."""
     _at_ends(room, nc, h, top)
+    if state.whole[FIRST] >= 0:
+        is_moving = laws.rows.shape[0] > 0
+        return not is_moving or law_holds_in_run(plant, laws, room, nc, top + 1, _DEFECT * rtol + 64.0 * _UNIT)
     for t in range(laws.registers.shape[0]):
         first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
         if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
@@ -220,7 +248,7 @@ def _law_holds(
             room.V[place] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
         for j in range(0, count, WIDTH):  # order 0 is done anew, and nothing needs the old one any more
             place = at + j // WIDTH * block
-            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room, place, orders, 0)
+            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, place, orders, 0)
         for j in range(count):
             i = room.lane[first + j]
             mode = state.mode[room.cons[i]]
