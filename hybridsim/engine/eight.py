@@ -48,7 +48,7 @@ if ENABLED:
 
         @lower_builtin(symbol, EightType, EightType)
         def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return getattr(builder, instruction)(*args)
+            return getattr(builder, instruction)(*args, flags=("contract",))
 
     for _symbol, _instruction in (
         (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv"),

@@ -167,6 +167,11 @@ def project(plant: Any, state: Any, room: Any, j: int, tau: float, v: Any) -> No
     """
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m, several = last - first, False
+    if m == 1 and plant.unit[first]:
+        if state.mode[first] == STICK:
+            e = plant.w_ptr[first]
+            v[plant.w_col[e]] = base_speed(plant, state, first, tau) / plant.w_val[e]
+        return
     for c in range(first, last):
         if state.mode[c] == STICK and plant.unit[c]:
             e = plant.w_ptr[c]

@@ -221,9 +221,8 @@ def _note(plant: Any, state: Any, room: Any, record: Any, j: int, tau: float, fi
 @kernel
 def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
     """All positions and velocities at tau, which becomes the origin."""
-    for j in range(plant.node_dof.shape[0] - 1):
-        for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            room.acc[x] = tau - state.origin[j]
+    for x in range(plant.dof_node.shape[0]):
+        room.acc[x] = tau - state.origin[plant.dof_node[x]]
     for x in range(0, plant.dof_node.shape[0], WIDTH):
         value, slope = states_at(state.series, x, load(room.acc, x))
         store(room.sums, x, value)

@@ -79,15 +79,15 @@ def reach(
     h, Q, wide = longest, room.Q, room.Q.shape[1]
     for a in range(nd):
         x = room.dofs[a]
-        room.sums[0, a] = state.tolerance[0, x] + rtol * abs(Q[0, a])
-        room.sums[1, a] = state.tolerance[1, x] + rtol * abs(Q[1, a])
+        room.sums[0, a] = 1.0 / (state.tolerance[0, x] + rtol * abs(Q[0, a]))
+        room.sums[1, a] = 1.0 / (state.tolerance[1, x] + rtol * abs(Q[1, a]))
     for a in range(nd, whole_vectors(nd)):
-        room.sums[0, a] = room.sums[1, a] = math.inf
+        room.sums[0, a] = room.sums[1, a] = 0.0
     for k in range(top - 1, top + 1):
         largest, fastest, total = splat(0.0), splat(0.0), splat(0.0)
         for a in range(0, nd, WIDTH):
             term = size(load(Q, k * wide + a))
-            at_q, at_v = term / load(room.sums, a), term / load(room.sums, wide + a)
+            at_q, at_v = term * load(room.sums, a), term * load(room.sums, wide + a)
             largest, fastest, total = larger(at_q, largest), larger(at_v, fastest), total + (at_q + at_v)
         largest_q, largest_v, is_finite = _largest(room, largest, fastest, total)
         largest_v *= k
@@ -98,15 +98,16 @@ def reach(
         if largest_v * h ** (k - 1) > 1.0:
             h = largest_v ** (-1.0 / (k - 1))
     for i in range(whole_vectors(nc)):
-        room.sums[0, i] = math.inf
+        room.sums[0, i] = 0.0
     for i in range(nc):
         c = room.cons[i]
         if state.mode[c] == STICK:
-            room.sums[0, i] = rtol * max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
+            most = max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
+            room.sums[0, i] = 1.0 / (rtol * most) if most > 0.0 else 0.0
     for k in range(top - 3, top - 1):
         largest = splat(0.0)
         for i in range(0, nc, WIDTH):
-            largest = larger(size(load(room.F, k * wide + i)) / load(room.sums, i), largest)
+            largest = larger(size(load(room.F, k * wide + i)) * load(room.sums, i), largest)
         most, _, _ = _largest(room, largest, largest, largest)
         if most * h**k > 1.0:
             h = most ** (-1.0 / k)
