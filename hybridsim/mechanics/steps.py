@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.eight import WIDTH, larger, load, size, splat, store, whole_vectors
+from hybridsim.engine.eight import WIDTH, choose, larger, load, size, splat, store, whole_vectors
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import (
@@ -136,17 +136,25 @@ def _exit_of(room: Any, terms: int, h: float, order: int, slack: float, is_short
 
 
 @kernel
-def _bound_rest(series: Any, sums: Any, row: int, nc: int, last: int, h: float) -> None:
-    """Of each contact the sums of the terms 1..last of a series over a time h that are positive, and that are not."""
-    wide, step, zero = series.shape[1], splat(h), splat(0.0)
+def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) -> None:
+    """Of each guard of slip (or force of stick) the sums of its terms over a time h that are positive, and that are not.
+
+    All but the first; to room.sums, rows 1 and 2.
+    """
+    R, F, sums = room.R, room.F, room.sums
+    wide, step, zero = R.shape[1], splat(h), splat(0.0)
+    for i in range(whole_vectors(nc)):
+        sums[0, i] = 1.0 if i < nc and state.mode[room.cons[i]] != STICK else 0.0
     for i in range(0, nc, WIDTH):
-        above, below, power = zero, zero, step
-        for k in range(1, last + 1):
-            term = power * load(series, k * wide + i)
+        above, below, power, slips = zero, zero, step, load(sums, i)
+        for k in range(1, top - 1):
+            term = power * choose(slips, load(R, k * wide + i), load(F, k * wide + i))
             positive = larger(term, zero)
             above, below, power = above + positive, below + (term - positive), power * step
-        store(sums, row * wide + i, above)
-        store(sums, (row + 1) * wide + i, below)
+        term = power * choose(slips, load(R, (top - 1) * wide + i), zero)
+        positive = larger(term, zero)
+        store(sums, wide + i, above + positive)
+        store(sums, 2 * wide + i, below + (term - positive))
 
 
 @inlined
@@ -164,17 +172,15 @@ def isolate(
     plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
     """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
-    _bound_rest(room.R, room.sums, 0, nc, top - 1, h)
-    _bound_rest(room.F, room.sums, 2, nc, top - 2, h)
+    _bound_rest(plant, state, room, nc, top, h)
     power = h ** (top - 2)
     for i in range(nc):
         c = room.cons[i]
         room.exits[i], room.kinds[i] = OPEN_END, VELOCITY
-        fresh = state.stamp[c] == tau
+        fresh, above, below = state.stamp[c] == tau, room.sums[1, i], room.sums[2, i]
         if state.mode[c] != STICK:
             sigma, order = float(state.mode[c]), state.decree[c, 0] if fresh else 0
             lead = sigma * room.R[0, i]
-            above, below = room.sums[0, i], room.sums[1, i]
             fall = below if sigma > 0.0 else -above
             if order == 0 and _is_far(room.R, i, top - 1, lead, fall, power * h, h, lead + above - below):
                 continue
@@ -191,7 +197,6 @@ def isolate(
                 limit, order = plant.limits[c, side], state.decree[c, side] if fresh else 0
                 most = max(limit, abs(room.F[0, i]))
                 lead = limit - sigma * room.F[0, i]
-                above, below = room.sums[2, i], room.sums[3, i]
                 fall = -above if side == 0 else below
                 if order == 0 and _is_far(room.F, i, top - 2, lead, fall, power, h, most + above - below):
                     continue
