@@ -127,16 +127,16 @@ def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) 
     """Put the constants of the contacts in lanes lane_ptr[t]..last - 1 into a tape's registers; where these end."""
     first, at, block = room.lane_ptr[t], room.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
-    for i in range(at, at + whole_vectors(count) // WIDTH * block, block):
+    end = at + whole_vectors(count) // WIDTH * block
+    for i in range(at, end, block):
         clear_constants(laws, room.V, t, i, orders)
     for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
         for j in range(whole_vectors(count)):
             c = room.cons[room.lane[first + min(j, count - 1)]]
             place = lane_place(at, block, laws.par_reg[i], orders, 0, j)
             room.V[place] = plant.par[c, i - laws.par_ptr[t]]
-    for i in range(at, at + whole_vectors(count) // WIDTH * block, block):
-        advance_lanes(rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room.V, i, orders, 0)
-    return at + whole_vectors(count) // WIDTH * block
+    advance_lanes(rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room.V, at, end, block, orders, 0)
+    return end
 
 
 @inlined
@@ -149,9 +149,8 @@ def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k
             i = room.lane[first + min(j, count - 1)]
             place = lane_place(at, block, laws.speed[t], orders, k, j)
             room.V[place] = state.mode[room.cons[i]] * room.R[k, i]
-        for j in range(0, count, WIDTH):
-            place = at + j // WIDTH * block
-            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, place, orders, k)
+        rows, end = (laws.row_ptr[t], laws.row_ptr[t + 1]), at + whole_vectors(count) // WIDTH * block
+        advance_lanes(laws.rows, rows[0], rows[1], room.V, at, end, block, orders, k)
         for j in range(count):
             i = room.lane[first + j]
             force = room.V[lane_place(at, block, laws.out[t], orders, k, j)]

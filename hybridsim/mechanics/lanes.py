@@ -148,41 +148,44 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 
 
 @kernel
-def advance_lanes(rows: Any, first: int, last: int, V: Any, base: int, orders: int, k: int) -> None:
-    """Coefficient k of the operations first..last - 1 for the eight lanes of a block that begins at a base in V.
+def advance_lanes(
+    rows: Any, first: int, last: int, V: Any, begin: int, end: int, block: int, orders: int, k: int
+) -> None:
+    """Coefficient k of the operations first..last - 1 in all blocks of eight lanes from `begin` to `end` in V.
 
-    Register r has its coefficient k at base + (r*orders + k)*WIDTH.
+    Register r has its coefficient k at (r*orders + k)*WIDTH of a block.
     """
     length = orders * WIDTH
-    for r in range(first, last):
-        op = rows[r, 0]
-        a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
-        z, x, y = out + k * WIDTH, a + k * WIDTH, b + k * WIDTH
-        if op == SCALE:
-            store(V, z, load(V, x) * load(V, b))
-        elif ADD_CONSTANT <= op <= CONSTANT_SUB:
-            value = load(V, x)
-            if k == 0:
-                value = _with_constant(op, value, load(V, b))
-            elif op == CONSTANT_SUB:
-                value = splat(-1.0) * value
-            store(V, z, value)
-        elif op == DIV:
-            store(V, z, _quotient(V, x, out, b, k))
-        elif op == MUL:
-            store(V, z, _product(V, a, y, 0, k))
-        elif op == ADD:
-            store(V, z, load(V, x) + load(V, y))
-        elif op == SUB:
-            store(V, z, load(V, x) - load(V, y))
-        elif op == DIVIDE_BY:
-            store(V, z, load(V, x) / load(V, b))
-        elif op == NEG:
-            store(V, z, splat(-1.0) * load(V, x))
-        elif k == 0:
-            _leading(op, V, a, b, rows[r, 2], rows[r, 3], out, out + length)
-        else:
-            _higher(op, V, a, b, rows[r, 2], out, out + length, k)
+    for base in range(begin, end, block):
+        for r in range(first, last):
+            op = rows[r, 0]
+            a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
+            z, x, y = out + k * WIDTH, a + k * WIDTH, b + k * WIDTH
+            if op == SCALE:
+                store(V, z, load(V, x) * load(V, b))
+            elif ADD_CONSTANT <= op <= CONSTANT_SUB:
+                value = load(V, x)
+                if k == 0:
+                    value = _with_constant(op, value, load(V, b))
+                elif op == CONSTANT_SUB:
+                    value = splat(-1.0) * value
+                store(V, z, value)
+            elif op == DIV:
+                store(V, z, _quotient(V, x, out, b, k))
+            elif op == MUL:
+                store(V, z, _product(V, a, y, 0, k))
+            elif op == ADD:
+                store(V, z, load(V, x) + load(V, y))
+            elif op == SUB:
+                store(V, z, load(V, x) - load(V, y))
+            elif op == DIVIDE_BY:
+                store(V, z, load(V, x) / load(V, b))
+            elif op == NEG:
+                store(V, z, splat(-1.0) * load(V, x))
+            elif k == 0:
+                _leading(op, V, a, b, rows[r, 2], rows[r, 3], out, out + length)
+            else:
+                _higher(op, V, a, b, rows[r, 2], out, out + length, k)
 
 
 @kernel

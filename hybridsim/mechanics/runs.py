@@ -89,7 +89,8 @@ def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: in
             store(W, g * block + laws.par_reg[i] * orders * WIDTH, load(bands, (VALUES + i) * length + x))
         for i in range(laws.number_reg.shape[0]):
             store(W, g * block + laws.number_reg[i] * orders * WIDTH, splat(laws.number_val[i]))
-        advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], W, g * block, orders, 0)
+    end = whole_vectors(count) // WIDTH * block
+    advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], W, 0, end, block, orders, 0)
 
 
 @kernel
@@ -100,20 +101,21 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
     Q, R, F, W, strips, offsets = room.Q, room.R, room.F, room.W, room.strips, plant.offsets
     wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
     height, block = _height(plant), laws.registers[0] * orders * WIDTH
-    damped = plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts
+    groups, damped = whole_vectors(count) // WIDTH, plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts
     speed, out = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH
     for k in range(top - 1):
         step, share = splat(k + 1.0), splat(1.0 / ((k + 1.0) * (k + 2.0)))
-        for g in range(whole_vectors(count) // WIDTH):
-            s, v, row = g * height, g * block, k * wide + g * WIDTH
-            slip = load(strips, s + _SLIP * WIDTH)
+        for g in range(groups):
+            s, row = g * height, k * wide + g * WIDTH
             forward = load(strips, s + _FORWARD * WIDTH) * step * load(Q, row + wide)
-            change = zero
             if k == 0:
                 forward = forward - load(strips, s + _BASE * WIDTH)
-                change = load(strips, s + _STILL * WIDTH)
-            store(W, v + speed + k * WIDTH, forward)
-            store(R, row, slip * forward)
+            store(W, g * block + speed + k * WIDTH, forward)
+            store(R, row, load(strips, s + _SLIP * WIDTH) * forward)
+        advance_lanes(laws.rows, 0, law, W, 0, groups * block, block, orders, k)
+        for g in range(groups):
+            s, row = g * height, k * wide + g * WIDTH
+            slip, change = load(strips, s + _SLIP * WIDTH), load(strips, s + _STILL * WIDTH) if k == 0 else zero
             place = s + _DIAGONALS * WIDTH
             for i in range(shifts):
                 change = change - load(strips, place + i * WIDTH) * load(Q, row + offsets[i])
@@ -122,13 +124,12 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
                 for i in range(shifts):
                     total = total + load(strips, place + (shifts + i) * WIDTH) * load(Q, row + wide + offsets[i])
                 change = change - step * total
-            advance_lanes(laws.rows, 0, law, W, v, orders, k)
-            force = slip * load(W, v + out + k * WIDTH)
+            force = slip * load(W, g * block + out + k * WIDTH)
             change = change - load(strips, s + _MOBILITY * WIDTH) * choose(slip, force, zero)
             store(F, row, choose(slip, force, load(strips, s + _HOLDING * WIDTH) * change))
             kept = choose(load(strips, s + _BESIDE * WIDTH), load(Q, row + 2 * wide), zero)
             store(Q, row + 2 * wide, choose(slip, change * share, kept))
-    for g in range(whole_vectors(count) // WIDTH):
+    for g in range(groups):
         row = (top - 1) * wide + g * WIDTH
         forward = load(strips, g * height + _FORWARD * WIDTH) * splat(float(top)) * load(Q, row + wide)
         store(R, row, load(strips, g * height + _SLIP * WIDTH) * forward)
@@ -143,7 +144,10 @@ def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, orders: int, 
     for g in range(whole_vectors(count) // WIDTH):
         a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         store(W, g * block + speed, larger(slip * load(sums, a), zero))
-        advance_lanes(laws.rows, 0, laws.rows.shape[0], W, g * block, orders, 0)
+    end = whole_vectors(count) // WIDTH * block
+    advance_lanes(laws.rows, 0, laws.rows.shape[0], W, 0, end, block, orders, 0)
+    for g in range(whole_vectors(count) // WIDTH):
+        a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         off = size(load(sums, wide + a) - slip * load(W, g * block + out))
         beyond = off - splat(share) * load(sums, 2 * wide + a)
         worst = worst + choose(slip, larger(beyond, zero) + zero * beyond, zero)  # no number where that is none

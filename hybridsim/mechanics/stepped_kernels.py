@@ -133,16 +133,17 @@ def slip_forces(plant: Any, laws: Any, room: Any) -> None:
         if count == 0:
             continue
         block = laws.registers[t] * WIDTH
-        for at in range(0, whole_vectors(count) // WIDTH * block, block):
+        size = whole_vectors(count) // WIDTH * block
+        for at in range(0, size, block):
             clear_constants(laws, room.V, t, at, 1)
         for j in range(whole_vectors(count)):
             c = room.lane[min(j, count - 1)]
             for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
                 room.V[lane_place(0, block, laws.par_reg[i], 1, 0, j)] = plant.par[c, i - laws.par_ptr[t]]
             room.V[lane_place(0, block, laws.speed[t], 1, 0, j)] = abs(room.speed[c])
-        for at in range(0, whole_vectors(count) // WIDTH * block, block):
-            advance_lanes(laws.constant_rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room.V, at, 1, 0)
-            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, at, 1, 0)
+        begin, end = laws.constant_ptr[t], laws.constant_ptr[t + 1]
+        advance_lanes(laws.constant_rows, begin, end, room.V, 0, size, block, 1, 0)
+        advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, 0, size, block, 1, 0)
         for j in range(count):
             c, value = room.lane[j], room.V[lane_place(0, block, laws.out[t], 1, 0, j)]
             if room.speed[c] > 0.0:

@@ -252,9 +252,9 @@ def _law_holds(
             i = room.lane[first + min(j, count - 1)]
             place = lane_place(at, block, laws.speed[t], orders, 0, j)
             room.V[place] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
-        for j in range(0, count, WIDTH):  # order 0 is done anew, and nothing needs the old one any more
-            place = at + j // WIDTH * block
-            advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, place, orders, 0)
+        # order 0 is done anew, and nothing needs the old one any more
+        rows, end = (laws.row_ptr[t], laws.row_ptr[t + 1]), at + whole_vectors(count) // WIDTH * block
+        advance_lanes(laws.rows, rows[0], rows[1], room.V, at, end, block, orders, 0)
         for j in range(count):
             i = room.lane[first + j]
             mode = state.mode[room.cons[i]]
