@@ -49,17 +49,19 @@ def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
 def shift(series: Any, x: int, d: float, top: int, out: Any) -> None:
     """Coefficients 0..top of the polynomial in column x about d: sum_i series_i C(i, k) d**(i - k).
 
-    out: room for 3 TERMS numbers; behind the result are the powers, d**(last - m) at m, and zeros.
+    out: room for 3 TERMS numbers; behind the result are the powers, d**(last - m) at TERMS + m, and last d itself.
     """
     last = series.shape[0] - 1
     if d == 0.0:
         for k in range(last + 1):
             out[k] = series[k, x]
         return
-    power = 1.0
-    for m in range(last, -1, -1):
-        out[TERMS + m] = power
-        power *= d
+    if out[3 * TERMS - 1] != d:  # neighbours often begin at one time
+        power = 1.0
+        for m in range(last, -1, -1):
+            out[TERMS + m] = power
+            power *= d
+        out[3 * TERMS - 1] = d
     for k in range(0, top + 1, WIDTH):
         total = splat(0.0)
         for i in range(k, last + 1):

@@ -11,12 +11,14 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hybridsim.engine.eight import WIDTH, room_for
-from hybridsim.engine.jit import call_kernel, kernel, kernel_address
+from hybridsim.engine.bernstein_code import LEADING, bernstein_code
+from hybridsim.engine.jit import ENABLED, call_kernel, kernel, kernel_address
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
 from hybridsim.engine.timepair import phase_of
 from hybridsim.mechanics.arrays import (
     AT,
+    BERNSTEIN,
     CASCADE,
     DECIDE,
     DONE,
@@ -74,6 +76,8 @@ class MechanicalRun:
         state, room = packed(self.state), packed(self.room)
         began = perf_counter()
         reach_kernels(self.state, plant, laws, state, room)
+        if ENABLED:
+            self.state.kernels[BERNSTEIN:], self._code = bernstein_code(self.order - 1)
         self.code = self._settle_start(plant, laws, state, room)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
@@ -163,7 +167,7 @@ def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any)
 
 def reach_kernels(arrays: State, *packs: Any) -> None:
     """Compile the large kernels if need be, and put their addresses where the others find them."""
-    arrays.kernels[:] = [kernel_address(function, *packs) for function in (expand, stretch, decide)]
+    arrays.kernels[:BERNSTEIN] = [kernel_address(function, *packs) for function in (expand, stretch, decide)]
 
 
 def new_state(built: Built, order: int) -> State:
@@ -179,7 +183,7 @@ def new_state(built: Built, order: int) -> State:
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
         tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
         flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
-        kernels=np.zeros(3, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
+        kernels=np.zeros(BERNSTEIN + LEADING, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.mechanics.arrays import (
     AT,
+    BERNSTEIN,
     CONS,
     DOFS,
     FIRST,
@@ -115,7 +116,9 @@ def reach(
 
 
 @kernel
-def _exit_of(room: Any, terms: int, h: float, order: int, slack: float, is_short: bool) -> tuple[int, float]:
+def _exit_of(
+    state: Any, room: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
+) -> tuple[int, float]:
     """First time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
 
     Where it is zero all along it does not. On a short stretch a touch is passed if it is positive after it.
@@ -129,7 +132,9 @@ def _exit_of(room: Any, terms: int, h: float, order: int, slack: float, is_short
     if total == 0.0:
         return NEVER, 1.0
     error = 2.0 * (abs(room.poly[terms - 1]) + abs(room.poly[terms - 2])) + 8.0 * _UNIT * total + slack
-    outcome, theta = first_exit(room.poly[:terms], error, order, room.bern, room.stack, 0)
+    form = BERNSTEIN + top - (terms - order)
+    code = state.kernels[form] if form < state.kernels.shape[0] else 0
+    outcome, theta = first_exit(room.poly[:terms], error, order, room.bern, room.stack, code)
     if outcome == OPEN and is_short and end > error:
         outcome = NEVER
     return outcome, theta
@@ -186,7 +191,7 @@ def isolate(
                 continue
             for k in range(top):
                 room.poly[k] = sigma * room.R[k, i]
-            outcome, theta = _exit_of(room, top, h, order, 0.0, is_short)
+            outcome, theta = _exit_of(state, room, top, top, h, order, 0.0, is_short)
             if outcome == OPEN:
                 return OPEN, theta
             if outcome == FOUND:
@@ -203,7 +208,7 @@ def isolate(
                 for k in range(top - 1):
                     room.poly[k] = -sigma * room.F[k, i]
                 room.poly[0] += limit
-                outcome, theta = _exit_of(room, top - 1, h, order, 8.0 * _UNIT * most, is_short)
+                outcome, theta = _exit_of(state, room, top, top - 1, h, order, 8.0 * _UNIT * most, is_short)
                 if outcome == OPEN:
                     return OPEN, theta
                 if outcome == FOUND and theta * h < room.exits[i]:
