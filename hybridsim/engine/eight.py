@@ -1,8 +1,8 @@
 """Eight doubles at once: vectors as a type of kernels, which the compiler would not make of so short loops.
 
 A loop over a few lanes is made into vectors of sixteen and a rest that runs one by one; here it is all vectors, and the
-arrays are longer by what the last one needs. Processors with shorter vectors take two or four of theirs. Sums, products
-and quotients are those of numbers, to the last bit. Without the compiler a vector is an array.
+arrays are longer by what the last one needs. Processors with shorter vectors take two or four of theirs. A product
+and a sum may be fused. Without the compiler a vector is an array.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def whole_vectors(count: int) -> int:
 
 
 def room_for(rows: int, columns: int, before: int = 0) -> np.ndarray:
-    """Zeros (rows, columns) that begin on a line of the cache; vectors may reach beyond the end, or so far before it."""
+    """Zeros (rows, columns) that begin on a line of the cache; vectors may reach beyond the end, or so far before."""
     ahead = -(-before // WIDTH) * WIDTH
     whole = np.zeros(ahead + rows * columns + 2 * WIDTH)
     skip = ahead + (-whole.ctypes.data // whole.itemsize) % WIDTH

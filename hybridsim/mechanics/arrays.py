@@ -17,20 +17,22 @@ DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop ca
 # numbers that a kernel reached by its address is given; FIRST: where a run of neighbours begins, -1 where it is none
 COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
 AT, LONGEST, RTOL, LENGTH = range(4)  # and real ones; the length of a stretch comes back
-EXPAND, STRETCH, DECIDE, BERNSTEIN = range(4)  # these kernels; then series to Bernstein form, for ever fewer terms
+EXPAND, STRETCH, DECIDE, BERNSTEIN = range(
+    4
+)  # these kernels; then series to Bernstein form, for ever fewer terms
 
 
 class State(NamedTuple):
     """Where a run is; P1 = order + 1.
 
-    x: (2, n) positions and velocities at the origin of the present step. series (P1, n): of each coordinate, from the
-    node's origin (within the step); both in whole vectors. mode (m,): 0 stick, else direction of slip. held (m,): -1 or +1 where the
-    force of a contact at rest stays at its limit because others hold it. decree (m, 2), stamp (m,): leading
-    coefficients of its guards that are zero just after an event, and when. until, guard (m,): next exit and
-    its kind. pinv: pseudo-inverses of the Delassus matrices of what sticks, node by node. holds (nn,): how
-    many stick. pin (n,): contact that fixes a coordinate, or -1. anchor (m,): coordinate that is evaluated
-    from a contact's constraint, or -1. tree: tournament of the next times. clock: origin of the step (high,
-    low), its length, last event. phase: angles at the origin. flags: see `loop`. counts: steps, events,
+    x: (2, n) positions and velocities at the origin of the present step. series (P1, n): of each coordinate, from
+    the node's origin (within the step); both in whole vectors. mode (m,): 0 stick, else direction of slip. held
+    (m,): -1 or +1 where the force of a contact at rest stays at its limit because others hold it. decree (m, 2),
+    stamp (m,): leading coefficients of its guards that are zero just after an event, and when. until, guard (m,):
+    next exit and its kind. pinv: pseudo-inverses of the Delassus matrices of what sticks, node by node. holds
+    (nn,): how many stick. pin (n,): contact that fixes a coordinate, or -1. anchor (m,): coordinate that is
+    evaluated from a contact's constraint, or -1. tree: tournament of the next times. clock: origin of the step
+    (high, low), its length, last event. phase: angles at the origin. flags: see `loop`. counts: steps, events,
     restarts of patches, nodes restarted, undecided, grazings. kernels, whole, real: addresses of the large
     kernels, and what they are given.
     """
@@ -60,7 +62,12 @@ class State(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Scratch: the patch under work (nodes, coordinates, contacts and where these are), its series, and polynomials."""
+    """Scratch: the patch under work (nodes, coordinates, contacts and where these are), its series, and polynomials.
+
+    Q, R, F and sums have rows of one length, in whole vectors. lane, lane_ptr, place, V: registers of the tapes, see
+    `expansion`. strips, W, laid: what `runs` lays out for each eight neighbours, their registers, and for whom (number
+    of the first, and one). line: a series about another point, see `polynomials`.
+    """
 
     nodes: np.ndarray
     dofs: np.ndarray
@@ -94,6 +101,7 @@ class Room(NamedTuple):
     line: np.ndarray
     strips: np.ndarray
     W: np.ndarray
+    laid: np.ndarray
     sums: np.ndarray
 
 

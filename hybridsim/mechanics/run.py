@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from hybridsim.engine.eight import WIDTH, room_for
 from hybridsim.engine.bernstein_code import LEADING, bernstein_code
+from hybridsim.engine.eight import WIDTH, room_for
 from hybridsim.engine.jit import ENABLED, call_kernel, kernel, kernel_address
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
@@ -177,8 +177,8 @@ def new_state(built: Built, order: int) -> State:
     leaves = 1 << max(m, 1).bit_length()
     ints: dict[str, Any] = {"dtype": np.int64}
     return State(
-        x=np.zeros((2, n)), series=room_for(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes), mode=np.zeros(m, **ints),
-        held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
+        x=np.zeros((2, n)), series=room_for(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes),
+        mode=np.zeros(m, **ints), held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
         until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(plant.g_val), 1)),
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
         tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
@@ -199,7 +199,7 @@ def new_room(built: Built, order: int) -> Room:
     wide = -(-(max(n, m) + 2 * beside) // WIDTH) * WIDTH
     return Room(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
-        lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints), 
+        lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints),
         Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(wide),
         trig=np.zeros((len(plant.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
         place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
@@ -208,6 +208,7 @@ def new_room(built: Built, order: int) -> Room:
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), strips=room_for(1, (len(plant.bands) + 3) * wide)[0], sums=room_for(4, max(wide, 2 * WIDTH)),
+        line=np.zeros(3 * TERMS), sums=room_for(4, wide), strips=room_for(1, (len(plant.bands) + 3) * wide)[0],
+        laid=np.zeros(wide // WIDTH, **ints),
         W=room_for(1, (registers * columns + 1) * wide if len(plant.offsets) else 1)[0],
     )  # fmt: skip

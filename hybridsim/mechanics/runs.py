@@ -15,7 +15,7 @@ from hybridsim.mechanics.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WE
 from hybridsim.mechanics.lanes import advance_lanes, clear
 from hybridsim.mechanics.polynomials import shift, state_at
 
-# Of a strip, the rows: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
+# Rows of a strip: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
 # base; what a force does; what holds; constant acceleration; diagonals.
 _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range(8)
 
@@ -66,7 +66,8 @@ def _height(plant: Any) -> int:
 def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: int, orders: int) -> None:
     """Put what belongs to each eight of the run side by side: strips, and the constants of the law.
 
-    All contacts are lanes. Of what does not move the higher coefficients are zero from the beginning.
+    All contacts are lanes. Of what does not move the higher coefficients are zero from the beginning, and what was laid
+    out for the same eight before is there still.
     """
     length, block, height = plant.bands.shape[1], laws.registers[0] * orders * WIDTH, _height(plant)
     strips, bands, W = room.strips, plant.bands, room.W
@@ -80,6 +81,9 @@ def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: in
         slip, weight = load(strips, s + _SLIP * WIDTH), load(bands, WEIGHT * length + x)
         store(strips, s + _FORWARD * WIDTH, slip * weight)
         store(strips, s + _BASE * WIDTH, slip * load(bands, BASE * length + x))
+        if room.laid[g] == x + 1:
+            continue
+        room.laid[g] = x + 1
         store(strips, s + _MOBILITY * WIDTH, load(bands, MOBILITY * length + x))
         store(strips, s + _HOLDING * WIDTH, load(bands, HOLDING * length + x) * weight)
         store(strips, s + _STILL * WIDTH, load(bands, STILL * length + x))
@@ -89,19 +93,22 @@ def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: in
             store(W, g * block + laws.par_reg[i] * orders * WIDTH, load(bands, (VALUES + i) * length + x))
         for i in range(laws.number_reg.shape[0]):
             store(W, g * block + laws.number_reg[i] * orders * WIDTH, splat(laws.number_val[i]))
-    end = whole_vectors(count) // WIDTH * block
-    advance_lanes(laws.constant_rows, 0, laws.constant_rows.shape[0], W, 0, end, block, orders, 0)
+        begin, rows = g * block, laws.constant_rows
+        advance_lanes(rows, 0, rows.shape[0], W, begin, begin + block, block, orders, 0)
 
 
 @kernel
 def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: int) -> None:
     """Series of the run that was gathered: Q (positions), R (relative velocities), F (forces)."""
-    orders = top + 1
+    orders = room.Q.shape[0]  # the same whatever is asked for, so that what was laid out stays
     _lay_out(plant, laws, state, room, state.whole[FIRST], count, orders)
     Q, R, F, W, strips, offsets = room.Q, room.R, room.F, room.W, room.strips, plant.offsets
     wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
     height, block = _height(plant), laws.registers[0] * orders * WIDTH
-    groups, damped = whole_vectors(count) // WIDTH, plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts
+    groups, damped = (
+        whole_vectors(count) // WIDTH,
+        plant.bands.shape[0] > VALUES + plant.par.shape[1] + shifts,
+    )
     speed, out = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH
     for k in range(top - 1):
         step, share = splat(k + 1.0), splat(1.0 / ((k + 1.0) * (k + 2.0)))
@@ -115,14 +122,19 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
         advance_lanes(laws.rows, 0, law, W, 0, groups * block, block, orders, k)
         for g in range(groups):
             s, row = g * height, k * wide + g * WIDTH
-            slip, change = load(strips, s + _SLIP * WIDTH), load(strips, s + _STILL * WIDTH) if k == 0 else zero
+            slip, change = (
+                load(strips, s + _SLIP * WIDTH),
+                load(strips, s + _STILL * WIDTH) if k == 0 else zero,
+            )
             place = s + _DIAGONALS * WIDTH
             for i in range(shifts):
                 change = change - load(strips, place + i * WIDTH) * load(Q, row + offsets[i])
             if damped:
                 total = zero
                 for i in range(shifts):
-                    total = total + load(strips, place + (shifts + i) * WIDTH) * load(Q, row + wide + offsets[i])
+                    total = total + load(strips, place + (shifts + i) * WIDTH) * load(
+                        Q, row + wide + offsets[i]
+                    )
                 change = change - step * total
             force = slip * load(W, g * block + out + k * WIDTH)
             change = change - load(strips, s + _MOBILITY * WIDTH) * choose(slip, force, zero)
@@ -136,11 +148,17 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
 
 
 @kernel
-def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, orders: int, share: float) -> bool:
+def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, share: float) -> bool:
     """Whether the forces in room.sums are what the law says at the velocities there, to a share of their terms."""
     sums, W, strips = room.sums, room.W, room.strips
-    wide, height, block = sums.shape[1], _height(plant), laws.registers[0] * orders * WIDTH
-    speed, out, zero, worst = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH, splat(0.0), splat(0.0)
+    orders, wide, height = room.Q.shape[0], sums.shape[1], _height(plant)
+    block = laws.registers[0] * orders * WIDTH
+    speed, out, zero, worst = (
+        laws.speed[0] * orders * WIDTH,
+        laws.out[0] * orders * WIDTH,
+        splat(0.0),
+        splat(0.0),
+    )
     for g in range(whole_vectors(count) // WIDTH):
         a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         store(W, g * block + speed, larger(slip * load(sums, a), zero))
@@ -150,7 +168,9 @@ def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, orders: int, 
         a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         off = size(load(sums, wide + a) - slip * load(W, g * block + out))
         beyond = off - splat(share) * load(sums, 2 * wide + a)
-        worst = worst + choose(slip, larger(beyond, zero) + zero * beyond, zero)  # no number where that is none
+        worst = worst + choose(
+            slip, larger(beyond, zero) + zero * beyond, zero
+        )  # no number where that is none
     store(sums, 0, worst)
     for i in range(WIDTH):
         if not sums[0, i] <= 0.0:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.jets import UNIT
 from hybridsim.engine.eight import WIDTH, room_for
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import seconds_compiling
 from hybridsim.engine.packs import packed
 from hybridsim.errors import UsageError
@@ -139,5 +139,8 @@ def _bench(n: int, nc: int, m: int, registers: int) -> Bench:
     of |= {name: np.zeros(m, dtype=np.int64) for name in ("active", "dirty", "next")}
     lanes = nc + WIDTH  # in whole vectors
     return Bench(
-        **of, base=np.zeros((nc, 3)), lane=np.zeros(lanes, dtype=np.int64), V=room_for(1, registers * lanes + 1)[0]
+        **of,
+        base=np.zeros((nc, 3)),
+        lane=np.zeros(lanes, dtype=np.int64),
+        V=room_for(1, registers * lanes + 1)[0],
     )

@@ -142,7 +142,7 @@ def _exit_of(
 
 @kernel
 def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) -> None:
-    """Of each guard of slip (or force of stick) the sums of its terms over a time h that are positive, and that are not.
+    """Of each guard of slip (or force of stick) the sums of its terms over a time h that are above zero and below.
 
     All but the first; to room.sums, rows 1 and 2.
     """
@@ -163,7 +163,9 @@ def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) 
 
 
 @inlined
-def _is_far(series: Any, i: int, last: int, lead: float, fall: float, power: float, h: float, most: float) -> bool:
+def _is_far(
+    series: Any, i: int, last: int, lead: float, fall: float, power: float, h: float, most: float
+) -> bool:
     """Whether a guard that begins at `lead` stays above what `first_exit` would ask of it, whatever its terms do.
 
     fall: the sum of those that are negative (each is there by a part only); power: h**last; most: size of all terms.
@@ -245,8 +247,8 @@ def _law_holds(
     """Whether the forces of what slips are what their laws say at the end of the patch's series, or at their exits."""
     _at_ends(room, nc, h, top)
     if state.whole[FIRST] >= 0:
-        is_moving = laws.rows.shape[0] > 0
-        return not is_moving or law_holds_in_run(plant, laws, room, nc, top + 1, _DEFECT * rtol + 64.0 * _UNIT)
+        share = _DEFECT * rtol + 64.0 * _UNIT
+        return laws.rows.shape[0] == 0 or law_holds_in_run(plant, laws, room, nc, share)
     for t in range(laws.registers.shape[0]):
         first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
         if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
