@@ -105,11 +105,8 @@ class MechanicalRun:
         turns = state.phase[plant.base_rate] if len(plant.rates) else 0.0
         base = plant.base[:, 0] + plant.base[:, 1] * np.sin(turns) + plant.base[:, 2] * np.cos(turns)
         state.mode[:] = np.sign(weights @ state.x[1] - base)
-        for j in range(len(plant.node_dof) - 1):
-            state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
-            if code := call_from_python(state.kernels[DECIDE], *packs):
-                state.flags[WHERE] = j
-                return code
+        if code := _settle_nodes(*packs):
+            return code
         state.x[:] = state.series[:2, : len(plant.dof_node)]
         return DONE
 
@@ -160,9 +157,15 @@ class MechanicalRun:
 
 
 @kernel
-def call_from_python(address: int, plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Call a kernel of packs."""
-    return call_kernel(address, (plant, laws, state, room))
+def _settle_nodes(plant: Any, laws: Any, state: Any, room: Any) -> int:
+    """Decide the nodes at the start, one after another, up to the first that has no decision."""
+    for j in range(plant.node_dof.shape[0] - 1):
+        state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
+        code = call_kernel(state.kernels[DECIDE], (plant, laws, state, room))
+        if code != 0:
+            state.flags[WHERE] = j
+            return code
+    return DONE
 
 
 def reach_kernels(arrays: State, *packs: Any) -> None:
