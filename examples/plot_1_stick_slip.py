@@ -1,10 +1,10 @@
-r"""
+"""
 A block that sticks and slips
 =============================
 
 A block on a table is pulled over a spring whose far end moves at a constant speed. Friction at rest
-is higher than in motion, so the block moves in jerks: it holds until the spring pulls with
-:math:`\mu_s m g`, and each hold lasts :math:`2(\mu_s - \mu_k) m g / (k V)`.
+is higher than in motion, so the block moves in jerks: it holds until the spring pulls with ``mu_s m
+g``, and each hold lasts ``2 (mu_s - mu_k) m g/(k V)``.
 """
 
 import hybridsim as hs

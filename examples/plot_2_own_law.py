@@ -1,10 +1,10 @@
-r"""
+"""
 A friction law of one's own
 ===========================
 
-Friction that falls with speed and rises again, :math:`\mu(v) = \mu_0/(1 + \delta |v|) + \eta |v|`,
-under a load that grows with the displacement. ``slip`` is the magnitude of the force in motion,
-``stick`` the limit at rest.
+Friction that falls with speed and rises again, ``mu(v) = mu0/(1 + delta |v|) + eta |v|``, under a
+load that grows with the displacement. ``slip`` is the magnitude of the force in motion, ``stick``
+the limit at rest.
 """
 
 import hybridsim as hs

@@ -35,7 +35,7 @@ sol = hs.simulate(system.to_model(), (0, 40))
 plot.save(plot.time_history(sol, ["q1", "q2", "v1", "v2"]), "blocks.png")
 
 # %%
-# What the contacts give, :math:`-\int f\,\dot q\,dt`, against the change of the energy: Gauss
+# What the contacts give, the integral of -f q' over time, against the change of the energy: Gauss
 # points in every piece between two events.
 
 nodes, weights = np.polynomial.legendre.leggauss(20)

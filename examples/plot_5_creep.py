@@ -1,10 +1,10 @@
-r"""
+"""
 Why a body on a slope creeps under tanh
 =======================================
 
-A block rests on a slope because friction can hold it. Smoothed friction, :math:`\mu N
-\tanh(v/v_0)`, has no force at rest: the block creeps at the speed at which the smoothed force
-carries it, :math:`v_0\,\mathrm{artanh}(\tan\alpha/\mu)`.
+A block rests on a slope because friction can hold it. Smoothed friction, ``mu N tanh(v/v0)``, has
+no force at rest: the block creeps at the speed at which the smoothed force carries it, ``v0
+artanh(tan(alpha)/mu)``.
 """
 
 from math import atanh

@@ -1,10 +1,9 @@
-r"""
+"""
 A relay that slides
 ===================
 
-A relay on :math:`s = x + v/2` drives a mass. Where both fields point at the surface :math:`s = 0`
-the state slides along it (Filippov): there is no chattering, and the motion on it is :math:`\dot x
-= -2x`.
+A relay on ``s = x + v/2`` drives a mass. Where both fields point at the surface ``s = 0`` the state
+slides along it (Filippov): there is no chattering, and the motion on it is ``x' = -2 x``.
 """
 
 import math

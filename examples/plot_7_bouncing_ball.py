@@ -1,9 +1,9 @@
-r"""
+"""
 A ball whose bounces accumulate
 ===============================
 
-A ball dropped from 1 m bounces with a restitution of 0.7. Its impacts accumulate at :math:`t_\infty
-= \sqrt{2h/g}\,(1 + e)/(1 - e)`; behind that instant the contact is closed, and the run goes on.
+A ball dropped from 1 m bounces with a restitution of 0.7. Its impacts accumulate at ``sqrt(2 h/g)
+(1 + e)/(1 - e)``; behind that instant the contact is closed, and the run goes on.
 """
 
 import math
