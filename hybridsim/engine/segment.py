@@ -240,12 +240,14 @@ class SegmentRun:
         grows away from the surface: a shorter one is to be searched.
         """
         order = 0 if is_monitor else int(self.watch.orders[hit.number])
-        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER:
+        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or self.method.dense_is_accurate:
             return False
         x = self.flow.project(np.zeros(1), step.x0[None, :])[0]
-        series = self.system.series(0.0, x, self.flow.p, self.flow.z, self.rounding(), 0.0)
-        g, s = hit.number, abs(hit.theta * step.s1)
-        return bool(abs(series.guards[g, order]) * s**order <= series.guard_bounds[g, 0])
+        series = self.system.series(0.0, x, self.flow.p, self.flow.z, 4.0 * UNIT * self.scale, 0.0)
+        leading, rounding = abs(series.guards[hit.number, order]), series.guard_bounds[hit.number, 0]
+        found, shorter = abs(hit.theta * step.s1), abs(_SHORTER * step.s1)
+        # a step no longer than what rounding hides would say nothing either
+        return bool(leading * found**order <= rounding < leading * shorter**order)
 
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))

@@ -19,10 +19,9 @@ def _absolute(u: Any) -> Any:
 class exp(sympy.exp):  # named as what SymPy's printers know
     """exp(u) whose sum u stays whole: SymPy makes exp(2000)*exp(-1000*v) of exp(2000 - 1000*v), which is no double."""
 
-    @classmethod
-    def eval(cls, arg: Any) -> Any:
-        """Value or simpler form, but for sums."""
-        return None if arg.is_Add else super().eval(arg)
+    def __new__(cls, arg: Any, **options: Any) -> Any:
+        """Simplified, but for sums."""
+        return super().__new__(cls, arg, **(options | {"evaluate": False} if arg.is_Add else options))
 
     def as_base_exp(self) -> tuple[Any, Any]:
         """Itself, so that a product merges it with its equals alone."""

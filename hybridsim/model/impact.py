@@ -34,10 +34,10 @@ class Impact(Declared):
     name : str
         Of the normal force p.
     gap : str or float
-        g(t, x) >= 0, a smooth expression of positions: p enters its second derivative and not its first. p
+        Gap function g(t, x) >= 0, a smooth expression of positions: p enters its second derivative and not its first. p
         has to do work along the gap, so that a mass m at height h with gap h has + p/m in its acceleration.
     restitution : str or float
-        e, from 0 (no rebound) to 1 (no loss); it may use the speed of approach, above zero, by the name
+        Coefficient e, from 0 (no rebound) to 1 (no loss); it may use the speed of approach, above zero, by the name
         ``speed``.
     place : Place, optional
         Where it is written, for the messages of errors.
