@@ -16,6 +16,7 @@ from hybridsim.engine.jit import ENABLED, call_kernel, kernel, kernel_address
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
 from hybridsim.engine.timepair import phase_of
+from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import (
     AT,
     BERNSTEIN,
@@ -47,6 +48,23 @@ _ROOM = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events that one call has room for, beside those of one node
 _TIGHTEST = 1e-15
 _RADIUS = 2  # of the first patch; it adapts
+_RANGE = 280  # decades of a double, some left for what the powers are multiplied with
+_LEAST = 10  # order below which a series is not worth its steps
+
+
+def _order_in_range(built: Built, span: tuple[float, float]) -> int:
+    """The order up to which rates and times to its power are doubles, whatever the unit of time is."""
+    plant = built.plant
+    rates = [abs(plant.k_val).max(initial=0.0) ** 0.5, abs(plant.c_val).max(initial=0.0), *plant.rates]
+    sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
+    decades = max((abs(math.log10(size)) for size in sizes), default=0.0)
+    order = int(_RANGE / max(decades, 1.0))
+    if order < _LEAST:
+        raise UsageError(
+            f"rates up to {max(rates):.3g} over a span of {span[1] - span[0]:.3g} leave the range of numbers",
+            remedy="choose a unit of time in which they are nearer to one",
+        )
+    return order
 
 
 class MechanicalRun:
@@ -57,7 +75,7 @@ class MechanicalRun:
         self.built, self.span = built, span
         self.rtol, self.keep = max(rtol, _TIGHTEST), keep
         # coupled coordinates make the linear part of a series the dearer one, as where there is no convolution at all
-        self.order = series_order(self.rtol, linear=True)
+        self.order = min(series_order(self.rtol, linear=True), _order_in_range(built, span))
         self.max_step = max_step
         self.state = new_state(built, self.order)
         self.room = new_room(built, self.order)

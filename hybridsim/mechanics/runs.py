@@ -51,7 +51,7 @@ def gather_run(plant: Any, state: Any, room: Any, count: int, tau: float, top: i
 def clear_beside(plant: Any, room: Any, count: int, top: int) -> None:
     """Zeros in the lanes around a run, as far as anything acts."""
     wide, offsets = room.Q.shape[1], plant.offsets
-    before, after = -min(offsets[0], 0), max(offsets[-1], 0)
+    before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # the rest of the last vector among them
     for k in range(top + 1):
         clear(room.Q, k * wide - whole_vectors(before), before)
         clear(room.Q, k * wide + count, after)

@@ -79,3 +79,29 @@ def test_a_series_about_another_point_is_right_to_some_ulps_of_its_terms(terms: 
                 Fraction(series[i, column]) * comb(i, k) * Fraction(d) ** (i - k) for i in range(k, terms)
             ]
             assert abs(Fraction(out[k]) - sum(parts)) <= Fraction(2e-15) * sum(map(abs, parts))
+
+
+@pytest.mark.parametrize("unit", [1e-14, 1e12, 1e13, 1e18])
+@pytest.mark.parametrize("rtol", [1e-9, 1e-13])
+def test_the_unit_of_time_is_of_no_account(unit: float, rtol: float) -> None:
+    """The same chain in another unit: powers of times and rates would leave the range of doubles at a high order."""
+
+    def end(s: float) -> tuple[list[str], np.ndarray]:
+        n = 12
+        rng = np.random.default_rng(1)
+        stiffness = np.diag(np.full(n, 2.5)) - np.eye(n, k=1) - np.eye(n, k=-1)
+        contacts = [
+            hs.MechanicalContact(
+                f"f{i}", {i: 1}, 1 / s**2, "coulomb", {"mu": float(rng.uniform(0.2, 0.8))}, base=0.5 / s
+            )
+            for i in range(n)
+        ]
+        start = {"q0": rng.uniform(-2, 2, n), "v0": rng.uniform(-1, 1, n) / s}
+        system = hs.MechanicalSystem(np.ones(n), None, stiffness / s**2, None, contacts, **start)
+        sol = hs.simulate(system, (0, 30 * s), rtol=rtol)
+        assert sol.success, sol.message
+        return [f"{e.component} {e.target}" for e in sol.events], sol.x_end[:n]
+
+    (events, x), (expected, x_expected) = end(unit), end(1.0)
+    assert events == expected
+    assert x == pytest.approx(x_expected, abs=1e4 * rtol)
