@@ -122,13 +122,12 @@ def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) ->
         for n, us in zip(SIZES, per_event)
     )
     is_ahead = {n: HAS_HEYOKA and rows[n][fine][0] < rows[n]["heyoka, 1e-9"][0] for n in SIZES}
-    ahead, behind = (
-        ", ".join(str(n) for n in SIZES if is_ahead[n] is side) or "none" for side in (True, False)
-    )
+    ahead, behind = (", ".join(str(n) for n in SIZES if is_ahead[n] is side) for side in (True, False))
+    but = f", and behind for n = {behind}" if behind else ""
     verdict = ""
     if HAS_HEYOKA:
         verdict = f"""
-Against heyoka hybridsim is ahead for n = {ahead}, and behind for n = {behind}. heyoka expands the whole chain at
+Against heyoka hybridsim is ahead for n = {ahead or "none"}{but}. heyoka expands the whole chain at
 every event, in code that is made and compiled for this one chain (not counted), and its event callbacks are Python;
 hybridsim's kernels are compiled once for all systems.
 """
