@@ -23,6 +23,7 @@ PACKAGE = ROOT / "hybridsim"
 # Where each box stands: its row from the ground up, and how far right of the middle.
 PLACES = {
     "errors": (0, 0.0),
+    "files": (1, 2.2),
     "expr": (1, 0.0),
     "model": (2, 0.0),
     "engine": (3, 0.0),
@@ -32,6 +33,7 @@ PLACES = {
     "notebook": (5, 2.2),
     "arguments": (5, 0.0),
     "solution": (6, 0.0),
+    "preparation": (7, 2.2),
     "mechanics": (7, 0.0),
     "simulate": (8, 0.0),
     "ivp": (8, -2.2),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -105,6 +106,13 @@ def test_the_page_on_floors_has_them_all_in_this_order() -> None:
     page = (Path(__file__).parents[1] / "docs" / "explanation" / "floors.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`.*?`) \|", page, re.MULTILINE)
     assert tuple(name.strip("`") for row in rows for name in row.split(", ")) == FLOORS
+
+
+def test_the_picture_has_every_floor() -> None:
+    script = Path(__file__).parents[1] / "scripts" / "floors_graph.py"
+    below, sizes = runpy.run_path(str(script))["graph"]()
+    assert set(below) == set(FLOORS) == set(sizes)
+    assert "engine" in below["integrators"] and not below["errors"]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))
