@@ -205,3 +205,33 @@ HELD = '[contacts.f]\nvelocity = "v"\nnormal = "1"\nlaw = { name = "coulomb", mu
 def test_forcing_without_a_common_period_is_followed(states: str, rest: str, kind: str, said: str) -> None:
     found = hs.steady_state(model(states, "", rest), max_periods=64)
     assert found.kind == kind and said in found.message
+
+
+def test_a_quantity_that_is_rounding_alone_takes_no_pieces_for_ever() -> None:
+    """A balance of energy is zero to rounding: no piece of it is ever smooth, however short."""
+    forced = 'x = {start = 0, der = "v"}\nv = {start = 0, der = "-x - 0.1*v + cos(2*t)"}'
+    balance = 'w = {start = 0, der = "v*(-x - 0.1*v + cos(2*t))"}'
+    outputs = '[outputs]\nbalance = "v**2/2 - w"\none = "sin(x)**2 + cos(x)**2 - 1"\nfast = "sin(300*x)"'
+    found = hs.steady_state(model(f"{forced}\n{balance}", "", outputs))
+    assert len(found._orbit.starts) < 5000
+    assert found.amplitude["balance"] < 1e-12
+    assert found.amplitude["one"] <= 2.0**-52
+    assert found.amplitude["fast"] == pytest.approx(1.0, abs=1e-12)
+    # (-4 + 1 + 0.2 i) X = -F: speed 2 |X|
+    assert found.amplitude["v"] == pytest.approx(2.0 / abs(-3.0 + 0.2j), rel=1e-10)
+
+
+def test_a_quantity_that_jumps_is_never_beyond_its_values() -> None:
+    forced = 'x = {start = 0, der = "v"}\nv = {start = 0, der = "-x - 0.1*v + cos(2*t)"}'
+    found = hs.steady_state(
+        model(forced, "", '[outputs]\nside = "sign(x)"\nstair = "sign(v - 0.1) + 2*sign(v + 0.2)"')
+    )
+    assert (found.minimum["side"], found.maximum["side"]) == pytest.approx((-1.0, 1.0), abs=1e-12)
+    assert (found.minimum["stair"], found.maximum["stair"]) == pytest.approx((-3.0, 3.0), abs=1e-12)
+
+
+def test_a_state_that_only_adds_up_is_named() -> None:
+    forced = 'x = {start = 0, der = "v"}\nv = {start = 0, der = "-x - 0.1*v + cos(2*t)"}'
+    found = hs.steady_state(model(f'{forced}\nspent = {{start = 0, der = "0.1*v**2"}}'), max_periods=256)
+    assert found.kind == "not settled"
+    assert "spent goes on moving away" in found.message

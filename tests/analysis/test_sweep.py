@@ -88,6 +88,14 @@ def test_a_point_that_fails_leaves_its_status_and_all_the_others() -> None:
     assert list(found.problems()) == [("not a number: x", 3), ("RuntimeError: too heavy for this", 3)]
 
 
+def test_a_sweep_without_any_result_has_its_readings_all_the_same() -> None:
+    found = hs.sweep("dfcs", {"c": [-200.0, -300.0]}, ["amplitude.x", "kind"])
+    assert found.failed.all()
+    assert np.isnan(found["amplitude.x"]).all() and found["kind"].tolist() == ["", ""]
+    ends = hs.sweep("dfcs", {"m": [0.0]}, "final.x", t_span=(0, 0.1))
+    assert ends.failed.all() and np.isnan(ends["final.x"]).all()
+
+
 def test_the_same_by_any_executor() -> None:
     expected = by_threads()
     assert same(hs.sweep("dfcs", GRID, end, workers=1), expected)

@@ -18,9 +18,13 @@ if TYPE_CHECKING:
 POINTS = 16  # of Gauss on a piece: a polynomial of degree 15
 _TAIL = 4  # last coefficients, which tell whether the polynomial holds
 _RESOLVED = 1e-13  # they are below that part of the largest value of the whole stretch
+_HOLDS = 1e-6  # where they are not even below that part, the polynomial is no picture of the quantity
 _NOISE = 1e-9  # below that part, what halving a piece does not make smaller is rounding
 _SMALLER = 0.7
 _HALVINGS = 24
+_PROBED, _TINY = 16, 2.0**-16  # pieces, and the share of each, from which rounding is told
+_ASIDE = (0.382, 0.618)  # where in a piece: not where symmetry may put a jump, and never at one jump twice
+_ROUNDINGS = 4.0  # times what was met there
 _DENSE = 65  # points at which a slope is looked at for changes of sign
 _STEPS = 4  # of Newton's method, from the chord through two of these points
 
@@ -90,11 +94,16 @@ class Orbit:
     @cached_property
     def extremes(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest value (Q,) of each quantity, both sides of every jump included."""
+        # around a jump, as of sign(x), the polynomial of the last piece swings beyond what the quantity ever is
+        tails = np.abs(self.coefficients[:, -_TAIL:]).max(axis=1)
+        holds = tails <= _HOLDS * np.abs(self.values).max(axis=(0, 1))
         ends = np.einsum("ij,kjq->kiq", _AT_ENDS, self.coefficients)
+        ends = np.where(holds[:, None], ends, self.values[:, [0, -1]])
         sampled = np.concatenate([ends, self.values], axis=1)
         low, high = sampled.min(axis=(0, 1)), sampled.max(axis=(0, 1))
-        np.minimum.at(low, self.turns.quantity, self.turns.value)
-        np.maximum.at(high, self.turns.quantity, self.turns.value)
+        turns, kept = self.turns, holds[self.turns.piece, self.turns.quantity]
+        np.minimum.at(low, turns.quantity[kept], turns.value[kept])
+        np.maximum.at(high, turns.quantity[kept], turns.value[kept])
         return low, high
 
     @cached_property
@@ -203,16 +212,14 @@ def orbit_of(solution: Solution) -> Orbit:
     segments, begins, ends = index[:-1][same], s[:-1][same], s[1:][same]
     finished: list[tuple[np.ndarray, ...]] = []
     scale = np.zeros(len(sample.names))
+    rounding = _ROUNDINGS * _rounding(sample, segments, begins, ends)
     before = np.full((len(segments), len(sample.names)), np.inf)  # tails on the pieces that were halved
     for halving in range(_HALVINGS):
-        points = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + NODES)
-        flat = sample(np.repeat(segments, POINTS), points.ravel())
-        values = flat.reshape(len(segments), POINTS, -1)
-        values[np.isinf(values)] = 0.0  # guards of other modes
+        values, tails = _sampled(sample, segments, begins, ends)
         scale = np.maximum(scale, np.abs(values).max(axis=(0, 1)))
-        tails = np.abs(np.einsum("ij,kjq->kiq", _TO_COEFFICIENTS[-_TAIL:], values)).max(axis=1)
         is_rounding = (tails <= _NOISE * scale) & (tails >= _SMALLER * before)
-        good = ((tails <= _RESOLVED * scale) | is_rounding).all(axis=1) | (halving == _HALVINGS - 1)
+        is_resolved = tails <= np.maximum(_RESOLVED * scale, rounding)
+        good = (is_resolved | is_rounding).all(axis=1) | (halving == _HALVINGS - 1)
         finished.append((segments[good], begins[good], ends[good], values[good]))
         if good.all():
             break
@@ -225,3 +232,27 @@ def orbit_of(solution: Solution) -> Orbit:
     origins = solution._segments.origins()[segments[order]]
     starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + begins[order])
     return Orbit(sample.names, starts, (ends - begins)[order], segments[order], values[order])
+
+
+def _sampled(
+    sample: Sampler, segments: np.ndarray, begins: np.ndarray, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (K, POINTS, Q) on pieces, and the largest of the last coefficients (K, Q) there."""
+    points = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + NODES)
+    values = sample(np.repeat(segments, POINTS), points.ravel()).reshape(len(segments), POINTS, -1)
+    values[np.isinf(values)] = 0.0  # guards of other modes
+    return values, np.abs(np.einsum("ij,kjq->kiq", _TO_COEFFICIENTS[-_TAIL:], values)).max(axis=1)
+
+
+def _rounding(sample: Sampler, segments: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """The last coefficients (Q,) that rounding alone makes: on a piece so short that nothing else is left in them.
+
+    Of a difference of large terms, such as a balance of energy, it may be all there is: no piece is short enough then.
+    """
+    probed = np.unique(np.linspace(0, len(segments) - 1, _PROBED).astype(int)) if len(segments) else segments
+    found = []
+    for share in _ASIDE:
+        starts = begins[probed] + share * (ends - begins)[probed]
+        lengths = _TINY * (ends - begins)[probed]
+        found.append(_sampled(sample, segments[probed], starts, starts + lengths)[1])
+    return np.minimum(*found).max(axis=0, initial=0.0)

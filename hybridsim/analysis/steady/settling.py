@@ -82,14 +82,14 @@ class Passings:
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )
 
-    def drifts(self) -> bool:
-        """Whether a state moves on as much in each quarter of the passings, the same way."""
+    def drifting(self) -> int | None:
+        """The number of a state that moves on as much in each quarter of the passings, the same way."""
         quarter = (len(self.values) - 1) // 4
         if quarter < 2:
-            return False
+            return None
         moves = np.diff(self.values[::-quarter][:5], axis=0)
         i = int(np.argmax(np.abs(moves[0]) / np.where(self.scale > 0.0, self.scale, 1.0)))
-        return bool(np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]))
+        return i if np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]) else None
 
     def nearest(self) -> int:
         """After how many passings the motion comes closest to repeating: the fewest that are about as good."""

@@ -260,21 +260,29 @@ class _Search:
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
         first, second = largest_exponents(self.motion, passings.last, base)
         exponent = 0.5 * (first + second)
-        grew = len(self.earlier) > 0 and (passings.scale > _GROWS * self.earlier).any()
-        grows = grew or passings.drifts()
-        if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not grows:
+        leaving = self._leaving(passings)
+        if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not leaving:
             kind = CHAOTIC
-        elif abs(exponent) * base <= _NEUTRAL and not grows:
+        elif abs(exponent) * base <= _NEUTRAL and not leaving:
             kind = QUASI
         else:
             kind = UNSETTLED
         message = (
             f"{kind} after {self.periods} periods: largest Lyapunov exponent {exponent:.3g} per unit of time"
-            + (", and a state goes on moving away" if grows else "")
+            + (f", and {leaving} goes on moving away: leave out what only adds up" if leaving else "")
         )
         found = _found(self.motion, kind, replace(self._orbit(passings, 1), residual=passings.residual(1)))
         found.lyapunov, found.message, found.periods = exponent, message, self.periods
         return found
+
+    def _leaving(self, passings: Passings) -> str:
+        """The name of a state that never comes back; empty if all do."""
+        names = [*self.motion.names, *self.motion.discrete]
+        drifting = passings.drifting()
+        if drifting is not None:
+            return names[drifting]
+        grown = passings.scale > _GROWS * self.earlier if len(self.earlier) else np.zeros(0)
+        return names[int(np.argmax(grown))] if grown.any() else ""
 
 
 _LONGER = 8

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -39,9 +39,14 @@ class Collected:
                     array[number, : np.size(value)] = value
         self.done += len(outcomes)
 
-    def values(self, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
-        """The arrays by name, in the order in which the first points have them."""
-        names = sorted(self._arrays, key=lambda name: self._places[name])
+    def values(
+        self, shape: tuple[int, ...], nothing: Mapping[str, float | str] | None = None
+    ) -> dict[str, np.ndarray]:
+        """The arrays by name, in the order in which the first points have them; of what no point has, `nothing`."""
+        for name, value in (nothing or {}).items():
+            if name not in self._arrays:
+                self._arrays[name] = np.full(len(self.status), value, dtype=_kind(value))
+        names = sorted(self._arrays, key=lambda name: self._places.get(name, (len(self.status), 0)))
         return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
 
     def _room(self, old: np.ndarray | None, value: Reading) -> np.ndarray:

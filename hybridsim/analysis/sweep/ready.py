@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ STEADY, FINAL = "steady", "final"
 _OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
 _OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
 _OF_MOTION = ("period", "multiple", "residual", "newton_steps", "periods", "kind", "word", "stable")
+_TEXTS = ("kind", "word")
 _SQUARED = "energy"
 _PLAIN = ("amplitude", "energy")  # of each quantity, where nothing in particular is asked for
 
@@ -33,6 +35,10 @@ class Steady:
 
     words: tuple[str, ...]
     options: Mapping[str, Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """What stands where there is no result."""
+        return {word: "" if word in _TEXTS else math.nan for word in self.words}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
         """The steady state, looked for from that of the neighbour where there is one."""
@@ -55,6 +61,10 @@ class Final:
 
     names: tuple[str, ...]
     options: Mapping[str, Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """What stands where there is no result."""
+        return {f"{FINAL}.{name}": math.nan for name in self.names}
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
         """The states by name, from the neighbour's where there is one."""

@@ -15,7 +15,7 @@ from hybridsim.analysis.sweep.axes import points_of
 from hybridsim.analysis.sweep.job import Job, new_token
 from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.measures import measure_of
-from hybridsim.analysis.sweep.ready import units_of_readings
+from hybridsim.analysis.sweep.ready import Final, Steady, units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import whole
@@ -105,12 +105,13 @@ def sweep(
     points = points_of(model, values, mode)
     tell = callback(progress)
     count = None if workers is None else whole(workers, "workers")
+    measured = measure_of(measure, model, warm_start, options)
     job = Job(
         new_token(),
         model,
         tuple(axis.name for axis in points.axes),
         frozenset(axis.name for axis in points.axes if axis.is_start),
-        measure_of(measure, model, warm_start, options),
+        measured,
         bool(warm_start),
     )
     began = time.perf_counter()
@@ -119,7 +120,8 @@ def sweep(
     )
     with Journal(journal, mark) if journal is not None else nullcontext() as file:
         collected, finished, who = work(job, points, executor, count, tell, file)
-    found = collected.values(points.shape)
+    nothing = measured.nothing() if isinstance(measured, Steady | Final) else None
+    found = collected.values(points.shape, nothing)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
     if not callable(measure):
         known |= units_of_readings(found, model)
