@@ -4,9 +4,9 @@
     python scripts/figures.py --make [PAGE ...]  run the commands of these pages, of all older ones if none is named
     python scripts/figures.py --done PAGE ...    a person has brought these up to date with what the commands print
 
-The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a hash of the
-package's sources without docstrings; the site says at the foot of each page whether they are the sources that it was
-built from.
+The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a hash of
+those modules of the package that the commands can reach, without docstrings, and of its data; the site says at the foot
+of each page whether they are those that it was built from.
 """
 
 from __future__ import annotations
@@ -25,9 +25,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from used_sources import modules_of
+
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, NOTES = ROOT / "docs" / "figures.toml", ROOT / "docs" / "figures.json"
-OF_RESULTS = (".py", ".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
+OF_DATA = (".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
 
 
 def without_docstrings(source: bytes) -> bytes:
@@ -44,11 +46,13 @@ def without_docstrings(source: bytes) -> bytes:
     return b"\n".join(line for line in lines if line.strip())
 
 
-def sources() -> str:
-    """Hash of the package: equal where every figure would come out alike."""
+def sources(page: str) -> str:
+    """Hash of what the commands of a page use of the package: equal where every figure would come out alike."""
     digest = hashlib.sha256()
     package = ROOT / "hybridsim"
-    for path in sorted(p for p in package.rglob("*") if p.suffix in OF_RESULTS):
+    used = set().union(*map(modules_of, table()[page]["commands"]))
+    used |= {path for path in package.rglob("*") if path.suffix in OF_DATA}
+    for path in sorted(used):
         content = path.read_bytes()
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(without_docstrings(content) if path.suffix == ".py" else content)
@@ -78,7 +82,7 @@ def note(page: str, minutes: float | None) -> None:
     noted = notes()
     before = noted.get(page, {}).get("minutes")
     noted[page] = {
-        "sources": sources(),
+        "sources": sources(page),
         "commit": commit(),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "minutes": before if minutes is None else round(minutes, 1),
@@ -95,7 +99,9 @@ def footer(page: str) -> str:
     noted = notes().get(page)
     if noted is None:
         return f"\n\n---\n\nFigures: {commands}, by sources from before they were noted.\n"
-    same = "those of this version" if noted["sources"] == sources() else "older than those of this version"
+    same = (
+        "those of this version" if noted["sources"] == sources(page) else "older than those of this version"
+    )
     made = f"{commands}, {noted['date']}, at commit {noted['commit']}"
     return f"\n\n---\n\nFigures: {made}; the package's sources are {same}.\n"
 
@@ -123,11 +129,11 @@ def main() -> None:
     parser.add_argument("--done", action="store_true", help="note the pages as of the present sources")
     parser.add_argument("pages", nargs="*", metavar="PAGE", help="as in docs/figures.toml")
     args = parser.parse_args()
-    entries, present = table(), sources()
+    entries = table()
     unknown = [page for page in args.pages if page not in entries]
     if unknown:
         parser.error(f"not in docs/figures.toml: {', '.join(unknown)}")
-    is_present = {page: notes().get(page, {}).get("sources") == present for page in entries}
+    is_present = {page: notes().get(page, {}).get("sources") == sources(page) for page in entries}
     if args.done:
         for page in args.pages:
             note(page, None)

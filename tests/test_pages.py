@@ -158,8 +158,9 @@ def test_the_page_on_sweeps_runs_on_threads_processes_and_a_cluster(tmp_path: Pa
     assert (processes, cluster) == ("ProcessPoolExecutor (2) True", "ClientExecutor (2) True")
 
 
-def test_every_study_says_what_makes_its_figures() -> None:
+def test_every_study_says_what_makes_its_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each page of a study is in the table, each script that a command names is there, each page gets its foot."""
+    monkeypatch.syspath_prepend(ROOT / "scripts")
     figures = runpy.run_path(str(ROOT / "scripts" / "figures.py"))
     table = figures["table"]()
     studies = {f"studies/{page.name}" for page in (ROOT / "docs" / "studies").glob("*.md")}
@@ -170,3 +171,20 @@ def test_every_study_says_what_makes_its_figures() -> None:
     assert all((ROOT / script).is_file() for script in scripts)
     assert "studies/speed.py" in figures["footer"]("studies/speed.md")
     assert figures["footer"]("index.md") == ""
+
+
+def test_figures_depend_on_what_their_commands_use() -> None:
+    """A page is older where a module that its command reaches has changed, through functions and packages too."""
+    used = runpy.run_path(str(ROOT / "scripts" / "used_sources.py"))["modules_of"]
+
+    def reached(command: str) -> set[str]:
+        return {path.relative_to(ROOT / "hybridsim").as_posix() for path in used(command)}
+
+    speed, blade = reached("python studies/speed.py"), reached("python studies/blade_damper.py")
+    kernels = {"engine/exact_leap.py", "engine/linear_kernels.py", "integrators/exact.py", "preparation.py"}
+    asked = {"analysis/steady/steady_state.py", "analysis/sweep/collected.py"}
+    assert kernels <= speed and kernels | asked <= blade
+    assert not asked & speed and not any(name.startswith("cli/") for name in speed)
+    atlas = reached("hybridsim atlas --out docs/atlas")
+    assert {"cli/atlas.py", "cli/entry.py"} <= atlas and "cli/advise.py" not in atlas
+    assert "testing/catalogue/__init__.py" in reached("cd tests && python -m conformance.table")
