@@ -89,14 +89,14 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_the_page_on_own_laws_runs_and_keeps_them_short(tmp_path: Path) -> None:
-    """Both declarations are below 30 lines and run; the Python form is the same model."""
+    """The declarations are below 30 lines and run; the Python form is the same model."""
     page = ROOT / "docs" / "how-to" / "own-law.md"
     solutions = []
     for text in blocks(page, "toml"):
         assert len(text.splitlines()) < 30
         model = hs.Model.from_toml(text)
         solutions.append(hs.simulate(model, (0, model.duration_value() or 1)))
-    assert [sol.status for sol in solutions] == ["finished", "finished"]
+    assert [sol.status for sol in solutions] == ["finished"] * 3
     (code,) = blocks(page, "python")
     script = tmp_path / "shown.py"
     script.write_text(code.replace("fading.png", (tmp_path / "fading.png").as_posix()), encoding="utf-8")
@@ -109,7 +109,7 @@ def test_the_page_on_many_contacts_runs_and_is_short(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     shown = blocks(ROOT / "docs" / "how-to" / "many-contacts.md", "python")
-    assert [len(code.splitlines()) < 30 for code in shown] == [True, True, True]
+    assert [len(code.splitlines()) < 30 for code in shown] == [True] * 4
     script = tmp_path / "shown.py"
     script.write_text("\n".join(shown), encoding="utf-8")
     runpy.run_path(str(script))
