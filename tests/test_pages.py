@@ -115,7 +115,7 @@ def test_the_page_on_many_contacts_runs_and_is_short(
     runpy.run_path(str(script))
     said = re.findall(r"^print\(.*\)  # (.+)$", "\n".join(shown), re.MULTILINE)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 4
+    assert len(said) == 5
     first = tmp_path / "first.py"
     first.write_text(
         shown[0] + 'hs.simulate(system.to_model(), (0, 1), integrator="dop853")', encoding="utf-8"
