@@ -77,8 +77,10 @@ def _handed_on(package: str, name: str) -> set[tuple[str, str]]:
         return {(_public()[name], name)}
     file = _file(package)
     assert file is not None
-    # a module and what it defines may have one name
-    return {(f"{package}.{name}", ""), *(one for one in _imports(file) if one[1] == name)}
+    handed = {one for one in _imports(file) if one[1] == name}
+    if not handed and _file(f"{package}.{name}") is None:  # the package defines it, out of whatever it imports
+        return set(_imports(file))
+    return handed | {(f"{package}.{name}", "")}  # a module and what it defines may have one name
 
 
 @cache
