@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -59,13 +59,12 @@ class Pool:
         waiting: Sequence[Item] = list(items)
         with ThreadPoolExecutor(self.workers) as threads:
             futures: list[Future[Result]] = [threads.submit(function, item) for item in waiting]
-            open_, count = set(futures), len(futures)
+            count = len(futures)
             try:
-                while open_:
-                    done, open_ = wait(open_, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        future.result()
-                    self.tell(begin + (end - begin) * (count - len(open_)) / count)
+                # to wait for the next of all that are open, again and again, goes as the square of their number
+                for done, future in enumerate(as_completed(futures), start=1):
+                    future.result()
+                    self.tell(begin + (end - begin) * done / count)
             except BaseException:  # Ctrl-C above all: no more is begun, and it is raised again
                 threads.shutdown(wait=True, cancel_futures=True)
                 raise
