@@ -78,7 +78,9 @@ def _handed_on(package: str, name: str) -> set[tuple[str, str]]:
     file = _file(package)
     assert file is not None
     handed = {one for one in _imports(file) if one[1] == name}
-    if not handed and _file(f"{package}.{name}") is None:  # the package defines it, out of whatever it imports
+    if (
+        not handed and _file(f"{package}.{name}") is None
+    ):  # the package defines it, out of whatever it imports
         return set(_imports(file))
     return handed | {(f"{package}.{name}", "")}  # a module and what it defines may have one name
 
