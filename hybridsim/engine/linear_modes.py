@@ -75,13 +75,18 @@ def modes_of(
     return found
 
 
+def is_always_linear(system: System) -> bool:
+    """Whether a model is linear in each of its modes whatever the values of its parameters."""
+    return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))
+
+
 def what_is_not_linear(system: System) -> str | None:
     """What keeps a model from being linear in each of its modes, in words; None where nothing does.
 
     Each mode of each component is looked at; other combinations of modes are when they are entered. Most models are
     linear at any values of their parameters or at none; the others are looked at for each set of values.
     """
-    if system.code.shared("is linear", lambda: _first_reason(system, None) is None):
+    if is_always_linear(system):
         return None
     known: dict[tuple[float, ...], str | None] = system.code.shared("what is not linear", dict)
     values = tuple(system.values.values())

@@ -66,15 +66,19 @@ class LinearPlan:
         self.recipe = Recipe(numbers)
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y."""
-        A, rows = (np.zeros(shape) for shape in self._shapes)
+        """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.
+
+        registers: (R,), or (points, R) for as many of each.
+        """
+        lead = registers.shape[:-1]
+        A, rows = (np.zeros(lead + shape) for shape in self._shapes)
         for matrix, (places, sources) in ((A, self._flow), (rows, self._guards)):
-            matrix.reshape(-1)[places] = registers[sources]
+            matrix.reshape(*lead, -1)[..., places] = registers[..., sources]
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
-        """The atoms and monomials as arrays."""
-        return self._fixed | {name: registers[places] for name, places in self._computed.items()}
+        """The atoms and monomials as arrays; registers as for `matrices`."""
+        return self._fixed | {name: registers[..., places] for name, places in self._computed.items()}
 
 
 def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:

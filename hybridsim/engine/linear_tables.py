@@ -83,10 +83,32 @@ def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float
     """
     plan, registers = plan_of(system, met, p)
     A, rows = plan.matrices(registers)
-    if not (np.abs(A) < _LARGEST).all() or not (np.abs(rows) < _LARGEST).all():
+    if not is_finite(A, rows).all():
         return None
+    tables: LinearTables = packed(
+        LinearTables(
+            **plan.atoms(registers),
+            phases=angles_of(system),
+            **of_matrices(A, rows, system.n, horizon),
+        )
+    )
+    return tables
+
+
+def is_finite(A: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Whether all coefficients have squares; of matrices of many points, of which of them."""
+    inside = [(np.abs(part) < _LARGEST).all(axis=(-3, -2, -1)) for part in (A, rows)]
+    return np.logical_and(*inside)
+
+
+def angles_of(system: System) -> np.ndarray:
+    """Where in p the angles are that are known to rounding only: the first, and the one after the last."""
+    return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
+
+
+def of_matrices(A: np.ndarray, rows: np.ndarray, n: int, horizon: float) -> dict[str, np.ndarray]:
+    """The fields of the tables that have a row for each vector of modes, by name: of A (K, m, m), rows (K, G, m)."""
     count, guards, size = rows.shape
-    n = system.n
     flows = modals(A, horizon, TERMS)
     widest = flows.values.shape[1]
     series, roundings = (np.empty((count, guards, ORDER + 1, size)) for _ in range(2))
@@ -106,28 +128,28 @@ def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float
         grown,
         waves,
     )
-    tables: LinearTables = packed(
-        LinearTables(
-            **plan.atoms(registers),
-            phases=np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
-            series=series,
-            roundings=roundings,
-            counts=flows.counts,
-            values=flows.values,
-            upper=flows.upper,
-            ends=flows.ends,
-            basis=flows.full_basis[:, :n].copy(),
-            inverse=flows.inverse,
-            terms=terms,
-            sizes=sizes,
-            rests=rests,
-            farthest=farthest,
-            grown=grown,
-            slopes=A[:, :n].copy(),
-            waves=waves,
-        )
-    )
-    return tables
+    return {
+        "series": series,
+        "roundings": roundings,
+        "counts": flows.counts,
+        "values": flows.values,
+        "upper": flows.upper,
+        "ends": flows.ends,
+        "basis": flows.full_basis[:, :n].copy(),
+        "inverse": flows.inverse,
+        "terms": terms,
+        "sizes": sizes,
+        "rests": rests,
+        "farthest": farthest,
+        "grown": grown,
+        "slopes": A[:, :n].copy(),
+        "waves": waves,
+    }
+
+
+def horizon_class(horizon: float) -> float:
+    """The order of magnitude that tables are made for."""
+    return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 
 def tables_of(
@@ -138,7 +160,7 @@ def tables_of(
     The tables are made once for each set of parameter values and each order of magnitude of the horizon: how long a
     segment may be at most. The scratch arrays serve all tables of one form. None where there are no tables.
     """
-    horizon = 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
+    horizon = horizon_class(horizon)
     kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
     found = kept.get(key)

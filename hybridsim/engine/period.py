@@ -24,7 +24,11 @@ def system_period(system: System) -> float | None:
 
 def common_period(system: System) -> float | None:
     """After how long all forcing, inputs and clocks repeat: the least multiple of the longest period, or None."""
-    periods = all_periods(system)
+    return common_multiple(all_periods(system))
+
+
+def common_multiple(periods: list[float]) -> float | None:
+    """The least multiple of the longest of some periods that the others divide, or None."""
     return _multiple_of_all(periods, _MOST) if periods else None
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.jit import kernel
 from hybridsim.engine.tape import ADD, DIV, MUL, NEG, SUB
 from hybridsim.engine.taylor import advance
 
@@ -133,3 +134,23 @@ class Recipe:
         registers = V[:, 0]
         same = (registers[self._left] == registers[self._right]) == self._found
         return registers if same.all() else None
+
+    def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All registers (points, R) at the inputs of many points, and where (points,) the comparisons come out alike."""
+        found = np.empty((len(inputs), len(self._start)))
+        _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
+        same = (found[:, self._left] == found[:, self._right]) == self._found
+        return found, same.all(axis=1)
+
+
+@kernel
+def _replay(rows: Any, start: Any, inputs: Any, V: Any, out: Any) -> None:
+    """Carry the operations out for each row of inputs; V (R, 1): room."""
+    for i in range(inputs.shape[0]):
+        for r in range(start.shape[0]):
+            V[r, 0] = start[r]
+        for j in range(inputs.shape[1]):
+            V[j, 0] = inputs[i, j]
+        advance(rows, V, 0)
+        for r in range(start.shape[0]):
+            out[i, r] = V[r, 0]

@@ -212,7 +212,7 @@ class System:
         self._base = np.zeros(self.layout.size)
         self._base[: self.layout.parameters] = list(self.values.values())
         self._base[self.layout.pin_at] = 1.0
-        self.rates = self._plain("rates", self._base, data["rates"])
+        self.rates = self.rates_at(self._base)
         self.signals = tuple(Signal(i, self.values) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
@@ -301,9 +301,10 @@ class System:
         """Where the tape's inputs and results are."""
         return self._registers
 
-    def _plain(self, name: str, p: np.ndarray, size: int) -> np.ndarray:
-        out = np.zeros(size)
-        getattr(self.code.module, name)(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
+    def rates_at(self, p: np.ndarray) -> np.ndarray:
+        """The rates at which angles grow in time, at the values of parameters in p."""
+        out = np.zeros(self.layout.phases)
+        self.code.module.rates(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
         return out
 
     def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from hybridsim.model.check_impacts import check_restitution
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared
 from hybridsim.model.inputs import Input
+from hybridsim.model.model import Model
 from hybridsim.model.scope import Scope
 
 # A limit below the force at the onset of slip by less than this share is rounding in a law such as
@@ -44,6 +45,30 @@ def check_values(scope: Scope) -> None:
         _contact(scope, contact, constants)
     for impact in model.impacts:
         check_restitution(scope, impact, constants)
+
+
+def checked_names(model: Model) -> frozenset[str]:
+    """Names of parameters that these checks look at, directly or through others: the rest may have any finite value."""
+    used: set[str] = set() if model.duration is None else set(model.duration.names)
+    for part in (*model.discrete, *model.states):
+        used |= part.start.names
+    for schedule in model.schedules:
+        for time in (*schedule.times, schedule.start, schedule.period):
+            used |= time.names if time is not None else set()
+    for signal in model.inputs:
+        used |= set().union(*(expression.names for expression in signal.expressions.values()))
+    for contact in model.contacts:
+        used |= contact.normal.names
+        if contact.law.is_set_valued:
+            used |= set().union(*(contact.limit_force(b).names | contact.onset_force(b).names for b in (False, True)))
+    if model.impacts:
+        used |= {parameter.name for parameter in model.parameters}
+    made_of = {p.name: p.value.names for p in model.parameters} | {n: e.names for n, e in model.definitions}
+    waiting = set(used)
+    while waiting:
+        waiting = set().union(*(made_of.get(name, frozenset()) for name in waiting)) - used
+        used |= waiting
+    return frozenset(used & {parameter.name for parameter in model.parameters})
 
 
 def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:

@@ -101,7 +101,11 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
     """Measure the model at some points, one after the other."""
     if watch is None:
         job = _kept(job)
-    began, outcomes = time.perf_counter(), []
+    began = time.perf_counter()
+    together = None if job.chained else _together(job, points, watch)
+    if together is not None:
+        return Batch(together, time.perf_counter() - began)
+    outcomes = []
     previous: Any = None
     for settings in points:
         if watch is not None and watch.stopped():
@@ -112,6 +116,21 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
         if watch is not None:
             watch.tell()
     return Batch(outcomes, time.perf_counter() - began)
+
+
+def _together(job: Job, points: Sequence[Settings], watch: Watch | None) -> list[Outcome] | None:
+    """By a measure that takes many points at once, where it takes these."""
+    together = getattr(job.measure, "together", None)
+    if together is None:
+        return None
+
+    def goes_on() -> bool:
+        if watch is not None:
+            watch.tell()
+        return watch is None or not watch.stopped()
+
+    found: list[Outcome] | None = together(job, points, lambda settings: _run(job, settings, None)[0], goes_on)
+    return found
 
 
 def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.sweep.job import Incomplete
+from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
+from hybridsim.analysis.wanted import whole
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.units import time_unit, units_of
@@ -16,7 +18,7 @@ from hybridsim.model.units import time_unit, units_of
 if TYPE_CHECKING:
     from hybridsim.analysis.steady import SteadyState
 
-STEADY, FINAL = "steady", "final"
+STEADY, FINAL, AFTER = "steady", "final", "after"
 # Measures of a steady state by what they are of: a state or an output, a contact, the motion as a whole.
 _OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
 _OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
@@ -83,7 +85,9 @@ class Final:
         return {f"{FINAL}.{name}": result[name] for name in self.names}
 
 
-def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str, Any]) -> Steady | Final:
+def ready_measure(
+    words: str | Sequence[str], model: Model, options: Mapping[str, Any]
+) -> Steady | Final | LastPeriod:
     """A measure by its name, "steady" or "final", or by the names of its readings.
 
     Raises
@@ -108,11 +112,14 @@ def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str
             f"measure is {words!r}",
             remedy="steady states and ends of runs are two sweeps; ask for one of them",
         )
-    refuse_unknown([steady_state, simulate], options)
-    known = _known(model)
+    if AFTER in options:
+        refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})
+    else:
+        refuse_unknown([steady_state, simulate], options)
+    known = _known(model, OF_MOTION if AFTER in options else _OF_MOTION)
     if asked == (STEADY,):
         asked = tuple(
-            word for word in known if word in ("period", "kind") or word.startswith((*_PLAIN, *_OF_CONTACT))
+            word for word in known if word in ("period", "residual" if AFTER in options else "kind") or word.startswith((*_PLAIN, *_OF_CONTACT))
         )
     for word in asked:
         stem, _, last = word.rpartition(".")
@@ -122,7 +129,18 @@ def ready_measure(words: str | Sequence[str], model: Model, options: Mapping[str
                 f"there is no measure {word!r}",
                 remedy=nearest(word, [STEADY, FINAL, *known], kind="measures"),
             )
+    if AFTER in options:
+        return _last_period(asked, model, dict(options))
     return Steady(asked, options)
+
+
+def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
+    after = whole(options.pop(AFTER), AFTER)
+    for name in ("save", "t_eval"):
+        if name in options:
+            raise UsageError(f"{name} is given beside after", remedy="leave it out: the last period is kept")
+    period_of(model)  # where it has none, that is told once
+    return LastPeriod(words, after, options, _reading)
 
 
 def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
@@ -140,14 +158,14 @@ def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
     return {word: unit for word, unit in units.items() if unit}
 
 
-def _known(model: Model) -> list[str]:
+def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
     """Every reading of a steady state; of the harmonics the first."""
     discrete = {d.name for d in model.discrete}
     quantities = [name for name in units_of(model) if name not in discrete]
     contacts = [contact.name for contact in model.contacts]
     numbered = {"harmonic": ".1"}
     found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
-    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *_OF_MOTION]
+    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *of_motion]
 
 
 def _of(word: str, names: Sequence[str], kind: str) -> str:
@@ -157,7 +175,7 @@ def _of(word: str, names: Sequence[str], kind: str) -> str:
     return name
 
 
-def _reading(steady: SteadyState, word: str) -> Any:
+def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:
     head, _, rest = word.partition(".")
     if head == "harmonic":
         name, _, number = rest.rpartition(".")

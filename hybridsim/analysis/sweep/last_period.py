@@ -1,0 +1,178 @@
+"""Readings of the last of so many periods of the forcing, whether or not the motion repeats by then: for whole maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.sweep.job import DONE, Job, Outcome, Settings
+from hybridsim.analysis.sweep.parameters import Setter
+from hybridsim.errors import SimulationError, UsageError
+from hybridsim.model import Model
+
+if TYPE_CHECKING:
+    from hybridsim.engine.fleet import Last
+    from hybridsim.solution import Solution
+
+OF_MOTION = ("period", "residual", "word")
+_OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "energy")
+_OF_CONTACTS = ("stick_fraction", "stops_per_period")
+_SMALLEST = 1e-3  # of a state's size: the least range that its change is measured by
+
+
+@dataclass(frozen=True)
+class MeasuredPeriod(Measures):
+    """The last period of a run, with the measures of a steady state."""
+
+    solution: Solution
+    period: float
+
+    @property
+    def residual(self) -> float:
+        """The largest change of a state over the period, relative to half of its range."""
+        low, high = self._orbit.extremes
+        ends = self.solution.y[:, [0, -1]]
+        n = len(ends)
+        return _residual(low[:n], high[:n], ends[:, 0], ends[:, 1])
+
+
+@dataclass(frozen=True)
+class LastPeriod:
+    """Readings as of a steady state, of the period that ends `after` periods of the forcing from the start."""
+
+    words: tuple[str, ...]
+    after: int
+    options: Mapping[str, Any]
+    read_one: Callable[[Any, str], Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """What stands where there is no result."""
+        return {word: "" if word == "word" else math.nan for word in self.words}
+
+    def run(self, model: Model, previous: Any) -> MeasuredPeriod:
+        """One run by itself."""
+        from hybridsim.simulate import simulate
+
+        period = period_of(model)
+        solution = simulate(model, (0.0, self.after * period), **{**self.options, "save": period})
+        if not solution.success:
+            raise SimulationError(f"{solution.status}: {solution.message}")
+        return MeasuredPeriod(solution, period)
+
+    def read(self, result: MeasuredPeriod) -> dict[str, Any]:
+        """The readings in the order of the words."""
+        return {word: self.read_one(result, word) for word in self.words}
+
+    def together(
+        self,
+        job: Job,
+        points: Sequence[Settings],
+        alone: Callable[[Settings], Outcome],
+        goes_on: Callable[[], bool],
+    ) -> list[Outcome] | None:
+        """All points in compiled code, but for those that it leaves to `alone`; None where it takes none of them.
+
+        goes_on: asked after each; the outcomes are those of the first points, as far as they were run.
+        """
+        from hybridsim.engine.fleet import Fleet, sails
+        from hybridsim.engine.recent import system_of
+
+        system = system_of(job.model)
+        readers = [_reader(word, system) for word in self.words]
+        if not self._is_plain() or None in readers or not sails(system):
+            return None
+        parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
+        outcomes: list[Outcome | None] = [None] * len(points)
+        for i, last in Fleet(system).runs(parameters[sound], starts[sound], self.after):
+            number = int(sound[i])
+            if last is None:
+                outcomes[number] = alone(points[number])
+            else:
+                found = {word: read(last) for word, read in zip(self.words, readers, strict=True) if read}
+                outcomes[number] = _outcome(found)
+            if not goes_on():
+                break
+        else:
+            for number in np.flatnonzero([outcome is None for outcome in outcomes]).tolist():
+                outcomes[number] = alone(points[number])
+                if not goes_on():
+                    break
+        known: list[Outcome] = []
+        for outcome in outcomes:
+            if outcome is None:
+                break
+            known.append(outcome)
+        return known
+
+    def _is_plain(self) -> bool:
+        return self.options.get("integrator", "auto") in ("auto", "exact") and not self.options.keys() - {"integrator"}
+
+
+def period_of(model: Model) -> float:
+    """The period of everything that drives a model.
+
+    Raises
+    ------
+    UsageError
+        Where it has none.
+    """
+    from hybridsim.engine.period import common_period
+    from hybridsim.engine.recent import system_of
+
+    period = common_period(system_of(model))
+    if period is None:
+        raise UsageError(
+            f"model {model.name} has no forcing that repeats: there is no last period",
+            remedy="leave out after: a steady state without forcing is found by itself",
+        )
+    return period
+
+
+def _outcome(found: dict[str, Any]) -> Outcome:
+    missing = [word for word, value in found.items() if not math.isfinite(value)]
+    return Outcome(f"not a number: {', '.join(missing)}" if missing else DONE, found)
+
+
+def _reader(word: str, system: Any) -> Callable[[Last], float] | None:
+    """What reads a word off the sums over the last period; None where they do not hold it."""
+    head, _, rest = word.partition(".")
+    if head == "period":
+        return lambda last: last.period
+    if head == "residual":
+        return lambda last: _residual(*last.stretch.extremes, *last.stretch.ends)
+    if head in _OF_STATES and rest in system.names:
+        return _of_state(head, system.names.index(rest))
+    contacts = [automaton.name for automaton in system.automata]
+    if head in _OF_CONTACTS and rest in contacts:
+        c = contacts.index(rest)
+        if head == "stick_fraction":
+            return lambda last: float(last.stretch.held[0, c] / last.period)
+        # a stretch that goes on over the end of the period counts once, one without end not at all
+        return lambda last: float(last.stretch.held[1, c] - last.stretch.holding[:, c].all())
+    return None
+
+
+def _of_state(head: str, i: int) -> Callable[[Last], float]:
+    def read(last: Last) -> float:
+        low, high = last.stretch.extremes[:, i].tolist()
+        whole, squares = last.stretch.integrals[:, i].tolist()
+        if head == "amplitude":
+            return float(0.5 * (high - low))
+        if head == "peak":
+            return float(max(abs(low), abs(high)))
+        if head == "mean":
+            return float(whole / last.period)
+        return float({"maximum": high, "minimum": low, "energy": squares}[head])
+
+    return read
+
+
+def _residual(low: np.ndarray, high: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    scale = np.maximum(0.5 * (high - low), _SMALLEST * np.maximum(abs(low), abs(high)))
+    moved = scale > 0.0
+    return float((np.abs(after - before)[moved] / scale[moved]).max(initial=0.0))

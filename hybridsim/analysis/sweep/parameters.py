@@ -1,0 +1,71 @@
+"""Values of all parameters and initial states at many points of a sweep, as arrays, without a model for each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hybridsim.analysis.sweep.job import Settings
+from hybridsim.errors import HybridsimError
+from hybridsim.expr import Expression, evaluate
+from hybridsim.model import Model
+from hybridsim.model.check_values import checked_names
+
+
+class Setter:
+    """Sets some parameters and initial values of a model.
+
+    Parameters
+    ----------
+    model : valid as it is.
+    names : what is set at each point.
+    at : the model at a point, for where more follows from what is set than its own value.
+    """
+
+    def __init__(self, model: Model, names: Sequence[str], at: Callable[[Settings], Model]) -> None:
+        self._at, self._names = at, tuple(names)
+        self._states = [state.name for state in model.states]
+        self._parameters = [parameter.name for parameter in model.parameters]
+        self._base = np.array(list(model.parameter_values().values()), dtype=float)
+        self._start = np.array(list(model.start_values().values()), dtype=float)
+        others = [p.value for p in model.parameters if p.name not in names]
+        others += [s.start for s in model.states if s.name not in names]
+        needed = set().union(*(expression.names for expression in others), checked_names(model))
+        self._is_plain = not needed & set(names)
+        self._known: dict[Expression, float] = {}
+
+    def values(self, points: Sequence[Settings]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Parameters (N, P) and initial states (N, n), and the numbers (m,) of the points that have some."""
+        parameters = np.tile(self._base, (len(points), 1))
+        starts = np.tile(self._start, (len(points), 1))
+        if not self._is_plain:
+            return parameters, starts, self._one_by_one(points, parameters, starts)
+        settings = np.array([[self._number(value) for value in point] for point in points])
+        for k, name in enumerate(self._names):
+            if name in self._states:
+                starts[:, self._states.index(name)] = settings[:, k]
+            else:
+                parameters[:, self._parameters.index(name)] = settings[:, k]
+        return parameters, starts, np.flatnonzero(np.isfinite(settings).all(axis=1))
+
+    def _one_by_one(self, points: Sequence[Settings], parameters: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        sound = []
+        for i, point in enumerate(points):
+            try:
+                model = self._at(point).validate()
+                values, start = model.parameter_values(), model.start_values()
+            except HybridsimError:
+                continue  # a run of its own tells what is the matter
+            parameters[i], starts[i] = list(values.values()), list(start.values())
+            sound.append(i)
+        return np.array(sound, dtype=np.int64)
+
+    def _number(self, setting: float | Expression) -> float:
+        """The value of a setting; NaN where it depends on others."""
+        if not isinstance(setting, Expression):
+            return setting
+        if setting not in self._known:
+            self._known[setting] = evaluate(setting, {}) if setting.is_constant else math.nan
+        return self._known[setting]

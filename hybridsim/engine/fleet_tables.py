@@ -1,0 +1,104 @@
+"""Tables of linear modes for many values of the parameters: made together, in arrays that lie one behind the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear_plan import plan_of
+from hybridsim.engine.linear_tables import (
+    LinearTables,
+    angles_of,
+    horizon_class,
+    is_finite,
+    of_matrices,
+)
+from hybridsim.engine.packs import packed
+from hybridsim.engine.system import System
+
+_COMPUTED = ("rates", "offsets", "weights")  # of the atoms: what depends on the values of parameters
+
+
+class FleetTables:
+    """What `hybridsim.engine.linear_tables.tables_of` gives for one point, for all points of a group.
+
+    Parameters
+    ----------
+    numbers : of the points (m,).
+    fields : of the tables, by name, where they differ from point to point one behind the other.
+    modes : how many vectors of modes they are for.
+    """
+
+    def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
+        self.numbers = numbers
+        self.form = len(fields["kinds"]), len(fields["factor_start"]), modes, fields["values"].shape[1]
+        counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
+        shared = {name for name in LinearTables._fields if _is_shared(name)}
+        self._arrays = fields  # the pack holds addresses alone
+        first = LinearTables(
+            **{
+                name: array if name in shared else array[0] if name in _COMPUTED else array[: counts[name]]
+                for name, array in fields.items()
+            }
+        )
+        self._pack: Any = packed(first)
+        self._rows = self._pack.table.reshape(len(LinearTables._fields), -1)
+        self._starts = self._rows[:, 0].copy()
+        self._steps = np.array(
+            [
+                0 if name in shared else fields[name].strides[0] * counts[name]
+                for name in LinearTables._fields
+            ],
+            dtype=np.int64,
+        )
+
+    def at(self, k: int) -> Any:
+        """The tables of the k-th point of the group, until the next call."""
+        self._rows[:, 0] = self._starts + k * self._steps
+        return self._pack
+
+
+def _is_shared(name: str) -> bool:
+    return name in ("kinds", "term_start", "sources", "factor_start", "factors", "phases")
+
+
+def fleet_tables(
+    system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
+) -> list[FleetTables]:
+    """Tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
+
+    One group for each order of magnitude of the horizon and each plan. Points whose tables hold no finite numbers are
+    in none of them.
+    """
+    classes = np.array([horizon_class(float(h)) for h in horizons])
+    groups, left = [], np.arange(len(parameters))
+    while len(left):
+        plan, _ = plan_of(system, modes, parameters[left[0]])
+        registers, holds = plan.recipe.values_at(parameters[left])
+        chosen, registers = left[holds], registers[holds]
+        for horizon in np.unique(classes[chosen]):
+            among = classes[chosen] == horizon
+            made = _group(system, plan, chosen[among], registers[among], float(horizon))
+            if made is not None:
+                groups.append(made)
+        left = left[~holds]
+    return groups
+
+
+def _group(
+    system: System, plan: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
+) -> FleetTables | None:
+    A, rows = plan.matrices(registers)
+    finite = is_finite(A, rows)
+    numbers, registers, A, rows = numbers[finite], registers[finite], A[finite], rows[finite]
+    if not len(numbers):
+        return None
+    modes = A.shape[1]
+    one_behind_the_other = [part.reshape(-1, *part.shape[2:]) for part in (A, rows)]
+    fields = (
+        plan.atoms(registers)
+        | {"phases": angles_of(system)}
+        | of_matrices(*one_behind_the_other, system.n, horizon)
+    )
+    return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)
