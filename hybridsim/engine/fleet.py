@@ -2,7 +2,7 @@
 
 A single run has its model checked, bound and decided on at its start in Python, which takes several times as long as a
 short run of linear modes itself. Here that is done for all runs together, or in compiled code. The runs are those of
-`hybridsim.engine.exact_leaper`, to the last bit; one that holds anything unusual is left to it.
+`hybridsim.engine.exact_leaper`; one that holds anything unusual is left to it.
 """
 
 from __future__ import annotations
@@ -34,6 +34,9 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
 _SEGMENTS = 1024  # room for one call of the loop
+# Where events follow each other ever faster the loop ends, for others to see whether they accumulate. A few intervals
+# that shrink by one factor are none of that yet: it goes on, so often at most.
+_RESUMED = 4
 _TURNS = 100  # as in `hybridsim.engine.loop`: the longest segment, in turns of the fastest angle
 _FULLY = 2.0 * math.pi
 
@@ -164,7 +167,14 @@ class _Ship:
         ]
         self.packs = [packed(record) for record in self.records]
         self.room = (np.zeros(widest, dtype=complex), np.zeros((2, n)))
-        self.n, self.count = n, count
+        self.found = Stretch(
+            extremes=np.empty((2, n)),
+            integrals=np.empty((2, n)),
+            ends=np.empty((2, n)),
+            held=np.empty((2, count)),
+            holding=np.empty((2, count), dtype=np.bool_),
+        )
+        self.found_packed = packed(self.found)
 
     def run(
         self, fleet: Fleet, tables: Any, p: np.ndarray, rates: np.ndarray, x0: np.ndarray, end: float, period: float,
@@ -185,19 +195,21 @@ class _Ship:
         if _rests(tapes, tables, desk.as_packed, desk.work, self.c):
             return self._at_rest(fleet, period)
         clock, target = np.zeros(2), np.array([end, 0.0])
-        since, kept = Instant(end - period), 0
-        while True:
+        since, kept, resumed = Instant(end - period), 0, 0
+        while resumed <= _RESUMED:
             code, count = _leap(
                 fleet.functions, fleet.automata, tapes, fleet.inputs, tables, places, longest, target, clock,
                 desk.as_packed, desk.work, desk.room, self.packs[0],
             )  # fmt: skip
             if code == AT_TARGET:
                 return self._measured(fleet, tables, since, kept, count)
-            if code != FULL or not count:
+            if not count:
                 return None
+            resumed += code != FULL
             self.records.reverse()
             self.packs.reverse()
             kept = count
+        return None
 
     def _may_begin(self, fleet: Fleet, state: Any) -> bool:
         """Whether each contact opposes its own velocity; one that does not is refused by a run of its own."""
@@ -205,13 +217,10 @@ class _Ship:
         return all(effect < 0.0 for effect in effects.values())
 
     def _blank(self) -> Stretch:
-        return Stretch(
-            extremes=np.stack([np.full(self.n, np.inf), np.full(self.n, -np.inf)]),
-            integrals=np.zeros((2, self.n)),
-            ends=np.zeros((2, self.n)),
-            held=np.zeros((2, self.count)),
-            holding=np.zeros((2, self.count), dtype=np.bool_),
-        )
+        found = self.found
+        found.extremes[0], found.extremes[1] = np.inf, -np.inf
+        found.integrals[:] = found.held[:] = 0.0
+        return found
 
     def _at_rest(self, fleet: Fleet, period: float) -> Stretch:
         found, state = self._blank(), self.desk.state
@@ -220,7 +229,7 @@ class _Ship:
         found.integrals[:] = period * state.x, period * state.x**2
         held = state.z == fleet.hold
         found.held[:], found.holding[:] = (period * held, held), held
-        return found
+        return _copy(found)
 
     def _measured(self, fleet: Fleet, tables: Any, since: Instant, kept: int, count: int) -> Stretch | None:
         """What the segments say that hold all after an instant, of those kept before and those just recorded."""
@@ -239,6 +248,10 @@ class _Ship:
         found = self._blank()
         done = _sum_up(
             tables, fleet.hold, (record.ends, record.rows, record.modes, record.coordinates, record.jumps),
-            first, count, begin, NODES, WEIGHTS, self.room, packed(found),
+            first, count, begin, NODES, WEIGHTS, self.room, self.found_packed,
         )  # fmt: skip
-        return found if done else None
+        return _copy(found) if done else None
+
+
+def _copy(found: Stretch) -> Stretch:
+    return Stretch(*[array.copy() for array in found])
