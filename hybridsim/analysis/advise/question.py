@@ -52,8 +52,8 @@ class OverRun(Measures):
         """Of this quantity alone: fixed steps leave a piece for each, and turning points are looked for on all."""
         if name not in self._alone:
             orbit = self._orbit
-            q = orbit.names.index(name)
-            one = replace(orbit, names=(name,), values=orbit.values[:, :, q : q + 1])
+            q = slice(orbit.column(name), orbit.column(name) + 1)
+            one = replace(orbit, names=(name,), values=orbit.values[:, :, q], is_smooth=orbit.is_smooth[:, q])
             self._alone[name] = tuple(float(ends[0]) for ends in one.extremes)
         return self._alone[name][side]
 

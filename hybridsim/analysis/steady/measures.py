@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridsim.analysis.steady.orbit import Orbit, orbit_of
+from hybridsim.analysis.steady.orbit import Orbit
+from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
@@ -82,7 +83,7 @@ class Measures:
         return ByName(self._names, measure, "quantity")
 
     def _extreme(self, name: str, side: int) -> float:
-        return float(self._orbit.extremes[side][self._orbit.names.index(name)])
+        return float(self._orbit.extremes[side][self._orbit.column(name)])
 
     @property
     def minimum(self) -> ByName:

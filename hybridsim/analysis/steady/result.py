@@ -98,7 +98,7 @@ class SteadyState(Measures):
 
     @cached_property
     def _orbit(self) -> Stretch:
-        from hybridsim.analysis.steady.orbit import orbit_of
+        from hybridsim.analysis.steady.resolving import orbit_of
 
         if not self.success:
             raise UsageError(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
-from hybridsim.analysis.steady.orbit import orbit_of
+from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.variations.sizes import ranges
 
 if TYPE_CHECKING:
@@ -144,8 +144,8 @@ def free_passings(motion: Motion, start: Point | None, duration: float) -> Passi
     solution = motion.run(start, duration)
     n, scale = len(motion.names), scale_of(solution, 0.0)
     late = motion.run(point_at(solution, 0.5 * duration), 0.5 * duration)
-    orbit = orbit_of(late)
-    low, high = (side[:n] for side in orbit.extremes)
+    orbit = orbit_of(late, states_only=True)
+    low, high = orbit.extremes
     moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
     end = point_at_end(late)
     if moves.max(initial=0.0) <= RESTS:

@@ -1,0 +1,221 @@
+"""A run as an `Orbit`: its steps are halved until a polynomial on each piece holds for every quantity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from hybridsim.analysis.steady.orbit import NODES, POINTS, TO_COEFFICIENTS, Orbit
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+_TAIL = 4  # last coefficients, which tell whether the polynomial holds
+_ASIDE_OF_ENDS = 2.0**-26  # of half a piece: events are at its ends, where sign(v) may be that of rounding
+_RESOLVED = 1e-13  # the misfit is below that part of the largest value of the whole stretch
+_HOLDS = 1e-6  # where rounding is more than that part, no polynomial is a picture of the quantity
+_NOISE = 1e-9  # below that part, what halving a piece does not make smaller is rounding
+_SMALLER = 0.7
+_HALVINGS = 24
+_MOST, _MOST_VALUES = 2**17, 2**24  # pieces, and values on all of them: 128 MB
+_MOST_OF_A_STEP = 8.0  # pieces, on average, that are let be in any case
+_AT_ONCE = 2**19  # values that are sampled in one go
+_PROBED = 16  # steps from which rounding is told
+# Shares of a step to probe. What is fast is smooth on a short one, and leaves rounding alone; but on a share of 2^-53
+# the states themselves do not change. The first leaves them half of their digits, the second is for what is faster yet.
+_TINY = (2.0**-26, 2.0**-40)
+_ASIDE = (0.382, 0.618)  # where in a step: not where symmetry may put a jump, and never at one jump twice
+_ROUNDINGS = 4.0  # times what was met there
+
+
+def _misfits() -> tuple[np.ndarray, np.ndarray]:
+    """Places on a piece to sample, Gauss points and two next to its ends, and the misfits (rows) of values there.
+
+    Misfits are the last coefficients, and how far the polynomial is off next to the ends: what begins behind the last
+    Gauss point is seen by nothing else.
+    """
+    near = np.array([-1.0, 1.0]) * (1.0 - _ASIDE_OF_ENDS)
+    beyond = legendre.legvander(near, POINTS - 1) @ TO_COEFFICIENTS
+    tails = TO_COEFFICIENTS[-_TAIL:]
+    off = np.concatenate([beyond, -np.eye(2)], axis=1)
+    off *= np.abs(tails).sum(axis=1).max() / np.abs(off).sum(axis=1).max()  # rounding makes as much of each
+    return np.append(NODES, near), np.concatenate([np.pad(tails, ((0, 0), (0, 2))), off])
+
+
+_PLACES, _MISFITS = _misfits()
+
+
+class Sampler:
+    """Values of states and other quantities inside the segments of a run.
+
+    These are outputs, discrete states, the surfaces of contacts ("velocity of f"), and all guards under their numbers
+    ("guard 3").
+    """
+
+    def __init__(self, solution: Solution, states_only: bool = False) -> None:
+        self.solution = solution
+        self.system = system = solution._system
+        self.segments = solution._segments
+        self.states_only = states_only
+        self.quantities = tuple(q for q in system.quantities if " in " not in q)
+        self.discrete = tuple(d.name for d in system.model.discrete)
+        self.guards = system.guard_count if system.has_tape else 0
+        contacts = [system.automata[c].name for c in system.surface_of]
+        others = (
+            *self.quantities,
+            *self.discrete,
+            *(f"velocity of {name}" for name in contacts),
+            *(f"guard {g}" for g in range(self.guards)),
+        )
+        self.names = (*system.names, *(() if states_only else others))
+
+    def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Values (k, Q) in the segments of these numbers (k,), at local times (k,)."""
+        x = self.segments.states(index, s)
+        if self.states_only:
+            return x
+        out = np.empty((len(s), len(self.names)))
+        out[:, : self.system.n] = x
+        order = np.argsort(index, kind="stable")
+        numbers, first = np.unique(index[order], return_index=True)
+        for i, chosen in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+            out[chosen, self.system.n :] = self._others(i, s[chosen], np.ascontiguousarray(x[chosen]))
+        return out
+
+    def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        system, segment = self.system, self.segments[i]
+        named = self.solution._quantities((*self.quantities, *self.discrete), segment, s, x)
+        columns = [np.reshape(named, (-1, len(s))).T]
+        if not system.has_tape:  # of Python functions: no contacts, and guards that are no series
+            return columns[0]
+        surfaces = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
+        guards = system.rows("guards", system.guard_count, s, x, segment.p, segment.z)
+        guards[:, ~system.active(segment.z)] = 0.0  # of other modes
+        guards[np.isinf(guards)] = 0.0  # never zero, and so as good as none
+        return np.concatenate([*columns, surfaces, guards], axis=1)
+
+
+class _Pieces(NamedTuple):
+    """Parts of segments (k,), from one local time to another."""
+
+    segments: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+    def of(self, chosen: np.ndarray | slice) -> _Pieces:
+        return _Pieces(*(part[chosen] for part in self))
+
+    def part(self, share: float, length: float) -> _Pieces:
+        """Of each a part that begins at a share of it, so long in units of it."""
+        whole = self.ends - self.begins
+        begins = self.begins + share * whole
+        return _Pieces(self.segments, begins, begins + length * whole)
+
+    def halves(self) -> _Pieces:
+        middle = 0.5 * (self.begins + self.ends)
+        begins = np.stack([self.begins, middle], axis=1).ravel()
+        return _Pieces(np.repeat(self.segments, 2), begins, np.stack([middle, self.ends], axis=1).ravel())
+
+
+class _Finished(NamedTuple):
+    """Pieces with values (k, POINTS, Q), and which quantities are polynomials there, and not constant (k, Q)."""
+
+    pieces: _Pieces
+    values: np.ndarray
+    is_smooth: np.ndarray
+
+
+def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
+    """A run, or what was kept of it, as polynomials; forward in time."""
+    sample = Sampler(solution, states_only)
+    index, s, _ = solution._segments.knots()
+    same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
+    steps = _Pieces(index[:-1][same], s[:-1][same], s[1:][same])
+    rounding = _ROUNDINGS * _rounding(sample, steps)
+    is_too_fast = np.zeros(len(sample.names), dtype=np.bool_)
+    while True:  # again without the quantities that take too many pieces: the others are small beside them
+        finished, left = _resolved(sample, steps, rounding, ~is_too_fast)
+        if not left.any():
+            break
+        is_too_fast |= left
+    pieces = _Pieces(*(np.concatenate(parts) for parts in zip(*(f.pieces for f in finished), strict=True)))
+    order = np.lexsort((pieces.begins, pieces.segments))
+    places = np.split(np.argsort(order), np.cumsum([len(f.values) for f in finished])[:-1])
+    values = np.empty((len(order), POINTS, len(sample.names)))
+    is_smooth = np.empty((len(order), len(sample.names)), dtype=np.bool_)
+    for part, place in zip(finished, places, strict=True):
+        values[place], is_smooth[place] = part.values, part.is_smooth
+    values[:, :, is_too_fast] = np.nan
+    pieces = pieces.of(order)
+    origins = solution._segments.origins()[pieces.segments]
+    starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + pieces.begins)
+    too_fast = frozenset(name for name, is_it in zip(sample.names, is_too_fast, strict=True) if is_it)
+    lengths = pieces.ends - pieces.begins
+    return Orbit(sample.names, starts, lengths, pieces.segments, values, is_smooth, too_fast)
+
+
+def _resolved(
+    sample: Sampler, pieces: _Pieces, rounding: np.ndarray, watched: np.ndarray
+) -> tuple[list[_Finished], np.ndarray]:
+    """Pieces on which polynomials hold for the watched quantities (Q,); or those (Q,) that take too many of them."""
+    count = len(sample.names)
+    most = max(min(_MOST, _MOST_VALUES // (POINTS * count)), int(_MOST_OF_A_STEP * len(pieces.begins)))
+    finished: list[_Finished] = []
+    done, scale = 0, np.zeros(count)
+    before = np.full((len(pieces.begins), count), np.inf)  # misfits on the pieces that were halved
+    for halving in range(_HALVINGS):
+        values, misfits = _sampled(sample, pieces)
+        low, high = values.min(axis=1), values.max(axis=1)
+        scale = np.maximum(scale, np.maximum(-low, high).max(axis=0, initial=0.0))
+        bound = np.maximum(_RESOLVED * scale, rounding)
+        is_rounding = (misfits <= _NOISE * scale) & (misfits >= _SMALLER * before)
+        # what is no number somewhere is not smooth there, and no halving makes it so
+        is_rough = watched & (misfits > bound) & ~is_rounding
+        # the polynomial of a constant is its rounding
+        is_smooth = ((misfits <= bound) | is_rounding) & (rounding <= _HOLDS * scale) & (low < high)
+        good = ~is_rough.any(axis=1) | (halving == _HALVINGS - 1)
+        finished.append(_Finished(pieces.of(good), values[good], is_smooth[good]))
+        if good.all():
+            break
+        done += int(good.sum())
+        pieces, before = pieces.of(~good).halves(), np.repeat(misfits[~good], 2, axis=0)
+        if done + len(pieces.begins) > most:
+            takes = is_rough.sum(axis=0)
+            return [], 2 * takes >= takes.max()
+    return finished, np.zeros(count, dtype=np.bool_)
+
+
+def _sampled(sample: Sampler, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray]:
+    """Values (K, POINTS, Q) on pieces, and the largest misfit (K, Q) of each polynomial there."""
+    count = len(pieces.begins)
+    values, misfits = np.empty((count, POINTS, len(sample.names))), np.empty((count, len(sample.names)))
+    block = max(1, _AT_ONCE // (len(_PLACES) * len(sample.names)))
+    for first in range(0, count, block):
+        chosen = slice(first, first + block)
+        segments, begins, ends = pieces.of(chosen)
+        at = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + _PLACES)
+        found = sample(np.repeat(segments, len(_PLACES)), at.ravel()).reshape(*at.shape, -1)
+        found[np.isinf(found)] = np.nan  # no polynomial has a pole
+        values[chosen] = found[:, :POINTS]
+        misfits[chosen] = np.abs(_MISFITS @ found).max(axis=1)
+    return values, misfits
+
+
+def _rounding(sample: Sampler, steps: _Pieces) -> np.ndarray:
+    """The misfit (Q,) that rounding alone makes: on a piece so short that nothing else is left in it.
+
+    Of a difference of large terms, such as a balance of energy, it may be all there is: no piece is short enough then.
+    """
+    count = len(steps.begins)
+    probed = steps.of(np.unique(np.linspace(0, count - 1, _PROBED).astype(int)) if count else slice(0))
+    probes = [probed.part(share, tiny) for tiny in _TINY for share in _ASIDE]
+    values, misfits = _sampled(
+        sample, _Pieces(*(np.concatenate(parts) for parts in zip(*probes, strict=True)))
+    )
+    tells = (values.min(axis=1) < values.max(axis=1)) & np.isfinite(
+        misfits
+    )  # else all points are one to a double
+    least = np.where(tells, misfits, np.inf).reshape(len(probes), -1, len(sample.names)).min(axis=0)
+    return np.where(np.isfinite(least), least, 0.0).max(axis=0, initial=0.0)
