@@ -53,6 +53,8 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
     if len(sliding) < 2:
         return ""
     pull = _pull(settling, sliding, z)
+    if not np.isfinite(pull).all():
+        return ""  # nothing follows from it: the run says what is no number
     # one whose rate no relay moves is held by the surface of its rate (hybridsim.engine.second_order)
     moved = np.flatnonzero(pull.any(axis=1))
     sliding, pull = [sliding[i] for i in moved], pull[np.ix_(moved, moved)]
@@ -84,7 +86,8 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
             other[c] = side
             series: Any = settling.series_of(other)
             rates.append(series.surfaces[rows, 1])
-        found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
+        with np.errstate(invalid="ignore"):  # of two that are infinite
+            found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
     return found
 
 
