@@ -149,7 +149,7 @@ def callback(progress: Any) -> Any:
 
 def relative_tolerance(rtol: Any) -> float:
     """rtol, from what double precision can keep to below 1."""
-    remedy = f"give a number from {SMALLEST_RTOL:.2g} to below 1"
+    remedy = f"give a number from {SMALLEST_RTOL!r} to below 1"
     value = RTOL if rtol is None else number(rtol, "rtol", remedy)
     if not (SMALLEST_RTOL <= value < 1.0):
         raise UsageError(f"rtol is {rtol!r}", remedy=remedy)
