@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,23 @@ def test_an_event_has_two_sides(ball: hs.Solution) -> None:
     assert event.x_plus[0] == 0.0
     assert (ball(event.t) == event.x_plus).all()
     assert ball(event.t, side="-") == pytest.approx(event.x_minus, abs=1e-12)
+
+
+def test_equal_events_are_equal(ball: hs.Solution) -> None:
+    again = hs.simulate("bouncing-ball", (0, 3), rtol=1e-12)
+    first, second = ball.events[:2]
+    assert first == again.events[0] and ball.events == again.events
+    assert first != second and first != "floor"
+    assert ball.events.index(second) == 1 and len({*ball.events, *again.events}) == len(ball.events)
+    for other in (
+        replace(first, t=second.t),
+        replace(first, guard="g"),
+        replace(first, x_plus=first.x_minus),
+        replace(first, x_minus=first.x_minus[:1]),
+    ):
+        assert first != other
+    lost = replace(first, x_plus=np.full(2, np.nan))
+    assert lost == replace(first, x_plus=np.full(2, np.nan)) != first
 
 
 def test_event_times_stand_twice_in_t(ball: hs.Solution) -> None:
