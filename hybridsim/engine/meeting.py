@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.decide import FINE
+from hybridsim.engine.fatal_guards import said_by_every_mode
 from hybridsim.engine.jets import UNIT
 from hybridsim.model.meanings import Meanings
 
@@ -94,6 +95,8 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
 def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
     """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
     system = settling.system
+    if said := said_by_every_mode(system, members, settling.sides):
+        return "inconsistent", said
     unique = [c for c in members if system.automata[c].is_unique]
     slow = [c for c in unique if c not in system.pins and c not in system.projected]
     if slow:
