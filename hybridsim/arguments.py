@@ -22,6 +22,20 @@ SMALLEST_RTOL = 100 * 2.0**-52
 RTOL = 1e-9
 
 
+def without_a_name(value: Any) -> UsageError:
+    """The error of what follows t_span by its place alone, as y0 does in SciPy's solve_ivp."""
+    shown = repr(value)
+    if isinstance(value, Mapping):
+        remedy = f"name it: params={shown} for parameters, x0={shown} for initial values"
+    elif is_row(value):
+        remedy = f"name it: x0={shown}"
+    elif isinstance(value, str):
+        remedy = f"name it: integrator={shown}"
+    else:
+        remedy = "name it: x0=..., params=..., rtol=..."
+    return UsageError(f"{shown} is given to simulate without a name", remedy=remedy)
+
+
 def number(value: Any, what: str, remedy: str = "give a number") -> float:
     """A real number as a double; a text, a truth value or a sequence is none."""
     if not isinstance(value, str | bytes | bool | np.bool_):
@@ -149,7 +163,7 @@ def callback(progress: Any) -> Any:
 
 def relative_tolerance(rtol: Any) -> float:
     """rtol, from what double precision can keep to below 1."""
-    remedy = f"give a number from {SMALLEST_RTOL:.2g} to below 1"
+    remedy = f"give a number from {SMALLEST_RTOL!r} to below 1"
     value = RTOL if rtol is None else number(rtol, "rtol", remedy)
     if not (SMALLEST_RTOL <= value < 1.0):
         raise UsageError(f"rtol is {rtol!r}", remedy=remedy)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter, signature
 from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
@@ -43,7 +44,7 @@ def simulate(
 def simulate(
     model: Model | MechanicalSystem | str | PathLike[str],
     t_span: tuple[float, float],
-    *,
+    *misplaced: Any,
     params: Mapping[str, Any] | None = None,
     x0: Mapping[str, float] | Sequence[float] | None = None,
     z0: Mapping[str, str] | None = None,
@@ -121,6 +122,8 @@ def simulate(
     >>> sol.status
     'finished'
     """
+    if misplaced:
+        raise arguments.without_a_name(misplaced[0])
     if isinstance(model, MechanicalSystem):
         from hybridsim.mechanics.simulate import simulate_mechanical
 
@@ -151,4 +154,9 @@ def simulate(
     return run.carried_out(told, compile_time)
 
 
+_DECLARED = signature(simulate)
+# what has no name is taken in order to be refused: the signature that is shown has what can be given
+vars(simulate)["__signature__"] = _DECLARED.replace(
+    parameters=[p for p in _DECLARED.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL]
+)
 KEYWORDS = tuple(simulate.__kwdefaults__ or ())

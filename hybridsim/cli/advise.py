@@ -76,7 +76,7 @@ def add_to(commands: Any) -> None:
     options.add_budget(parser, "120; with --over as long as it takes")
     options.add_plot(parser, "it")
     options.add_json(parser, "everything")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(execute=execute, lighter="a shorter --t-end or a looser --tol")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

@@ -50,7 +50,7 @@ def add_to(commands: Any) -> None:
     )
     options.add_out(parser, "atlas")
     options.add_json(parser, "all verdicts")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(execute=execute, lighter="fewer scenes at a time or fewer --workers")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

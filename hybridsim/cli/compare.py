@@ -69,7 +69,9 @@ def add_to(commands: Any) -> None:
     options.add_budget(parser, "120, and 600 for the suite")
     options.add_out(parser, "compare-MODEL")
     options.add_json(parser, "the data")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(
+        execute=execute, lighter="a shorter --t-end or looser --rtol, and with --suite fewer --scenes"
+    )
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

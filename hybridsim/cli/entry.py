@@ -83,10 +83,12 @@ def main(argv: Sequence[str] | None = None) -> int:
                 errors="backslashreplace"
             )  # a title with an accent must not stop an ASCII terminal
     session = Session()
+    lighter = ""  # what takes less memory, of what a command has
     with warnings.catch_warnings(), session.listening():
         warnings.showwarning = _show_warning
         try:
             args = build_parser().parse_args(argv)
+            lighter = getattr(args, "lighter", "")
             code: int = args.execute(args, session)
             sys.stdout.flush()
         except SystemExit as done:  # argparse after --help and --version
@@ -102,7 +104,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             complain(str(error))
             return error.exit_code
         except MemoryError:
-            complain("out of memory; try a shorter --t-end or a looser --rtol")
+            complain(f"out of memory{lighter and f'; try {lighter}'}")
             return HybridsimError.exit_code
         except Exception as bug:  # the last line of defence: whatever arrives here is a bug of ours
             if isinstance(bug, OSError) and bug.errno in _NO_ROOM:

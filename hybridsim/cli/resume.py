@@ -31,7 +31,9 @@ def add_to(commands: Any) -> None:
         "--t-end", metavar="TIME", help="where to end (default: where the run should have ended)"
     )
     outcome.add_arguments(parser)
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(
+        execute=execute, lighter="a shorter --t-end; --limit megabytes=1000 stops with what there is"
+    )
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

@@ -48,7 +48,10 @@ def add_to(commands: Any) -> None:
         help="set an option of the integrator itself",
     )
     outcome.add_arguments(parser)
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(
+        execute=execute,
+        lighter="a shorter --t-end or a looser --rtol; --limit megabytes=1000 stops with what there is",
+    )
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

@@ -57,7 +57,7 @@ def add_to(commands: Any) -> None:
     )
     options.add_plot(parser, "one period")
     options.add_json(parser, "the result")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(execute=execute, lighter="a looser --tol or fewer --max-periods")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

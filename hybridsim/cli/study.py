@@ -37,7 +37,7 @@ def add_to(commands: Any) -> None:
         "--images", metavar="FOLDER", type=Path, help="folder of the pictures (default: that of the results)"
     )
     options.add_json(parser, "the verdicts")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(execute=execute, lighter="--quick")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

@@ -69,7 +69,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("--over", metavar="NAME", help="draw lines over this parameter instead of maps")
     options.add_out(parser, "sweep-MODEL")
     options.add_json(parser, "the data")
-    parser.set_defaults(execute=execute)
+    parser.set_defaults(execute=execute, lighter="fewer values at a time, fewer --workers or a looser --rtol")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:

@@ -39,11 +39,9 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     if len(grown):
         states = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in grown)
         return f"{states}: it may grow without bound"
+    if lost := rates_without_value(system, s, x, p, z):
+        return lost
     rates = system.flow(s, x, p, z)
-    if not np.isfinite(rates).all():
-        names = [system.names[i] for i in np.flatnonzero(~np.isfinite(rates))]
-        why = power_without_value(system, names, float(here), x) or _division_by_zero(system, names, x)
-        return _said(system, "the rate of", names, x, z) + why
     reach = _FARTHEST * max(abs(float(here)), abs(s), 1e-300)
     for k in range(_NEAR, -1, -1):
         step = reach * 0.5**k
@@ -55,10 +53,28 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         guards = system.rows(
             "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
         )[0]
-        lost = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
-        if len(lost):
-            return _said(system, "just after,", [system.guard_title(int(g), z) for g in lost], x, z)
+        without = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
+        if len(without):
+            titles = [system.guard_title(int(g), z) for g in without]
+            # what a mode holds has the rate of its constraint: the one that is declared is in the guards
+            held = [system.names[i] for g in without for i in system.pins.get(int(system.owner[g]), ())]
+            return _said(system, "just after,", titles, x, z) + _cause(system, held, float(here), x)
     return _steep(system, record, s, x, p, z, rates, first, reach)
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # it looks for what is no number
+def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
+    """The states whose rates are no numbers in the modes z, and why, in words; empty where all have a value."""
+    names = [system.names[i] for i in np.flatnonzero(~np.isfinite(system.flow(s, x, p, z)))]
+    if not names:
+        return ""
+    t = float(p[system.layout.origin_at]) + s
+    return _said(system, "the rate of", names, x, z) + _cause(system, names, t, x)
+
+
+def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
+    """What has no value in the rates of some states; empty where that cannot be told."""
+    return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
 
 
 def _steep(

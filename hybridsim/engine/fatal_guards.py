@@ -27,3 +27,14 @@ def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> st
                 if message and guard in located:
                     return message
     return None
+
+
+def said_by_every_mode(system: System, components: Iterable[int], sides: np.ndarray) -> str | None:
+    """By the first of the components that has such a guard, just negative, in each of its modes."""
+    for c in components:
+        automaton = system.automata[c]
+        modes = zip(automaton.guards, automaton.fatal)
+        found = [[m for g, m in zip(*mode) if m and sides[g] < 0] for mode in modes]
+        if all(found):
+            return str(found[0][0])
+    return None

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.decide import FINE
+from hybridsim.engine.fatal_guards import said_by_every_mode
 from hybridsim.engine.jets import UNIT
 from hybridsim.model.meanings import Meanings
 
@@ -53,6 +54,8 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
     if len(sliding) < 2:
         return ""
     pull = _pull(settling, sliding, z)
+    if not np.isfinite(pull).all():
+        return ""  # nothing follows from it: the run says what is no number
     # one whose rate no relay moves is held by the surface of its rate (hybridsim.engine.second_order)
     moved = np.flatnonzero(pull.any(axis=1))
     sliding, pull = [sliding[i] for i in moved], pull[np.ix_(moved, moved)]
@@ -84,13 +87,16 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
             other[c] = side
             series: Any = settling.series_of(other)
             rates.append(series.surfaces[rows, 1])
-        found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
+        with np.errstate(invalid="ignore"):  # of two that are infinite
+            found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
     return found
 
 
 def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
     """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
     system = settling.system
+    if said := said_by_every_mode(system, members, settling.sides):
+        return "inconsistent", said
     unique = [c for c in members if system.automata[c].is_unique]
     slow = [c for c in unique if c not in system.pins and c not in system.projected]
     if slow:

@@ -21,6 +21,7 @@ from hybridsim.engine.decide import (
     judge,
     side_after,
 )
+from hybridsim.engine.diagnosis import rates_without_value
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
 from hybridsim.engine.impact import strike
@@ -359,7 +360,7 @@ class Settling:
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
             verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
-            return "nonunique", self._say(taking_part, candidates[verdicts != LEAVES], _SEVERAL)
+            return self._several(taking_part, candidates[verdicts != LEAVES])
         if number == NONE:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
@@ -377,6 +378,15 @@ class Settling:
                         Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x)
                     )
         return None
+
+    def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
+        """Status and message where no joint candidate is preferred: from a rate without a value nothing follows."""
+        at = self.at
+        for modes in candidates:
+            lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
+            if lost:
+                return "step-failure", lost
+        return "nonunique", self._say(components, candidates, _SEVERAL)
 
     def _pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)

@@ -175,6 +175,8 @@ class _Checker:
         function = FUNCTIONS.get(name)
         if function is None:
             hint = nearest(name, FUNCTIONS, kind="functions")
+            if name == "v_rel":  # as results call it
+                hint = "write the velocity itself, as the contact has it, or give both a definition of it."
             raise self.fail(node, f"'{name}' is no function of expressions", hint)
         if node.keywords:
             raise self.fail(node, f"{name} takes no named arguments", f"{name} takes {function.arity}.")

@@ -9,9 +9,8 @@ from hybridsim.engine.jit import call, kernel
 from hybridsim.model.impact import ROUNDING
 
 UNILATERAL = 7  # column of the table that says whether a surface is a gap
-UP, DOWN, MOST, LEAST = range(
-    4
-)  # what a normal force lets grow: friction of slip above, below, limits of stick
+# what a normal force lets grow: friction of slip above, below, limits of stick
+UP, DOWN, MOST, LEAST = range(4)
 _STEPPED = 6  # number of that function among those of a step
 
 

@@ -17,9 +17,8 @@ DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop ca
 # numbers that a kernel reached by its address is given; FIRST: where a run of neighbours begins, -1 where it is none
 COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
 AT, LONGEST, RTOL, LENGTH = range(4)  # and real ones; the length of a stretch comes back
-EXPAND, STRETCH, DECIDE, BERNSTEIN = range(
-    4
-)  # these kernels; then series to Bernstein form, for ever fewer terms
+# these kernels; then series to Bernstein form, for ever fewer terms
+EXPAND, STRETCH, DECIDE, BERNSTEIN = range(4)
 
 
 class State(NamedTuple):

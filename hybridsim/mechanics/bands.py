@@ -12,9 +12,8 @@ import numpy as np
 
 from hybridsim.engine.eight import WIDTH
 
-WEIGHT, MOBILITY, HOLDING, BASE, STILL, VALUES = range(
-    6
-)  # rows: w; M^-1 w; 1/(w M^-1 w); base; acceleration; of laws
+# rows: w; M^-1 w; 1/(w M^-1 w); base; acceleration; constants of laws
+WEIGHT, MOBILITY, HOLDING, BASE, STILL, VALUES = range(6)
 _FULL = 1 / 3  # of the entries of the diagonals, that are not zero at the least
 
 

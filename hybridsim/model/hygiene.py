@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from hybridsim.errors import HybridsimError, Place
 from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import TIME
+from hybridsim.model.force_signs import wrong_signs
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
@@ -45,10 +46,23 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
     lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode; a
-    fractional power of a contact's velocity. Nothing is reported that the form of an expression does not show. The
-    guards of contacts and surfaces are made by the program and not looked at.
+    fractional power of a contact's velocity; a load or a friction force of the wrong sign. Nothing is reported that the
+    form of an expression, or its value at the start, does not show. The guards of contacts and surfaces are made by
+    the program and not looked at.
     """
-    return (*_of_signs(model), *_of_units(model), *_of_pulses(model), *jumps_of(model), *_of_powers(model))
+    return (
+        *_of_signs(model),
+        *_of_units(model),
+        *_of_pulses(model),
+        *jumps_of(model),
+        *_of_powers(model),
+        *_of_forces(model),
+    )
+
+
+def _of_forces(model: Model) -> Iterator[Caution]:
+    for contact, message, remedy in wrong_signs(model):
+        yield Caution(message, contact.place, remedy)
 
 
 def _of_powers(model: Model) -> Iterator[Caution]:

@@ -11,6 +11,7 @@ from hybridsim.expr import Expression, FunctionExpression, require_names
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.component import Component
 from hybridsim.model.declared import Declared
+from hybridsim.model.quantities import Output
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -96,11 +97,17 @@ class Scope:
         allowed = frozenset(known)
         if expr.names <= allowed and (expr.is_boolean == boolean or isinstance(expr, FunctionExpression)):
             return  # a function is seen when it is called
-        misplaced = sorted((expr.names - allowed) & self.all_names)
+        # an output that only shows something by its name uses that, not itself
+        outputs = {output.name: output for output in self.model.outputs if output.expr.text != output.name}
+        misplaced = sorted((expr.names - allowed) & (self.all_names | outputs.keys()))
         try:
             if misplaced:
                 name = misplaced[0]
-                kind = "the time" if name == TIME else f"the {self.kinds[name]}"
+                if allowed >= self.all_names:
+                    raise expr.error(
+                        f"'{name}' is an output: no expression can use it", remedy=_instead(outputs[name])
+                    )
+                kind = "the time" if name == TIME else f"the {self.kinds.get(name, 'output')}"
                 remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
                 raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
             self._require(expr, allowed)
@@ -146,3 +153,10 @@ class Scope:
                 found.add(name)
                 open_names |= definitions[name].names if name in definitions else frozenset()
         return frozenset(found)
+
+
+def _instead(output: Output) -> str:
+    """What to write where an expression uses an output."""
+    if output.modes:
+        return f"write {output.expr.text} there: it differs from mode to mode."
+    return f"declare {output.name} under [definitions] (definitions=), where it can be used, and read with sol.output."

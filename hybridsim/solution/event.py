@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Event:
     """Something that happened at one instant.
 
@@ -44,6 +44,21 @@ class Event:
     direction: int
     x_minus: np.ndarray
     x_plus: np.ndarray
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when everything is; of states, two that are no numbers are equal as well."""
+        if not isinstance(other, Event):
+            return NotImplemented
+        states = ((self.x_minus, other.x_minus), (self.x_plus, other.x_plus))
+        return self._what == other._what and all(np.array_equal(*pair, equal_nan=True) for pair in states)
+
+    def __hash__(self) -> int:
+        return hash(self._what)
+
+    @property
+    def _what(self) -> tuple[float | str, ...]:
+        """All but the states."""
+        return self.t, self.kind, self.component, self.guard, self.source, self.target, self.direction
 
     def __repr__(self) -> str:
         change = f" {self.source} -> {self.target}" if self.source or self.target else ""

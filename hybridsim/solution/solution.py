@@ -25,6 +25,11 @@ if TYPE_CHECKING:
 _GOOD = ("finished", "terminated")
 
 
+def _speed(contact: str) -> str:
+    """What `Solution.output` calls the relative velocity of a contact."""
+    return f"v_rel({contact})"
+
+
 class Solution(InTables):
     """The result of `simulate`; ``sol(t)`` is the dense output.
 
@@ -126,6 +131,8 @@ class Solution(InTables):
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
         """A named quantity over time: a state, an output, an input, a definition, a variable of a mode such as a force.
 
+        ``v_rel(f)`` is the relative velocity of a contact f that can stick.
+
         Parameters
         ----------
         name : what to evaluate.
@@ -133,11 +140,12 @@ class Solution(InTables):
         """
         known = (*self._system.names, *(q for q in self._system.quantities if " in " not in q))
         known = (*known, *(d.name for d in self.model.discrete))
-        if name not in known:
-            raise UsageError(
-                f"model {self.model.name} has no quantity {name!r}",
-                remedy=nearest(name, known, kind="quantities"),
-            )
+        if name not in (*known, *self._speeds):
+            remedy = nearest(name, (*known, *self._speeds), kind="quantities")
+            for contact in self.model.contacts:
+                if name == _speed(contact.name):
+                    remedy = f"declare it as an output: {contact.velocity.text}"
+            raise UsageError(f"model {self.model.name} has no quantity {name!r}", remedy=remedy)
         if t is None and self._grid is None:
             parts = [self._quantity(name, g, g.s, g.x) for g in self._segments]
             return np.concatenate(parts) if parts else np.zeros(0)
@@ -149,9 +157,20 @@ class Solution(InTables):
             out[chosen] = self._quantity(name, segment, s, x[chosen])
         return out[0] if np.ndim(given) == 0 else out
 
+    @cached_property
+    def _speeds(self) -> dict[str, int]:
+        """The relative velocities of contacts by name, each with its place among the surfaces."""
+        contacts = {contact.name for contact in self.model.contacts}
+        components = [self._system.automata[c].name for c in self._system.surface_of]
+        return {_speed(name): k for k, name in enumerate(components) if name in contacts}
+
     def _quantity(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         if name in self.names:
             return x[:, self.names.index(name)]
+        if name in self._speeds:
+            system = self._system
+            rows = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
+            return rows[:, self._speeds[name]]
         return self._quantities([name], segment, s, x)[0]
 
     def _quantities(

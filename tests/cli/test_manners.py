@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import __version__
+from hybridsim.cli.entry import COMMANDS
 
 
 def run(*argv: str, **variables: str) -> subprocess.CompletedProcess[str]:
@@ -144,3 +146,32 @@ def test_ascii_terminal() -> None:
 
 def test_the_same_program_as_a_module() -> None:
     assert run("--version").stdout == f"hybridsim {__version__}\n"
+
+
+LINES = {
+    "run": ["dfcs"],
+    "resume": ["r.hsol"],
+    "compare": ["dfcs"],
+    "advise": ["dfcs", "--quantity", "x"],
+    "steady": ["dfcs"],
+    "sweep": ["dfcs", "F0=10:20:3"],
+    "study": ["he2026"],
+    "atlas": [],
+    "check": ["dfcs"],
+    "models": [],
+    "integrators": [],
+    "cache": ["path"],
+}
+
+
+@pytest.mark.parametrize("command", [c.__name__.rpartition(".")[2] for c in COMMANDS])
+def test_out_of_memory_names_options_that_the_command_has(
+    command: str, hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = set(re.findall(r"--[a-z][a-z0-9-]*", hybridsim(command, "--help").out))
+    monkeypatch.setattr(f"hybridsim.cli.{command}.execute", raising(MemoryError()))
+    found = hybridsim(command, *LINES[command])
+    assert found.code == 1 and found.err.startswith("hybridsim: out of memory")
+    named = set(re.findall(r"--[a-z][a-z0-9-]*", found.err))
+    assert named <= known
+    assert bool(named) == (command not in ("check", "models", "integrators", "cache"))

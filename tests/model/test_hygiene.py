@@ -151,6 +151,60 @@ def test_contacts_are_not_suspected() -> None:
     assert cautions(PLAIN.replace('"-x"', '"-x - f"') + contact) == ()
 
 
+def rubbing(
+    law: hs.FrictionLaw | str, normal: str = "2", size: float | None = None, **given: object
+) -> list[str]:
+    """What is said of a block with a contact."""
+    opens, arguments = bool(given.pop("opens", False)), given
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", 3, "v"), hs.State("v", 0, "-x - f", nominal=size)],
+        contacts=[hs.Contact("f", "v", normal, law, arguments, opens=opens)],
+    ).validate()
+    return [caution.message for caution in warnings_of(block)]
+
+
+FALLING = hs.FrictionLaw("falling", slip="N*(0.5 - v/4)", stick="0.5*N")
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (rubbing("coulomb", "1 - x", mu=0.5), "the normal load '1 - x' is -2 at the start"),
+        (rubbing("coulomb", "2*cos(t) - x", mu=0.5), "the normal load '2*cos(t) - x' is -1 at the start"),
+        (rubbing("coulomb", mu="1 - x"), "the limit of stick is -4 at the start"),
+        (rubbing(FALLING, size=4), "the slip force is -1 at v = 4, a usual speed (nominal)"),
+        (
+            rubbing(hs.FrictionLaw("a", force="-c*v", parameters={"c": 3})),
+            "the force of the law 'a' acts along the velocity at all speeds: it drives the motion",
+        ),
+        (
+            rubbing(hs.FrictionLaw("b", force="mu*N*tanh(v/0.01)", parameters=["mu"]), mu=-0.5),
+            "the force of the law 'b' acts along the velocity at all speeds: it drives the motion",
+        ),
+    ],
+)
+def test_a_load_or_a_friction_force_of_the_wrong_sign(found: list[str], message: str) -> None:
+    assert found == [f"contact f: {message}"]
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        rubbing("coulomb", "x - 3", mu=0.5),  # which is nothing at the start
+        rubbing("coulomb", "1 - x", mu=0.5, opens=True),
+        rubbing("coulomb", mu="1 + x"),
+        rubbing(FALLING),  # no speed is known to be usual
+        rubbing(FALLING, size=1),
+        rubbing(hs.FrictionLaw("a", force="c*v", parameters={"c": 3})),
+        rubbing(hs.FrictionLaw("b", force="v**3 - v")),  # drives at small speeds alone, as a bowed string
+        rubbing("dahl", mu=0.5, sigma=100),
+    ],
+)
+def test_friction_that_opposes_the_motion_is_not_suspected(found: list[str]) -> None:
+    assert found == []
+
+
 def test_a_guard_without_units_among_others_with() -> None:
     text = """
         [parameters]

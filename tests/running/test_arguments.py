@@ -73,6 +73,15 @@ def test_a_bad_argument_is_named(given: dict[str, Any], says: str, remedy: str) 
     assert caught.match(remedy)
 
 
+def test_the_smallest_rtol_is_told_as_it_is() -> None:
+    """A bound that were rounded would be refused with itself as the remedy."""
+    with pytest.raises(UsageError, match=r"rtol is 2\.2e-14") as caught:
+        hs.simulate("dfcs", SPAN, rtol=2.2e-14)
+    bound = float(str(caught.value.remedy).split()[4])
+    assert bound == 100 * np.finfo(float).eps
+    assert hs.simulate("dfcs", SPAN, rtol=bound).success
+
+
 def test_numbers_of_all_kinds_are_numbers() -> None:
     plain = hs.simulate(
         "dfcs", SPAN, rtol=1e-6, atol=[1e-9, 1e-9], x0=[0, 0], max_step=0.001, first_step=2.0**-20

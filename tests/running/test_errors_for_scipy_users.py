@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from inspect import Parameter, signature
+
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -28,6 +31,30 @@ def test_keywords_of_solve_ivp(
     with pytest.raises(hs.UsageError) as caught:
         hs.simulate(model, (0, 0.01), **{keyword: value})
     assert repr(keyword) in str(caught.value) and remedy in str(caught.value.remedy)
+
+
+@pytest.mark.parametrize(
+    ("given", "remedy"),
+    [
+        (([0.0, 1.0],), "name it: x0=[0.0, 1.0]"),
+        ((np.array([0.0, 1.0]), "RK45"), "name it: x0=array([0., 1.])"),
+        (({"F0": 20},), "name it: params={'F0': 20} for parameters, x0={'F0': 20} for initial values"),
+        (("RK45",), "name it: integrator='RK45'"),
+        ((1e-6,), "name it: x0=..., params=..., rtol=..."),
+    ],
+)
+@pytest.mark.parametrize("model", ["dfcs", hs.two_blocks_on_belt()], ids=["model", "arrays"])
+def test_what_solve_ivp_takes_by_its_place(
+    model: str | hs.MechanicalSystem, given: tuple[object, ...], remedy: str
+) -> None:
+    with pytest.raises(hs.UsageError, match="is given to simulate without a name") as caught:
+        hs.simulate(model, (0, 1), *given)
+    assert caught.value.remedy == remedy
+
+
+def test_the_signature_shows_what_can_be_given() -> None:
+    kinds = {p.kind for p in signature(hs.simulate).parameters.values()}
+    assert kinds == {Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY, Parameter.VAR_KEYWORD}
 
 
 def test_keywords_that_are_the_same() -> None:

@@ -152,3 +152,46 @@ def test_what_a_rate_divides_by_is_named() -> None:
     for name in ("exact", "dop853", "scipy-rk45"):
         sol = hs.simulate(body, (0.0, 1.0), params={"m": 0}, integrator=name)
         assert sol.status == "step-failure" and "it divides by m, which is 0" in sol.message
+
+
+@pytest.mark.parametrize("name", [one.name for one in hs.list_integrators()])
+@pytest.mark.parametrize(
+    ("rate", "why"), [("(-k*x - f)/m", ": it divides by m, which is 0"), ("(-k*x - f)*sqrt(-1 - m)", "")]
+)
+def test_a_rate_where_a_stick_would_begin(name: str, rate: str, why: str) -> None:
+    """Both directions of slip have an infinite or no rate: that they are two is no reason to speak of many motions."""
+    block = hs.Model(
+        "block",
+        parameters={"m": 0, "k": 1},
+        states=[hs.State("x", 2, "v"), hs.State("v", 0, rate)],
+        contacts=[hs.Contact("f", velocity="v", normal="1", law="coulomb", arguments={"mu": 0.5})],
+    )
+    has_fixed_step = name in ("rk4-dichotomy", "rk4-sign", "moreau")
+    sol = hs.simulate(block, (0.0, 1.0), integrator=name, **({"step": 0.01} if has_fixed_step else {}))
+    assert sol.status == "step-failure" and sol.t_end == 0.0
+    if not has_fixed_step:  # they see a state that is no number after their first step
+        assert f"the rate of v is not a number (at x = 2, v = 0, f slip+){why}" in sol.message
+
+
+def test_a_rate_where_a_stick_has_begun() -> None:
+    """What holds the block divides by zero, and that is what its limits are compared with."""
+    block = hs.Model(
+        "block",
+        parameters={"q": 0},
+        states=[hs.State("v", 0, "1/q - f")],
+        contacts=[hs.Contact("f", velocity="v", normal="1", law="coulomb", arguments={"mu": 0.5})],
+    )
+    sol = hs.simulate(block, (0.0, 1.0), integrator="dop853")
+    assert sol.status == "step-failure" and "it divides by q, which is 0" in sol.message
+
+
+@pytest.mark.parametrize("rate", ["(-a - 2*b)/q", "(-a - 2*b)*sqrt(-1 - q)"])
+def test_a_rate_where_two_surfaces_meet(rate: str) -> None:
+    pair = hs.Model(
+        "pair",
+        parameters={"q": 0},
+        states=[hs.State("x", 0, rate), hs.State("y", 0, "-b + 2*a")],
+        surfaces=[hs.SwitchingSurface("a", "x"), hs.SwitchingSurface("b", "y")],
+    )
+    sol = hs.simulate(pair, (0.0, 1.0), integrator="dop853")
+    assert sol.status == "step-failure" and "is not a number" in sol.message

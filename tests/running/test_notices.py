@@ -131,3 +131,17 @@ def test_a_jump_in_a_rate_is_told_by_the_run_as_by_check(integrator: str) -> Non
 def test_a_corner_is_told_of_by_neither() -> None:
     model = hs.Model.from_toml(CRAWL.replace("-sign(x)", "-1 - abs(x)"))
     assert warnings_of(model) == () and hs.simulate(model, (0, 2)).warnings == ()
+
+
+@pytest.mark.parametrize("name", ["dop853", "taylor", "scipy-rk45", "cvode-bdf"])
+@pytest.mark.parametrize("x", [0.5, -3.0])
+def test_a_load_that_is_negative_from_the_start(name: str, x: float) -> None:
+    """No mode of a contact admits it: the run says why, and not that no motion is admissible."""
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", x, "v"), hs.State("v", 0, "-x - f")],
+        contacts=[hs.Contact("f", "v", "-1 - x**2", "coulomb", {"mu": 0.5})],
+    )
+    sol = hs.simulate(block, (0, 1), integrator=name)
+    assert sol.status == "inconsistent" and sol.t_end == 0.0
+    assert "normal load of contact f became negative: -1 - x**2 < 0" in sol.message

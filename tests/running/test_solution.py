@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,23 @@ def test_an_event_has_two_sides(ball: hs.Solution) -> None:
     assert event.x_plus[0] == 0.0
     assert (ball(event.t) == event.x_plus).all()
     assert ball(event.t, side="-") == pytest.approx(event.x_minus, abs=1e-12)
+
+
+def test_equal_events_are_equal(ball: hs.Solution) -> None:
+    again = hs.simulate("bouncing-ball", (0, 3), rtol=1e-12)
+    first, second = ball.events[:2]
+    assert first == again.events[0] and ball.events == again.events
+    assert first != second and first != "floor"
+    assert ball.events.index(second) == 1 and len({*ball.events, *again.events}) == len(ball.events)
+    for other in (
+        replace(first, t=second.t),
+        replace(first, guard="g"),
+        replace(first, x_plus=first.x_minus),
+        replace(first, x_minus=first.x_minus[:1]),
+    ):
+        assert first != other
+    lost = replace(first, x_plus=np.full(2, np.nan))
+    assert lost == replace(first, x_plus=np.full(2, np.nan)) != first
 
 
 def test_event_times_stand_twice_in_t(ball: hs.Solution) -> None:
@@ -88,6 +106,47 @@ def test_outputs_by_name() -> None:
     assert len(sol.output("f")) == len(sol.t)
     with pytest.raises(UsageError, match="'ff'"):
         sol.output("ff")
+
+
+def test_the_velocity_of_a_contact() -> None:
+    """Of a block on a belt to and fro: what is declared, to rounding, nothing in stick, and what arrays give."""
+    velocity, law = "v - 0.3*cos(2*t)", {"mu": 2}
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", 1, "v"), hs.State("v", 0, "-4*x - f")],
+        contacts=[hs.Contact("f", velocity=velocity, normal="1", law="coulomb", arguments=law)],
+    )
+    sol = hs.simulate(block, (0, 4))
+    t = np.linspace(0.0, 4.0, 401)
+    slip, sticks = sol.output("v_rel(f)", t), np.zeros(len(t), dtype=bool)
+    assert slip == pytest.approx(sol.output("v", t) - 0.3 * np.cos(2.0 * t), abs=1e-14)
+    for interval in sol.modes["f"]:
+        if interval.mode == "stick":
+            sticks |= (interval.t0 < t) & (t < interval.t1)
+    assert sticks.any() and not sticks.all() and np.abs(slip[sticks]).max() <= 1e-16
+    assert sol.output("v_rel(f)").shape == sol.t.shape and sol.output("v_rel(f)", 0.0) == -0.3
+    system = hs.two_blocks_on_belt()
+    name = f"v_rel({system.contacts[0].name})"
+    of_arrays, of_model = (hs.simulate(m, (0, 2), rtol=1e-11) for m in (system, system.to_model()))
+    assert of_model.output(name, t[:200]) == pytest.approx(of_arrays.output(name, t[:200]), abs=1e-8)
+
+
+def test_the_velocity_of_a_contact_elsewhere() -> None:
+    law = hs.FrictionLaw("rubber", force="0.5*N*tanh(10*v)")
+    block = hs.Model(
+        "block",
+        states=[hs.State("v", 1, "-f")],
+        contacts=[hs.Contact("f", velocity="v - 0.1", normal="1", law=law)],
+    )
+    with pytest.raises(UsageError) as caught:
+        hs.simulate(block, (0, 1)).output("v_rel(f)")
+    assert caught.value.remedy == "declare it as an output: v - 0.1"
+    with pytest.raises(hs.ExpressionError) as fault:
+        hs.Output("slip", "v_rel(f)")
+    assert (
+        fault.value.remedy
+        == "write the velocity itself, as the contact has it, or give both a definition of it."
+    )
 
 
 def test_names_of_scipy() -> None:
