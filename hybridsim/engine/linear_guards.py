@@ -25,10 +25,15 @@ def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
     modes, guards, size = rows.shape
     for k in range(modes):
         for g in range(guards):
-            row = rows[k, g]
+            row, is_zero = rows[k, g], True
             for m in range(size):
                 series[k, g, 0, m] = row[m]
                 roundings[k, g, 0, m] = abs(row[m])
+                is_zero = is_zero and row[m] == 0.0
+            if is_zero:  # a guard of other modes
+                series[k, g, :, :] = 0.0
+                roundings[k, g, :, :] = 0.0
+                continue
             for order in range(ORDER):
                 for m in range(size):
                     total = bound = 0.0
@@ -57,12 +62,17 @@ def modal_guards(
     """Of Re(gamma c) with gamma = row basis along c' = B c: coefficients, bounds of |c|'s factors, reach, waves.
 
     flows: `hybridsim.engine.modal.Modals` with |B**TERMS|; gamma (J,) is room. The rest is what
-    `hybridsim.engine.linear_tables` describes.
+    `hybridsim.engine.linear_tables` describes, prepared for guards that are zero.
     """
     counts, values, upper, ends, basis = flows.counts, flows.values, flows.upper, flows.ends, flows.full_basis
     modes, guards, size = rows.shape
     for k in range(modes):
         for g in range(guards):
+            is_zero = True
+            for m in range(size):
+                is_zero = is_zero and rows[k, g, m] == 0.0
+            if is_zero:  # a guard of other modes: all is as it was prepared
+                continue
             for j in range(counts[k]):
                 total = 0.0 + 0.0j
                 for m in range(size):
