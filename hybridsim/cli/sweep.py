@@ -24,6 +24,7 @@ of parameters; in a row A,B,C it is evaluated at every point.
 examples:
   hybridsim sweep dfcs F0=20:40:11 omega=400:900:26 --measure amplitude.x,stick_fraction.f
   hybridsim sweep dfcs 'omega=0.2*sqrt(k/m):1.5*sqrt(k/m):66' N=20,30,40 --over omega
+  hybridsim sweep dfcs F0=20:60:101 'omega=0.05*sqrt(k/m):2*sqrt(k/m):101' --measure amplitude.x --after 100
   hybridsim sweep belt v_belt=0.05:0.2:16 --measure final --t-end 50
 """
 _MOST_DRAWN = 2  # parameters of a picture
@@ -61,6 +62,13 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--t-end", metavar="TIME", help="end of each run, for --measure final (as in run)")
     parser.add_argument(
+        "--after",
+        metavar="PERIODS",
+        type=values.count,
+        help="readings of the period that ends so many periods of the forcing after the start, whether or not the "
+        "motion repeats by then: for maps of many points",
+    )
+    parser.add_argument(
         "--warm-start", action="store_true", help="start from the neighbour on the first axis"
     )
     options.add_integrator(parser)
@@ -87,8 +95,15 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     }
     if any(word.partition(".")[0] == "final" for word in args.measure):
         given["t_span"] = (0.0, values.end_time(model, args.t_end))
+        if args.after is not None:
+            raise UsageError(
+                "--after is for readings of a period", remedy="leave it out beside --measure final"
+            )
     elif args.t_end is not None:
         raise UsageError("--t-end is for --measure final", remedy="leave it out: steady states have no end")
+
+    if args.after is not None:
+        given["after"] = args.after
 
     import hybridsim
 

@@ -1,4 +1,4 @@
-"""Many runs of one model that differ in the values of parameters and in their start, of which the last stretch is measured.
+"""Many runs of one model that differ in the values of parameters and in their start: the last period of each.
 
 A single run has its model checked, bound and decided on at its start in Python, which takes several times as long as a
 short run of linear modes itself. Here that is done for all runs together, or in compiled code. The runs are those of
@@ -90,7 +90,9 @@ class Fleet:
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
         self._tapes: Any = self.shelf.tapes
 
-    def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[tuple[int, Last | None]]:
+    def runs(
+        self, parameters: np.ndarray, starts: np.ndarray, periods: int
+    ) -> Iterator[tuple[int, Last | None]]:
         """The last period of each run, by its number, in any order; None where a run is not for a fleet.
 
         parameters (N, P), in the order of the model; starts (N, n).
@@ -100,13 +102,17 @@ class Fleet:
             for i, last in self._runs(parameters[here], starts[here], periods):
                 yield first + i, last
 
-    def _runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[tuple[int, Last | None]]:
+    def _runs(
+        self, parameters: np.ndarray, starts: np.ndarray, periods: int
+    ) -> Iterator[tuple[int, Last | None]]:
         system, layout = self.system, self.system.layout
         vectors = np.zeros((len(parameters), layout.size))
         vectors[:, : layout.parameters] = parameters
         vectors[:, layout.pin_at] = 1.0
         rates = np.array([system.rates_at(p) for p in vectors]).reshape(len(vectors), -1)
-        times = np.array([common_multiple((_FULLY / abs(row[row != 0.0])).tolist()) or math.nan for row in rates])
+        times = np.array(
+            [common_multiple((_FULLY / abs(row[row != 0.0])).tolist()) or math.nan for row in rates]
+        )
         fastest = np.abs(rates).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             longest = _TURNS * _FULLY / fastest
@@ -123,7 +129,14 @@ class Fleet:
             for k, i in enumerate(fit[group.numbers].tolist()):
                 period = float(times[i])
                 stretch = ship.run(
-                    self, group.at(k), vectors[i], rates[i], starts[i], periods * period, period, float(longest[i])
+                    self,
+                    group.at(k),
+                    vectors[i],
+                    rates[i],
+                    starts[i],
+                    periods * period,
+                    period,
+                    float(longest[i]),
                 )
                 left.discard(i)
                 yield i, None if stretch is None else Last(period, stretch)

@@ -21,9 +21,17 @@ _UNKNOWN = -1  # in place of a mode
 
 @kernel
 def plain_start(
-    functions: Any, automata: Any, tapes: Any, inputs: Any, none: Any, places: Any, surfaces: Any, t0: float, state: Any,
+    functions: Any,
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    none: Any,
+    places: Any,
+    surfaces: Any,
+    t0: float,
+    state: Any,
     work: Any,
-) -> bool:  # fmt: skip
+) -> bool:
     """Decide all modes at t0 from the state, whose p holds parameters; False where that is not plain.
 
     none: empty tables, so that guards are judged by the tape. places: rates, then where in p the origin, the phases and
@@ -53,9 +61,7 @@ def plain_start(
 
 
 @merged
-def _take_sides(
-    automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any
-) -> bool:
+def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
     """The mode of the side that each is on, _UNKNOWN on the surface; False where there is no number."""
     constant, rows, derivatives, registers, owners = surfaces
     V, E, z, p = work.V, work.E, state.z, state.p
@@ -153,7 +159,9 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
         radius = 0.0
         if turning >= 0:
             u, v = lin.terms[k, g, turning, 0, 0], lin.terms[k, g, turning, 1, 0]
-            radius = math.hypot(u * c[turning].real - v * c[turning].imag, u * c[turning].imag + v * c[turning].real)
+            radius = math.hypot(
+                u * c[turning].real - v * c[turning].imag, u * c[turning].imag + v * c[turning].real
+            )
         if not level - radius >= -(16.0 + 2.0 * lin.counts[k]) * UNIT * size or not level > 0.0:
             return False
     return True

@@ -95,10 +95,6 @@ def _group(
     if not len(numbers):
         return None
     modes = A.shape[1]
-    one_behind_the_other = [part.reshape(-1, *part.shape[2:]) for part in (A, rows)]
-    fields = (
-        plan.atoms(registers)
-        | {"phases": angles_of(system)}
-        | of_matrices(*one_behind_the_other, system.n, horizon)
-    )
+    A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # one behind the other
+    fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_matrices(A, rows, system.n, horizon)
     return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)

@@ -87,16 +87,11 @@ def modals(A: np.ndarray, horizon: float = math.inf, exponent: int = 1) -> Modal
     balanced = A * scales[:, None, :] / scales[:, :, None]
     values, vectors = np.linalg.eig(balanced)
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
-    is_diagonal = np.zeros(len(A), dtype=np.bool_)
-    try:
-        inverses = np.linalg.inv(vectors)
-    except np.linalg.LinAlgError:  # of one of them
-        inverses = vectors
-    else:
-        # the norm of Frobenius bounds that which makes the condition; each eigenvector has norm 1
-        with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
-            squares = (inverses.real**2 + inverses.imag**2).sum(axis=(1, 2))
-            is_diagonal = A.shape[1] * squares <= _CONDITION**2
+    inverses = _inverses(vectors)
+    # the norm of Frobenius bounds that which makes the condition; each eigenvector has norm 1
+    with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
+        squares = (inverses.real**2 + inverses.imag**2).sum(axis=(1, 2))
+        is_diagonal = A.shape[1] * squares <= _CONDITION**2
     others = {
         int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k])
         for k in np.flatnonzero(~is_diagonal)
@@ -119,6 +114,16 @@ def modals(A: np.ndarray, horizon: float = math.inf, exponent: int = 1) -> Modal
         for whole, part in zip(result[1:], (*vars(flow).values(), flow.power(exponent)), strict=True):
             whole[k][tuple(slice(0, m) for m in part.shape)] = part
     return result
+
+
+def _inverses(vectors: np.ndarray) -> np.ndarray:
+    """Inverses (K, m, m), infinite for what has none: what is found for one matrix does not depend on the others."""
+    try:
+        return np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:  # of one of them
+        if len(vectors) == 1:
+            return np.full_like(vectors, np.inf)
+        return np.concatenate([_inverses(one[None]) for one in vectors])
 
 
 @kernel

@@ -136,7 +136,7 @@ class Recipe:
         return registers if same.all() else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All registers (points, R) at the inputs of many points, and where (points,) the comparisons come out alike."""
+        """All registers (points, R) at the inputs of many points; where (points,) the comparisons come out alike."""
         found = np.empty((len(inputs), len(self._start)))
         _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
         same = (found[:, self._left] == found[:, self._right]) == self._found

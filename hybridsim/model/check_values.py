@@ -50,8 +50,8 @@ def check_values(scope: Scope) -> None:
 def checked_names(model: Model) -> frozenset[str]:
     """Names of parameters that these checks look at, directly or through others: the rest may have any finite value."""
     used: set[str] = set() if model.duration is None else set(model.duration.names)
-    for part in (*model.discrete, *model.states):
-        used |= part.start.names
+    for start in (*(d.start for d in model.discrete), *(s.start for s in model.states)):
+        used |= start.names
     for schedule in model.schedules:
         for time in (*schedule.times, schedule.start, schedule.period):
             used |= time.names if time is not None else set()
@@ -60,7 +60,9 @@ def checked_names(model: Model) -> frozenset[str]:
     for contact in model.contacts:
         used |= contact.normal.names
         if contact.law.is_set_valued:
-            used |= set().union(*(contact.limit_force(b).names | contact.onset_force(b).names for b in (False, True)))
+            used |= set().union(
+                *(contact.limit_force(b).names | contact.onset_force(b).names for b in (False, True))
+            )
     if model.impacts:
         used |= {parameter.name for parameter in model.parameters}
     made_of = {p.name: p.value.names for p in model.parameters} | {n: e.names for n, e in model.definitions}

@@ -70,15 +70,18 @@ class Race:
 def race(size: Size, pool: Pool) -> Race:
     """Time all on the same threads: `exact` on the whole map, the others on a random sample of its points."""
     side = size.race_count
-    rows = [[Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)] for q in np.linspace(*RATIO_SPAN, side)]
-    points = [point for row in rows for point in row]
+    grid = [
+        [Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)]
+        for q in np.linspace(*RATIO_SPAN, side)
+    ]
+    points = [point for row in grid for point in row]
     chosen = np.random.default_rng(_SEED).choice(len(points), size.race_sample, replace=False)
     sample = [points[i] for i in chosen]
-    _map(rows[:2], pool, 0.0, 0.0)  # what is compiled or cached once is no part of either
+    _map(grid[:2], pool, 0.0, 0.0)  # what is compiled or cached once is no part of either
     for variant in (LITERAL, ZEROED):
         by_steps(points[-1], variant, 2, 1)
     entries: dict[str, Entry] = {}
-    seconds, whole = _map(rows, pool, 0.0, 0.3)
+    seconds, whole = _map(grid, pool, 0.0, 0.3)
     found: dict[str, tuple[float, int, list[tuple[float, float]]]] = {
         "exact": (seconds, len(points), [whole[i] for i in chosen])
     }
@@ -98,7 +101,9 @@ def race(size: Size, pool: Pool) -> Race:
     return Race(side, entries)
 
 
-def _map(rows: list[list[Point]], pool: Pool, begin: float, end: float) -> tuple[float, list[tuple[float, float]]]:
+def _map(
+    rows: list[list[Point]], pool: Pool, begin: float, end: float
+) -> tuple[float, list[tuple[float, float]]]:
     """Seconds a point, and A and E of each, of the last of so many periods from rest."""
 
     def tell(done: int, total: int, _: str) -> None:

@@ -129,7 +129,9 @@ def _together(job: Job, points: Sequence[Settings], watch: Watch | None) -> list
             watch.tell()
         return watch is None or not watch.stopped()
 
-    found: list[Outcome] | None = together(job, points, lambda settings: _run(job, settings, None)[0], goes_on)
+    found: list[Outcome] | None = together(
+        job, points, lambda settings: _run(job, settings, None)[0], goes_on
+    )
     return found
 
 

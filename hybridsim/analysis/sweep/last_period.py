@@ -110,7 +110,9 @@ class LastPeriod:
         return known
 
     def _is_plain(self) -> bool:
-        return self.options.get("integrator", "auto") in ("auto", "exact") and not self.options.keys() - {"integrator"}
+        return self.options.get("integrator", "auto") in ("auto", "exact") and not self.options.keys() - {
+            "integrator"
+        }
 
 
 def period_of(model: Model) -> float:

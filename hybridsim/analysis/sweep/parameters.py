@@ -50,7 +50,9 @@ class Setter:
                 parameters[:, self._parameters.index(name)] = settings[:, k]
         return parameters, starts, np.flatnonzero(np.isfinite(settings).all(axis=1))
 
-    def _one_by_one(self, points: Sequence[Settings], parameters: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    def _one_by_one(
+        self, points: Sequence[Settings], parameters: np.ndarray, starts: np.ndarray
+    ) -> np.ndarray:
         sound = []
         for i, point in enumerate(points):
             try:

@@ -119,7 +119,10 @@ def ready_measure(
     known = _known(model, OF_MOTION if AFTER in options else _OF_MOTION)
     if asked == (STEADY,):
         asked = tuple(
-            word for word in known if word in ("period", "residual" if AFTER in options else "kind") or word.startswith((*_PLAIN, *_OF_CONTACT))
+            word
+            for word in known
+            if word in ("period", "residual" if AFTER in options else "kind")
+            or word.startswith((*_PLAIN, *_OF_CONTACT))
         )
     for word in asked:
         stem, _, last = word.rpartition(".")
