@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.leaper import NOT_LINEAR
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_modes import is_always_linear
-from hybridsim.engine.mode_tables import automata_of, shelf_of
+from hybridsim.engine.mode_tables import TapeShelf, automata_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
 from hybridsim.engine.period import common_multiple
@@ -61,7 +62,7 @@ def sails(system: System) -> bool:
         and system.n > 0
         and not parts
         and all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
-        and all(len(cluster) <= MOST for cluster in system.clusters)
+        and len(system.automata) <= MOST  # there are tables of all vectors of modes
         and is_always_linear(system)
     )
 
@@ -75,10 +76,11 @@ class Fleet:
     """
 
     def __init__(self, system: System) -> None:
-        self.system, self.shelf, self.automata = system, shelf_of(system), automata_of(system)
+        self.system, self.automata = system, automata_of(system)
         self.functions, self.inputs = functions_of(system), system.registers.inputs
+        # of all vectors of modes, so that what becomes of a run does not depend on what others have met
+        self.tapes: Any = system.code.shared("tapes of fleets", lambda: _all_tapes(system))
         self.first = np.zeros(len(system.automata), dtype=np.int64)
-        self.shelf.surround(self.first)
         lean = system.lean_tape(self.first)
         self.surfaces = (
             lean.constant_rows,
@@ -88,7 +90,6 @@ class Fleet:
             np.array(system.surface_of, dtype=np.int64),
         )
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
-        self._tapes: Any = self.shelf.tapes
 
     def runs(
         self, parameters: np.ndarray, starts: np.ndarray, periods: int
@@ -117,9 +118,8 @@ class Fleet:
         with np.errstate(divide="ignore", invalid="ignore"):
             longest = _TURNS * _FULLY / fastest
             horizons = np.minimum(periods * times, longest)
-        self._tapes = self.shelf.tapes  # another thread may put more on the shelf
         fit, left = np.flatnonzero(np.isfinite(times)), set(range(len(vectors)))
-        groups = fleet_tables(system, self._tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit])
+        groups = fleet_tables(system, self.tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit])
         for group in groups:
             spare: deque[Any] = system.code.shared(f"scratch of fleets for {group.form}", deque)
             try:
@@ -143,6 +143,13 @@ class Fleet:
             spare.append(ship)
         for i in sorted(left):
             yield i, None
+
+
+def _all_tapes(system: System) -> Any:
+    shelf = TapeShelf(system)
+    for z in product(*(range(len(a.modes)) for a in system.automata)):
+        shelf.surround(np.array(z, dtype=np.int64))
+    return shelf.tapes
 
 
 class _Ship:
@@ -169,9 +176,7 @@ class _Ship:
         )  # fmt: skip
         self.desk = Desk.of(blank, p, work, packed(room))
         self.c = room.c
-        reach_settling(
-            fleet.automata, fleet._tapes, fleet.inputs, tables, self.desk.as_packed, self.desk.work
-        )
+        reach_settling(fleet.automata, fleet.tapes, fleet.inputs, tables, self.desk.as_packed, self.desk.work)
         self.records = [
             Record(
                 ends=np.empty(_SEGMENTS),
@@ -201,7 +206,7 @@ class _Ship:
         longest: float,
     ) -> Stretch | None:  # fmt: skip
         """The last period of one run from 0 to `end`; None where it meets something unusual."""
-        layout, desk, tapes = fleet.system.layout, self.desk, fleet._tapes
+        layout, desk, tapes = fleet.system.layout, self.desk, fleet.tapes
         state = desk.state
         state.x[:], state.p[:] = x0, p
         if not self._may_begin(fleet, state):

@@ -208,9 +208,10 @@ def _race(study: Study, picture: str) -> str:
             "",
             f"Steady amplitude and energy on {study.race.side} x {study.race.side} points, "
             f"{facts['settling']}, the same",
-            "threads in the same run; all that a point costs is in its time. `exact` runs the whole map, the others a",
-            "random sample of it; errors are on the sample, against the motion settled to rounding. Shooting finds the",
-            "orbit instead of waiting for it.",
+            "threads in the same run; all that a point costs is in its time. `exact` runs the whole map, as one",
+            "`hs.sweep(..., after=100)`; the others run a random sample of it, point by point, which is a millisecond",
+            "of each point's time. Errors are on the sample, against the motion settled to rounding. Shooting is",
+            "`hs.steady_state`: it finds the orbit instead of waiting for it, and settles the question of its kind.",
             "",
             "| method | ms a point | points | median error of A | largest of A | largest of E | time, of `exact` = 1 |",
             "| --- | --- | --- | --- | --- | --- | --- |",
