@@ -228,7 +228,7 @@ def draw_map() -> None:
         "dfcs",
         "amplitude.x",
         TOL,
-        over={"F0": np.linspace(0.5 * N, 1.5 * N, 31), "omega": NATURAL * np.linspace(0.05, 2.0, 40)},
+        over={"F0": np.linspace(0.5 * N, 1.5 * N, 17), "omega": NATURAL * np.linspace(0.05, 2.0, 25)},
         workers=1,
     )
     save(advice(found), PICTURE)
