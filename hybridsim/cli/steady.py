@@ -124,6 +124,7 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         for name in record["amplitude"]
     ]
     lines += ["", *_columns([header, *rows])]
+    lines += [f"  {name}: varies too fast, or jumps too often, to be read" for name in record["too_fast"]]
     count = len(next(iter(record["harmonics"].values()), [])) - 1
     if count > 0 and found.kind == "periodic":
         header = ("harmonic", *(str(k) for k in range(1, count + 1)))

@@ -51,6 +51,10 @@ def test_what_varies_too_fast_is_named(integrator: str, a: float) -> None:
         found.harmonic("q")
     assert found.amplitude["x"] == pytest.approx(X, rel=1e-10)
     assert found.mean["square"] == pytest.approx(0.5 * X * X, rel=1e-10)
+    assert found.too_fast == ("q",)
+    record = found.to_dict()
+    assert record["too_fast"] == ["q"]
+    assert set(record["amplitude"]) == set(record["harmonics"]) == {"x", "v", "square"}
 
 
 def test_too_fast_an_output_takes_no_memory() -> None:

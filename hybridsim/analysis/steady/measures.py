@@ -38,13 +38,23 @@ class UnknownName(UsageError, KeyError):
 
 
 class ByName(Mapping[str, float]):
-    """A measure of each quantity, worked out when it is asked for."""
+    """A measure of each quantity, worked out when it is asked for.
 
-    def __init__(self, names: tuple[str, ...], measure: Callable[[str], float], kind: str) -> None:
-        self._names, self._measure, self._kind = names, measure, kind
+    Those that cannot be read (`unreadable`) are no items of it, and say why when they are asked for.
+    """
+
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        measure: Callable[[str], float],
+        kind: str,
+        unreadable: frozenset[str] = frozenset(),
+    ) -> None:
+        self._measure, self._kind, self._unreadable = measure, kind, unreadable
+        self._names = tuple(name for name in names if name not in unreadable)
 
     def __getitem__(self, name: str) -> float:
-        if name not in self._names:
+        if name not in self._names and name not in self._unreadable:
             raise UnknownName(
                 f"the steady state has no {self._kind} {name!r}",
                 remedy=nearest(str(name), self._names, kind=self._kind),
@@ -80,7 +90,12 @@ class Measures:
         return tuple(system.automata[c].name for c in system.surface_of)
 
     def _each(self, measure: Callable[[str], float]) -> ByName:
-        return ByName(self._names, measure, "quantity")
+        return ByName(self._names, measure, "quantity", self._orbit.too_fast)
+
+    @property
+    def too_fast(self) -> tuple[str, ...]:
+        """Quantities that vary too fast, or jump too often, to be read off: the measures are of the others."""
+        return tuple(name for name in self._names if name in self._orbit.too_fast)
 
     def _extreme(self, name: str, side: int) -> float:
         return float(self._orbit.extremes[side][self._orbit.column(name)])
@@ -133,10 +148,12 @@ class Measures:
     def dissipated(self) -> ByName:
         """Work of friction over the period: the integral of the force times the relative velocity, by contact."""
         remember = [c.name for c in self.solution.model.contacts if c.name not in self._contacts]
+        contacts, too_fast = (*self._contacts, *remember), self._orbit.too_fast
         return ByName(
-            (*self._contacts, *remember),
+            contacts,
             lambda c: self._orbit.integral(self._orbit.of(c) * self._velocity(c)),
             "contact",
+            frozenset(c for c in contacts if {c, f"velocity of {c}"} & too_fast),
         )
 
     def _velocity(self, contact: str) -> np.ndarray:
@@ -195,10 +212,12 @@ class Measures:
     def grazing(self) -> Grazing | None:
         """The guard that comes closest to zero and turns back, if any guard turns; small means close to a grazing.
 
-        A guard that an event has made zero, or is about to, is left out there.
+        A guard that an event has made zero, or is about to, is left out there; so is one that varies too fast for
+        its turns to be found.
         """
         orbit, solution = self._orbit, self.solution
-        largest = {name: abs(orbit.of(name)).max() for name in orbit.names if name.startswith("guard ")}
+        guards = [name for name in orbit.names if name.startswith("guard ")]
+        largest = {name: abs(orbit.of(name)).max() for name in guards if name not in orbit.too_fast}
         found: list[Grazing] = []
         for quantity, piece, t, value, is_minimum in zip(*orbit.turns, strict=True):
             name = orbit.names[quantity]

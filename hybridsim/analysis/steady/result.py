@@ -146,8 +146,9 @@ class SteadyState(Measures):
                 {"amplitude": abs(c), "phase": float(np.angle(c))}
                 for c in (self.harmonic(name, k) for k in range(harmonics + 1))
             ]
-            for name in self._names
+            for name in self.amplitude
         }
+        record["too_fast"] = list(self.too_fast)
         record["word"] = list(self.word)
         record["multipliers"] = [[float(m.real), float(m.imag)] for m in self.multipliers]
         record["stable"] = self.stable
