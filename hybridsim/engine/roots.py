@@ -32,6 +32,8 @@ _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
 _MOST_PIECES = 200_000  # a guard that needs more oscillates some 20 000 times within one step
 _CLOSEST = 40  # halvings toward the start of a step in search of a value that rounding has not made
+_TOUCHING = 2.0**-40  # of the largest value on a step: a dip to below that is held against the rounding of the values
+_ROUNDINGS_BEFORE = 8.0  # times the rounding of one step: what those before it may have left
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 
 # Chebyshev points of the second kind on [0, 1]
@@ -209,6 +211,19 @@ def _before(
     return float(places[certain[0]]) if len(certain) else theta
 
 
+def _with_touches(
+    coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
+) -> tuple[np.ndarray, int]:
+    """The pattern of a piece of one sign, where its values come to within what rounding may have made of them all.
+
+    A misfit tells of roundings that differ from sample to sample; one that is common to them, such as that of the steps
+    before, shifts the dip unseen. At the ends of a step rounding has its own rules.
+    """
+    found, count = sign_pattern(coefficients, bounds)
+    at_an_end = (is_first and found[0, 2] == 0) or (is_last and found[count - 1, 2] == 0)
+    return (rows, 1) if at_an_end else (found, count)
+
+
 def find_roots(
     sample: Callable[[np.ndarray], np.ndarray],
     first: np.ndarray,
@@ -239,6 +254,7 @@ def find_roots(
     last, open_from = side, -1.0  # last certain sign; where the open stretch after it began
     low, pieces, undefined = math.inf, 0, math.inf
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
+    touching = _TOUCHING * np.abs(first[np.isfinite(first)]).max(initial=0.0)
     while waiting:
         a, b, samples, depth = waiting.pop()
         if samples is None:
@@ -263,6 +279,9 @@ def find_roots(
         bounds = np.full(DEGREE + 1, max(error, floor))
         n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
         rows, count = sign_pattern(coefficients[:n], bounds[:n])
+        if count == 1 and rows[0, 2] and n > DEGREE and (rows[0, 2] * coefficients).min() <= touching:
+            bounds = np.maximum(bounds, _ROUNDINGS_BEFORE * rounding())
+            rows, count = _with_touches(coefficients, bounds, rows, a == 0.0, b == 1.0)
         for left, right, sign in rows[:count]:
             x, y = a + (b - a) * left, a + (b - a) * right
             if sign == 0:

@@ -400,3 +400,15 @@ def test_a_dip_at_the_very_start_of_a_step_is_flagged() -> None:
     assert not search.crossings
     assert len(search.grazings) == 1
     assert search.grazings[0].theta < 1e-4
+
+
+@pytest.mark.parametrize("width", [1e-3, 1.0])
+def test_a_dip_that_rounding_has_shifted_is_flagged(width: float) -> None:
+    """What rounding adds to all samples alike is no misfit: the dip is above zero, and may be below it in truth."""
+    theta = 0.4321
+    shift = 4.0 * UNIT
+    dips = Search(lambda x: ((x - theta) / width) ** 2 + shift, side=1, rounding=UNIT)
+    assert dips.crossings == []
+    assert [g.theta for g in dips.grazings] == [pytest.approx(theta, abs=1e-7)]
+    clear = Search(lambda x: ((x - theta) ** 2 + 1e-12) / width**2, side=1, rounding=UNIT)
+    assert (clear.crossings, clear.grazings) == ([], [])
