@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +23,8 @@ from hybridsim.engine.jit import ENABLED, Door
 from hybridsim.engine.leap import AT_TARGET, FULL
 from hybridsim.engine.leaper import NOT_LINEAR
 from hybridsim.engine.linear_guards import TERMS
-from hybridsim.engine.linear_modes import is_always_linear
-from hybridsim.engine.mode_tables import TapeShelf, automata_of
+from hybridsim.engine.linear_modes import holds_constants, is_always_linear
+from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
 from hybridsim.engine.period import common_multiple
@@ -53,7 +52,10 @@ class Last(NamedTuple):
 
 
 def sails(system: System) -> bool:
-    """Whether runs of a model may go together: contacts alone, in modes that are linear at any values of parameters."""
+    """Whether runs of a model may go together: contacts alone, in modes that are linear at any values of parameters.
+
+    What they hold has to be a number: what a state does that follows others is not read off here.
+    """
     model = system.model
     parts = model.monitors or model.inputs or model.schedules or model.discrete or system.ties
     return (
@@ -62,8 +64,9 @@ def sails(system: System) -> bool:
         and system.n > 0
         and not parts
         and all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
-        and len(system.automata) <= MOST  # there are tables of all vectors of modes
+        and len(system.automata) <= MOST  # the shelf is complete from the beginning
         and is_always_linear(system)
+        and holds_constants(system)
     )
 
 
@@ -78,9 +81,10 @@ class Fleet:
     def __init__(self, system: System) -> None:
         self.system, self.automata = system, automata_of(system)
         self.functions, self.inputs = functions_of(system), system.registers.inputs
-        # of all vectors of modes, so that what becomes of a run does not depend on what others have met
-        self.tapes: Any = system.code.shared("tapes of fleets", lambda: _all_tapes(system))
         self.first = np.zeros(len(system.automata), dtype=np.int64)
+        shelf = shelf_of(system)
+        shelf.surround(self.first)
+        self.tapes = shelf.tapes
         lean = system.lean_tape(self.first)
         self.surfaces = (
             lean.constant_rows,
@@ -145,13 +149,6 @@ class Fleet:
             yield i, None
 
 
-def _all_tapes(system: System) -> Any:
-    shelf = TapeShelf(system)
-    for z in product(*(range(len(a.modes)) for a in system.automata)):
-        shelf.surround(np.array(z, dtype=np.int64))
-    return shelf.tapes
-
-
 class _Ship:
     """Scratch arrays for runs whose tables are of one form."""
 
@@ -191,7 +188,7 @@ class _Ship:
             for _ in range(2)
         ]
         self.packs = [packed(record) for record in self.records]
-        self.room = (np.zeros(widest, dtype=complex), np.zeros((2, n)))
+        self.room = (np.zeros(widest, dtype=complex), np.zeros((3, n)))
         self.found = Stretch(
             extremes=np.empty((2, n)),
             integrals=np.empty((2, n)),

@@ -21,13 +21,7 @@ class LinearMode:
     """
 
     def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
-        tape, layout = system.code.data["tape"], system.layout
-        varying = range(layout.discrete_at, layout.size)
-        parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
-        constants = [(r, v) for r, v, _ in tape["constants"]]
-        constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
-        reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
-        reader.read(system.mode_rows(z))
+        tape, reader = system.code.data["tape"], _reader(system, atoms, z, p)
         self.rates: list[Form] = []
         for name, register in zip(system.names, tape["derivatives"], strict=True):
             self.rates.append(_named(reader, register, f"the rate of {name}"))
@@ -39,6 +33,18 @@ class LinearMode:
         """The functions of time in it."""
         forms = [*self.rates, *self.guards.values()]
         return {key for form in forms for key in form if isinstance(key, tuple)}
+
+
+def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> LinearReader:
+    """The forms of all registers in one vector of modes."""
+    tape, layout = system.code.data["tape"], system.layout
+    varying = range(layout.discrete_at, layout.size)
+    parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
+    constants = [(r, v) for r, v, _ in tape["constants"]]
+    constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
+    reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
+    reader.read(system.mode_rows(z))
+    return reader
 
 
 def _named(reader: LinearReader, register: int, title: str) -> Form:
@@ -78,6 +84,27 @@ def modes_of(
 def is_always_linear(system: System) -> bool:
     """Whether a model is linear in each of its modes whatever the values of its parameters."""
     return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))
+
+
+def holds_constants(system: System) -> bool:
+    """Whether each surface is a multiple of one state and a constant, at any values: what is held there is a number.
+
+    On another surface the held state follows other states, or time, and is none of the modal coordinates.
+    """
+    return bool(system.code.shared("holds constants", lambda: _holds_constants(system)))
+
+
+def _holds_constants(system: System) -> bool:
+    reader = _reader(system, Atoms(), np.zeros(len(system.automata), dtype=np.int64), None)
+    for register in system.code.data["tape"]["surfaces"]:
+        try:
+            form = reader.form(register)
+        except NotLinear:
+            return False
+        states = [key for key in form if isinstance(key, int)]
+        if len(states) != 1 or form.keys() - {*states, ()}:
+            return False
+    return True
 
 
 def what_is_not_linear(system: System) -> str | None:

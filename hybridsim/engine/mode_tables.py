@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
+from itertools import product
 from pathlib import Path
 from threading import Lock
 from typing import Any, NamedTuple
@@ -16,6 +18,7 @@ from hybridsim.engine.packs import packed
 from hybridsim.engine.series_code import TooLong
 from hybridsim.engine.system import System
 
+_ALL = 27  # vectors of modes, as of three contacts: so many are on a shelf from the first on
 _LONGEST = 256  # vectors of modes on a shelf that is shared: each event searches it from one end to the other
 
 
@@ -133,10 +136,15 @@ def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TapeShelf:
-    """The tapes of the modes met so far; grows when a run comes to a new vector of modes."""
+    """The tapes of the modes met so far; grows when a run comes to a new vector of modes.
+
+    Where there are few it holds all of them from the first on: what is on the shelf decides which way an event is
+    taken, and so the last digits, which then do not depend on what was run before.
+    """
 
     def __init__(self, system: System) -> None:
         self.system = system
+        self._counts = [len(automaton.modes) for automaton in system.automata]
         self._met: dict[bytes, np.ndarray] = {}
         self._surrounded: set[bytes] = set()
         self._lock = Lock()
@@ -178,6 +186,9 @@ class TapeShelf:
             return
         with self._lock:
             met = len(self._met)
+            if not met and math.prod(self._counts) <= _ALL:
+                for modes in product(*map(range, self._counts)):
+                    self._met[np.array(modes, dtype=np.int64).tobytes()] = np.array(modes, dtype=np.int64)
             self._met.setdefault(z.tobytes(), z.copy())
             for c, automaton in enumerate(self.system.automata):
                 for m in range(len(automaton.modes)):

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.jit import inlined, kernel
-from hybridsim.engine.linear_kernels import moved
+from hybridsim.engine.linear_kernels import moved, size_of
 
 # Gauss's rule on pieces over which the fastest coordinate turns by so much takes its square to rounding: the error of
 # n nodes is below (angle/2)**(2n) 2**(2n) (n!)**4/((2n + 1) (2n)!**3), 2e-16 here.
 _TURN, _NODES = 8.0, 16
 _MOST_PIECES = 4096  # a stretch with more is for others
+_GROWN = 4.0  # times the coordinates, between two nodes: these are at most 0.8 of a rate apart
+_UNSEEN = 1e-15  # of a state's size: a turn that does less is none
 _ITERATIONS = 60  # of a secant method that halves in the worst case
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
 
@@ -69,6 +71,63 @@ def _turn(
     return value
 
 
+@inlined
+def _bend(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
+    """Bounds of a state and of its third derivative, less than a turn from modal coordinates v, from their sizes."""
+    size = bend = 0.0
+    for j in range(lin.counts[k]):
+        b = size_of(lin.basis[k, i, j])
+        if b == 0.0:
+            continue
+        rate = largest = 0.0
+        for m in range(j, lin.ends[k, j]):
+            row = size_of(lin.values[k, m])
+            for q in range(m + 1, lin.ends[k, j]):
+                row += size_of(lin.upper[k, m, q])
+            rate, largest = max(rate, row), max(largest, size_of(v[m]))
+        size += b * largest
+        bend += b * largest * rate * rate * rate
+    return size, _GROWN * bend
+
+
+@kernel
+def _between(
+    lin: Any,
+    k: int,
+    i: int,
+    c: Any,
+    low: float,
+    high: float,
+    at_low: float,
+    at_high: float,
+    v: Any,
+    extremes: Any,
+) -> None:
+    """Widen a state's extremes by those between two times at which its rates are known, however close they are.
+
+    The rate x' has two zeros in an interval of length h only where |x'| is at most max |x'''| h**2/2 at both of its
+    ends. Such an interval is halved until what could turn there is below rounding.
+    """
+    moved(lin, k, c, low, v)
+    size, bend = _bend(lin, k, i, v)
+    a, h = low, high - low
+    while a < high:
+        b = min(a + h, high)
+        moved(lin, k, c, b, v)
+        value, slope = _state_and_slope(lin, k, i, v)
+        extremes[0, i], extremes[1, i] = min(extremes[0, i], value), max(extremes[1, i], value)
+        if b == high:
+            slope = at_high
+        flat = 0.5 * bend * (b - a) * (b - a)
+        if max(abs(at_low), abs(slope)) <= flat and flat * (b - a) > _UNSEEN * size and a + 0.5 * h > a:
+            h *= 0.5
+            continue
+        if at_low * slope < 0.0:
+            value = _turn(lin, k, i, c, a, b, at_low, slope, v)
+            extremes[0, i], extremes[1, i] = min(extremes[0, i], value), max(extremes[1, i], value)
+        a, at_low, h = b, slope, 2.0 * h
+
+
 @kernel
 def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, room: Any, out: Any
@@ -76,7 +135,7 @@ def sum_up(
     """Add segments first to last - 1 of a record to a `Stretch`, the first one from local time `begin` on.
 
     record: ends, rows, modes, coordinates, jumps as `hybridsim.engine.exact_leap` writes them; hold: of each component.
-    room: v (J,) and slopes (2, n). False where a segment turns too often.
+    room: v (J,) and slopes (3, n). False where a segment turns too often.
     """
     ends, rows, modes, coordinates, jumps = record
     v, slopes = room
@@ -133,12 +192,15 @@ def sum_up(
                         integrals[1, i] += 0.5 * length * weights[node] * value * value
                         extremes[0, i] = min(extremes[0, i], value)
                         extremes[1, i] = max(extremes[1, i], value)
-                    slopes[1, i] = slope
+                    slopes[1, i], slopes[2, i] = slope, _bend(lin, k, i, v)[1]
                 for i in range(n):
-                    if slopes[0, i] * slopes[1, i] < 0.0:
-                        value = _turn(lin, k, i, c, before, s, slopes[0, i], slopes[1, i], v)
-                        extremes[0, i] = min(extremes[0, i], value)
-                        extremes[1, i] = max(extremes[1, i], value)
-                    slopes[0, i] = slopes[1, i]
+                    first_rate, last_rate, flat = (
+                        slopes[0, i],
+                        slopes[1, i],
+                        0.5 * slopes[2, i] * (s - before) ** 2,
+                    )
+                    if first_rate * last_rate < 0.0 or max(abs(first_rate), abs(last_rate)) <= flat:
+                        _between(lin, k, i, c, before, s, first_rate, last_rate, v, extremes)
+                    slopes[0, i] = last_rate
                 before = s
     return True

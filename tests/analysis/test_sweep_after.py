@@ -189,3 +189,81 @@ def test_what_has_no_last_period_is_refused() -> None:
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, save="all")
     with pytest.raises(UsageError, match="no measure 'kind'"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["kind"], after=3)
+
+
+@pytest.mark.parametrize("surface", ["v - z", "v - 0.5*cos(w*t)", "v + 0.3*x"])
+@pytest.mark.parametrize("load", [3.0, 100.0])
+def test_what_is_held_at_a_surface_that_moves_is_read_there(surface: str, load: float) -> None:
+    """A state that follows another, or time, while it is held: its own coordinate says nothing of it."""
+    model = hs.Model(
+        "pair",
+        parameters={"w": 1.0, "N": load},
+        states=[
+            hs.State("x", 0.0, "v"),
+            hs.State("v", 0.3, "-0.5*x - 0.2*v + cos(w*t) - f"),
+            hs.State("y", 0.0, "z"),
+            hs.State("z", 0.0, "-0.3*z + f"),
+        ],
+        contacts=[hs.Contact("f", surface, "N", "coulomb", {"mu": 0.3})],
+    )
+    words = ("mean.v", "energy.v", "maximum.v", "minimum.v", "residual")
+    found = hs.sweep(model, {"N": [load]}, words, after=10)
+    for word in words:
+        loose = 1e-6 if word == "residual" else 1e-9
+        assert found[word][0] == pytest.approx(by_itself(model, 10, word), rel=loose, abs=loose), word
+
+
+def test_the_higher_one_of_two_tops_next_to_each_other_is_read() -> None:
+    """x = cos s - a cos 2s + d sin s has two tops about a dip at s = 0 where a is above 1/4, and d makes one higher."""
+    text = "-w*sin(w*t + ph) + 2*a*w*sin(2*(w*t + ph)) + d*w*cos(w*t + ph)"
+    model = hs.Model(
+        "flat",
+        parameters={"w": 1.0, "a": 0.25, "d": 0.0, "ph": 0.0, "N": 0.3},
+        states=[
+            hs.State("x", "cos(ph) - a*cos(2*ph) + d*sin(ph)", text),
+            hs.State("v", 0.0, "-f + cos(w*t)"),
+        ],
+        contacts=[hs.Contact("f", "v", "N", "coulomb", {"mu": 1.0})],
+    )
+    assert sails(system_of(model.validate()))
+    s = np.linspace(-0.5, 0.5, 100_001)
+    for a, d in ((0.2505, 1e-6), (0.252, 1e-5), (0.2535, 3e-4)):
+        truth = highest(np.cos(s) - a * np.cos(2.0 * s) + d * np.sin(s))
+        found = hs.sweep(
+            model.with_(a=a, d=d), {"ph": np.linspace(0.0, 6.28, 300).tolist()}, ["maximum.x"], after=2
+        )
+        assert found["maximum.x"] == pytest.approx(np.full(300, truth), abs=1e-12)
+
+
+def test_the_bits_do_not_depend_on_what_was_run_before() -> None:
+    """Of two models that differ in names alone one meets a point first, the other after points that meet more modes."""
+
+    def three_blocks(*names: str) -> hs.Model:
+        pulls = ["F*cos(w*t) - k*x1", "k*(x1 - x2)", "0.5*cos(w*t) - x3"]
+        states = [hs.State(f"x{i + 1}", 0.0, f"v{i + 1}") for i in range(3)]
+        states += [
+            hs.State(f"v{i + 1}", 0.2 * i, f"{pulls[i]} - 0.1*v{i + 1} - {name}")
+            for i, name in enumerate(names)
+        ]
+        contacts = [
+            hs.Contact(name, f"v{i + 1} - 0.1", "N", "coulomb", {"mu": 0.3}) for i, name in enumerate(names)
+        ]
+        return hs.Model(
+            "three", parameters={"F": 2.0, "w": 1.1, "k": 3.0, "N": 3.0}, states=states, contacts=contacts
+        )
+
+    words = ["amplitude.x1", "energy.v2", "mean.x3", "maximum.v3", "word"]
+    first, second = three_blocks("a", "b", "c"), three_blocks("p", "q", "r")
+    for load in (0.5, 1.0, 0.0):
+        hs.sweep(second, {"N": [load]}, words, after=3)
+    alone, later = (hs.sweep(model, {"N": [3.0]}, words, after=3) for model in (first, second))
+    assert [alone[word][0] for word in words] == [later[word][0] for word in words]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [({"t_span": (0, 1)}, "t_span is given beside after"), ({"warm_start": True}, "warm_start")],
+)
+def test_what_does_not_go_with_the_last_period(given: dict, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        hs.sweep("dfcs", {"F0": [30]}, ["amplitude.x"], after=3, **given)

@@ -178,7 +178,13 @@ class Question:
             raise NoAnswer("a formula has no trajectory to hand to a function")
         given = motion if self.t_span is None else motion.solution
         value = self.function(given)
-        return complex(value) if isinstance(value, complex) else float(value)
+        try:
+            found = complex(value) if isinstance(value, complex) else float(value)
+        except (TypeError, ValueError):
+            raise NoAnswer(f"it returned {value!r}, which is no number") from None
+        if math.isnan(abs(found)):
+            raise NoAnswer(f"it returned {value!r}")
+        return found
 
     def _event_time(self, motion: Any) -> float:
         if not isinstance(motion, Measures):

@@ -118,7 +118,8 @@ class Orbit:
 
     def _turns_of(self, first: int, series: np.ndarray, is_smooth: np.ndarray) -> Turns:
         slopes = series @ _SLOPES_ON_GRID.T
-        row, g = np.nonzero(slopes[:, :-1] * slopes[:, 1:] < 0.0)
+        signs = np.sign(slopes)
+        row, g = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0.0)
         before, after, chosen = slopes[row, g], slopes[row, g + 1], series[row]
         k, q = np.divmod(row, len(self.names))
         at = _zeros(chosen @ _DIFFERENTIATE.T, _GRID[g], _GRID[g + 1], before, after)

@@ -139,7 +139,7 @@ def ready_measure(
 
 def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
     after = whole(options.pop(AFTER), AFTER)
-    for name in ("save", "t_eval"):
+    for name in ("t_span", "save", "t_eval"):
         if name in options:
             raise UsageError(f"{name} is given beside after", remedy="leave it out: the last period is kept")
     period_of(model)  # where it has none, that is told once

@@ -21,6 +21,7 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import whole
 from hybridsim.arguments import callback, chosen_model
+from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 
@@ -113,6 +114,11 @@ def sweep(
     points = points_of(model, values, mode)
     tell = callback(progress)
     if after is not None:
+        if warm_start:
+            raise UsageError(
+                "warm_start is given beside after: the periods are counted from the start of each point",
+                remedy="leave one of them out",
+            )
         options["after"] = after
     count = None if workers is None else whole(workers, "workers")
     measured = measure_of(measure, model, warm_start, options)
