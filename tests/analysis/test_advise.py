@@ -371,3 +371,12 @@ def test_what_is_refused(arguments: dict[str, Any], words: str) -> None:
 def test_a_full_model_without_an_answer_is_an_error() -> None:
     with pytest.raises(SimulationError, match="does not oscillate"):
         hs.advise("free-decay", "period", integrators=False)
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [("a", "returned 'a', which is no number"), ([1.0], "no number"), (math.nan, "returned nan")],
+)
+def test_a_function_that_returns_no_number_is_an_error(answer: Any, words: str) -> None:
+    with pytest.raises(SimulationError, match=words):
+        hs.advise("dfcs", lambda motion: answer, integrators=False)
