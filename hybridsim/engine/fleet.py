@@ -17,7 +17,7 @@ import numpy as np
 from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import MOST, functions_of, work_space
 from hybridsim.engine.exact_leap import Record, Room, exact_leap
-from hybridsim.engine.fleet_start import plain_start, rests_for_ever
+from hybridsim.engine.fleet_start import opposing, plain_start, rests_for_ever
 from hybridsim.engine.fleet_tables import fleet_tables
 from hybridsim.engine.jit import ENABLED, Door
 from hybridsim.engine.leap import AT_TARGET, FULL
@@ -42,6 +42,7 @@ _TURNS = 100  # as in `hybridsim.engine.loop`: the longest segment, in turns of 
 _FULLY = 2.0 * math.pi
 
 _leap, _start, _rests, _sum_up = Door(exact_leap), Door(plain_start), Door(rests_for_ever), Door(sum_up)
+_opposing = Door(opposing)
 
 
 class Last(NamedTuple):
@@ -100,7 +101,8 @@ class Fleet:
     ) -> Iterator[tuple[int, Last | None]]:
         """The last period of each run, by its number, in any order; None where a run is not for a fleet.
 
-        parameters (N, P), in the order of the model; starts (N, n).
+        What a period holds is to be read before the next one is asked for. parameters (N, P), in the order of the
+        model; starts (N, n).
         """
         for first in range(0, len(parameters), _TOGETHER):
             here = slice(first, first + _TOGETHER)
@@ -122,7 +124,8 @@ class Fleet:
         with np.errstate(divide="ignore", invalid="ignore"):
             longest = _TURNS * _FULLY / fastest
             horizons = np.minimum(periods * times, longest)
-        fit, left = np.flatnonzero(np.isfinite(times)), set(range(len(vectors)))
+        fit = np.flatnonzero(np.isfinite(times) & self._may_begin(starts, vectors))
+        left = set(range(len(vectors)))
         groups = fleet_tables(system, self.tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit])
         for group in groups:
             spare: deque[Any] = system.code.shared(f"scratch of fleets for {group.form}", deque)
@@ -147,6 +150,13 @@ class Fleet:
             spare.append(ship)
         for i in sorted(left):
             yield i, None
+
+    def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Where each contact opposes its own velocity (N,); a run with one that does not is refused by itself."""
+        found = np.empty(len(starts), dtype=np.bool_)
+        room = np.zeros(len(self.system.surface_of))
+        _opposing(self.system.address("effects"), starts, vectors, self.first, room, found)
+        return found
 
 
 class _Ship:
@@ -206,8 +216,6 @@ class _Ship:
         layout, desk, tapes = fleet.system.layout, self.desk, fleet.tapes
         state = desk.state
         state.x[:], state.p[:] = x0, p
-        if not self._may_begin(fleet, state):
-            return None
         places = (rates, layout.origin_at, layout.phases_at)
         if not _start(
             fleet.functions, fleet.automata, tapes, fleet.inputs, NOT_LINEAR, (*places, layout.pin_at), fleet.surfaces,
@@ -233,11 +241,6 @@ class _Ship:
             kept = count
         return None
 
-    def _may_begin(self, fleet: Fleet, state: Any) -> bool:
-        """Whether each contact opposes its own velocity; one that does not is refused by a run of its own."""
-        effects = fleet.system.effects(0.0, state.x, state.p, fleet.first)
-        return all(effect < 0.0 for effect in effects.values())
-
     def _blank(self) -> Stretch:
         found = self.found
         found.extremes[0], found.extremes[1] = np.inf, -np.inf
@@ -251,7 +254,7 @@ class _Ship:
         found.integrals[:] = period * state.x, period * state.x**2
         held = state.z == fleet.hold
         found.held[:], found.holding[:] = (period * held, held), held
-        return _copy(found)
+        return found
 
     def _measured(self, fleet: Fleet, tables: Any, since: Instant, kept: int, count: int) -> Stretch | None:
         """What the segments say that hold all after an instant, of those kept before and those just recorded."""
@@ -272,8 +275,4 @@ class _Ship:
             tables, fleet.hold, (record.ends, record.rows, record.modes, record.coordinates, record.jumps),
             first, count, begin, NODES, WEIGHTS, self.room, self.found_packed,
         )  # fmt: skip
-        return _copy(found) if done else None
-
-
-def _copy(found: Stretch) -> Stretch:
-    return Stretch(*[array.copy() for array in found])
+        return found if done else None

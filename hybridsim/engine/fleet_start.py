@@ -165,3 +165,13 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
         if not level - radius >= -(16.0 + 2.0 * lin.counts[k]) * UNIT * size or not level > 0.0:
             return False
     return True
+
+
+@kernel
+def opposing(effects: Any, x: Any, p: Any, z: Any, room: Any, out: Any) -> None:
+    """Whether in each of N starts x (N, n), p (N, P) every contact opposes its own velocity: out (N,); room (C,)."""
+    for i in range(x.shape[0]):
+        call(effects, 0.0, x[i], p[i], z, room)
+        out[i] = True
+        for c in range(room.shape[0]):
+            out[i] = out[i] and room[c] < 0.0

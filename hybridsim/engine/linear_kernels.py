@@ -275,12 +275,21 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @polynomial_kernel
 def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
-    """A polynomial of d and its derivative: Horner's rule on `start` and then the coefficients, highest first."""
-    value, slope = start, 0.0
-    for i in range(count):
-        slope = slope * d + value
-        value = value * d + backward[i]
-    return value, slope
+    """A polynomial of d and its derivative: Horner's rule on `start` and then the coefficients, highest first.
+
+    The even powers and the odd ones are two polynomials of d**2: neither waits for the other.
+    """
+    square = d * d
+    even, odd = (start, 0.0) if count % 2 == 0 else (0.0, start)
+    even_rate = odd_rate = 0.0
+    if count % 2 == 1:
+        even = backward[0]
+    for i in range(count % 2, count, 2):
+        odd_rate = odd_rate * square + odd
+        odd = odd * square + backward[i]
+        even_rate = even_rate * square + even
+        even = even * square + backward[i + 1]
+    return even + d * odd, odd + 2.0 * d * (even_rate + d * odd_rate)
 
 
 @inlined

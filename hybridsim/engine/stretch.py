@@ -8,13 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.jit import inlined, kernel
-from hybridsim.engine.linear_kernels import moved, size_of
+from hybridsim.engine.linear_kernels import moved
 
 # Gauss's rule on pieces over which the fastest coordinate turns by so much takes its square to rounding: the error of
 # n nodes is below (angle/2)**(2n) 2**(2n) (n!)**4/((2n + 1) (2n)!**3), 2e-16 here.
 _TURN, _NODES = 8.0, 16
 _MOST_PIECES = 4096  # a stretch with more is for others
-_GROWN = 4.0  # times the coordinates, between two nodes: these are at most 0.8 of a rate apart
+_GROWN = (
+    4.0  # times the coordinates, at most, from a node to the next: these are less than 0.8 of a rate apart
+)
 _UNSEEN = 1e-15  # of a state's size: a turn that does less is none
 _ITERATIONS = 60  # of a secant method that halves in the worst case
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
@@ -72,22 +74,34 @@ def _turn(
 
 
 @inlined
-def _bend(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
-    """Bounds of a state and of its third derivative, less than a turn from modal coordinates v, from their sizes."""
+def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
+    """Bounds of a state and of its third derivative up to the next node from modal coordinates v on, or from then on."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
-        b = size_of(lin.basis[k, i, j])
+        b = abs(lin.basis[k, i, j])
         if b == 0.0:
             continue
         rate = largest = 0.0
         for m in range(j, lin.ends[k, j]):
-            row = size_of(lin.values[k, m])
+            row = abs(lin.values[k, m])
             for q in range(m + 1, lin.ends[k, j]):
-                row += size_of(lin.upper[k, m, q])
-            rate, largest = max(rate, row), max(largest, size_of(v[m]))
+                row += abs(lin.upper[k, m, q])
+            rate, largest = max(rate, row), max(largest, abs(v[m]))
         size += b * largest
         bend += b * largest * rate * rate * rate
-    return size, _GROWN * bend
+    return size, bend if is_shrinking else _GROWN * bend
+
+
+@inlined
+def _is_shrinking(lin: Any, k: int) -> bool:
+    """Whether no modal coordinate ever grows, so that bounds made of them hold from there on."""
+    for j in range(lin.counts[k]):
+        if lin.values[k, j].real > 0.0:
+            return False
+        for m in range(j + 1, lin.ends[k, j]):
+            if lin.upper[k, j, m] != 0.0:
+                return False
+    return True
 
 
 @kernel
@@ -109,7 +123,7 @@ def _between(
     ends. Such an interval is halved until what could turn there is below rounding.
     """
     moved(lin, k, c, low, v)
-    size, bend = _bend(lin, k, i, v)
+    size, bend = _bend(lin, k, i, v, _is_shrinking(lin, k))
     a, h = low, high - low
     while a < high:
         b = min(a + h, high)
@@ -119,7 +133,7 @@ def _between(
         if b == high:
             slope = at_high
         flat = 0.5 * bend * (b - a) * (b - a)
-        if max(abs(at_low), abs(slope)) <= flat and flat * (b - a) > _UNSEEN * size and a + 0.5 * h > a:
+        if max(abs(at_low), abs(slope)) < flat and flat * (b - a) > _UNSEEN * size and a + 0.5 * h > a:
             h *= 0.5
             continue
         if at_low * slope < 0.0:
@@ -135,7 +149,8 @@ def sum_up(
     """Add segments first to last - 1 of a record to a `Stretch`, the first one from local time `begin` on.
 
     record: ends, rows, modes, coordinates, jumps as `hybridsim.engine.exact_leap` writes them; hold: of each component.
-    room: v (J,) and slopes (3, n). False where a segment turns too often.
+    room: v (J,); slopes and bounds of
+    third derivatives (3, n). False where a segment turns too often.
     """
     ends, rows, modes, coordinates, jumps = record
     v, slopes = room
@@ -175,8 +190,10 @@ def sum_up(
             extremes[0, i] = min(extremes[0, i], side, jumps[segment, 1, i])
             extremes[1, i] = max(extremes[1, i], side, jumps[segment, 1, i])
         moved(lin, k, c, s0, v)
+        is_shrinking = _is_shrinking(lin, k)
         for i in range(n):
             slopes[0, i] = _state_and_slope(lin, k, i, v)[1]
+            slopes[2, i] = _bend(lin, k, i, v, is_shrinking)[1]
         before = s0
         for piece in range(pieces):
             for node in range(nodes.shape[0] + 1):
@@ -192,15 +209,23 @@ def sum_up(
                         integrals[1, i] += 0.5 * length * weights[node] * value * value
                         extremes[0, i] = min(extremes[0, i], value)
                         extremes[1, i] = max(extremes[1, i], value)
-                    slopes[1, i], slopes[2, i] = slope, _bend(lin, k, i, v)[1]
+                    slopes[1, i] = slope
+                    if not is_shrinking:
+                        slopes[2, i] = _bend(lin, k, i, v, is_shrinking)[1]
                 for i in range(n):
                     first_rate, last_rate, flat = (
                         slopes[0, i],
                         slopes[1, i],
                         0.5 * slopes[2, i] * (s - before) ** 2,
                     )
-                    if first_rate * last_rate < 0.0 or max(abs(first_rate), abs(last_rate)) <= flat:
+                    if max(abs(first_rate), abs(last_rate)) < flat:
                         _between(lin, k, i, c, before, s, first_rate, last_rate, v, extremes)
+                    elif first_rate * last_rate < 0.0:
+                        value = _turn(lin, k, i, c, before, s, first_rate, last_rate, v)
+                        extremes[0, i], extremes[1, i] = (
+                            min(extremes[0, i], value),
+                            max(extremes[1, i], value),
+                        )
                     slopes[0, i] = last_rate
                 before = s
     return True
