@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,10 +77,11 @@ class Fleet:
     Parameters
     ----------
     system : one for which `sails` holds, at any values of its parameters.
+    goes_on : asked now and then in long runs, which end where it says no.
     """
 
-    def __init__(self, system: System) -> None:
-        self.system, self.automata = system, automata_of(system)
+    def __init__(self, system: System, goes_on: Callable[[], bool]) -> None:
+        self.system, self.automata, self.goes_on = system, automata_of(system), goes_on
         self.functions, self.inputs = functions_of(system), system.registers.inputs
         self.first = np.zeros(len(system.automata), dtype=np.int64)
         shelf = shelf_of(system)
@@ -233,7 +234,7 @@ class _Ship:
             )  # fmt: skip
             if code == AT_TARGET:
                 return self._measured(fleet, tables, since, kept, count)
-            if not count:
+            if not count or not fleet.goes_on():
                 return None
             resumed += code != FULL
             self.records.reverse()

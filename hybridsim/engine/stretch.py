@@ -75,7 +75,7 @@ def _turn(
 
 @inlined
 def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
-    """Bounds of a state and of its third derivative up to the next node from modal coordinates v on, or from then on."""
+    """Bounds of a state and of its third derivative, from modal coordinates v on, at least up to the next node."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
         b = abs(lin.basis[k, i, j])

@@ -11,7 +11,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.analysis.closed_forms.den_hartog import no_stops
-from hybridsim.engine.fleet import sails
+from hybridsim.engine.fleet import Fleet, sails
 from hybridsim.engine.recent import system_of
 from hybridsim.errors import UsageError
 
@@ -267,3 +267,12 @@ def test_the_bits_do_not_depend_on_what_was_run_before() -> None:
 def test_what_does_not_go_with_the_last_period(given: dict, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         hs.sweep("dfcs", {"F0": [30]}, ["amplitude.x"], after=3, **given)
+
+
+def test_a_long_run_ends_where_the_sweep_is_to_end() -> None:
+    system = system_of(hs.load("dfcs").validate())
+    values = np.array([[*system.values.values()]])
+    start = np.zeros((1, 2))
+    assert [last for _, last in Fleet(system, lambda: False).runs(values, start, 10_000)] == [None]
+    (last,) = [last for _, last in Fleet(system, lambda: True).runs(values, start, 10_000)]
+    assert last is not None

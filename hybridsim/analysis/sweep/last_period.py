@@ -88,8 +88,10 @@ class LastPeriod:
             return None
         parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
         outcomes: list[Outcome | None] = [None] * len(points)
-        for i, last in Fleet(system).runs(parameters[sound], starts[sound], self.after):
+        for i, last in Fleet(system, goes_on).runs(parameters[sound], starts[sound], self.after):
             number = int(sound[i])
+            if last is None and not goes_on():
+                break
             if last is None:
                 outcomes[number] = alone(points[number])
             else:
