@@ -41,7 +41,7 @@ def sweep_lines(
     Parameters
     ----------
     names : readings; the first six that are numbers if none is given.
-    over : the parameter that runs across; the longest axis if not given.
+    over : the parameter that runs across; if not given the longest axis of numbers.
     axes : as many axes as readings, to draw in; a new figure if not given.
     """
     dimensions = list(result.axes) if result.mode == "grid" else [next(iter(result.axes))]
@@ -51,7 +51,9 @@ def sweep_lines(
             remedy="two can be drawn; take a part of it with to_xarray().sel(...)",
         )
     lengths = dict(zip(dimensions, result.status.shape, strict=True))
-    across = max(dimensions, key=lengths.__getitem__) if over is None else over
+    across = over
+    if over is None:  # texts are no distances
+        across = max(dimensions, key=lambda name: (result.axes[name].dtype.kind == "f", lengths[name]))
     if across not in dimensions:
         raise UsageError(f"over is {over!r}", remedy=nearest(str(over), dimensions, kind="parameters"))
     found = chosen_names(result, names, arrays=True)

@@ -16,11 +16,15 @@ if TYPE_CHECKING:
 def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ...]:
     """Draw readings of a sweep; all that are numbers, if none is named, up to six.
 
+    A parameter of texts, such as the direction of `hs.bifurcation`, does not run across: its readings are lines, and
+    arrays at each point dots, the diagram of a bifurcation.
+
     Parameters
     ----------
     over : the parameter that runs across. With it, or with one parameter only, there are lines, one for each value
         of the other parameter; without it two parameters make a map.
     """
-    if over is None and len(result.axes) == 2 and result.mode == "grid":
+    has_texts = any(values.dtype.kind != "f" for values in result.axes.values())
+    if over is None and len(result.axes) == 2 and result.mode == "grid" and not has_texts:
         return sweep_map(result, *names)
     return sweep_lines(result, *names, over=over)

@@ -226,8 +226,20 @@ def test_a_region_says_the_same_as_each_point() -> None:
         for j, omega in enumerate(rates):
             model = hs.load("dfcs").with_(F0=F0, omega=omega)
             assert hs.advise(model, "amplitude.x", 0.01, integrators=False).simplest.name == found.map[i, j]
-    assert found.simplest.name == "full model" and "everywhere" in found.remarks[0]
+    assert found.simplest.name == "full model" and "at each point" in found.remarks[0]
     assert json.loads(found.to_json())["region"]["values"]["simplest"] == found.map.tolist()
+
+
+def test_what_was_not_tried_at_all_points_of_a_region_is_not_said_to_fail() -> None:
+    region = {"N": [10.0, 40.0], "omega": ["0.3*sqrt(k/m)", "0.95*sqrt(k/m)"]}
+    asked = {"over": region, "tol": 0.05}
+    both = hs.advise("dfcs", "amplitude.x", rungs=["viscous", "karnopp"], **asked)
+    alone = hs.advise("dfcs", "amplitude.x", rungs=["karnopp"], **asked)
+    karnopp = both.ladder[1]
+    assert alone.ladder[0].verdict == "adequate"
+    assert "viscous" in both.map and "karnopp" in both.map
+    assert karnopp.verdict == "adequate where tried" and "where nothing simpler does" in karnopp.why
+    assert "was not tried" in both.remarks[0]
 
 
 @pytest.mark.parametrize(
@@ -375,7 +387,13 @@ def test_a_full_model_without_an_answer_is_an_error() -> None:
 
 @pytest.mark.parametrize(
     ("answer", "words"),
-    [("a", "returned 'a', which is no number"), ([1.0], "no number"), (math.nan, "returned nan")],
+    [
+        ("a", "returned 'a', which is no number"),
+        ([1.0], "no number"),
+        (math.nan, "returned nan"),
+        (math.inf, "returned inf"),
+        (10**400, "no number"),
+    ],
 )
 def test_a_function_that_returns_no_number_is_an_error(answer: Any, words: str) -> None:
     with pytest.raises(SimulationError, match=words):

@@ -155,6 +155,29 @@ def test_rest_between_ticks_is_no_equilibrium() -> None:
         hs.equilibria(model('x = { start = 1, der = "u - x" }', "", clock))
 
 
+@pytest.mark.parametrize(
+    "pull", ["-2500*(x - 0.0045) - 0.5*v", "-2500*x - 0.5*v", "-2500*(x - 0.0045) - 0.5*v - 0.1*v**3"]
+)
+def test_a_motion_that_dies_out_rests(pull: str) -> None:
+    """What is left of it is rounding, which goes round about the point of rest and may repeat."""
+    model = hs.Model(
+        "decay", states=[hs.State("x", 0.1, "v", nominal=1e-2), hs.State("v", 0, pull, nominal=0.3)]
+    )
+    found = hs.steady_state(model)
+    assert found.kind == "equilibrium"
+    assert found.mean["x"] == pytest.approx(0.0 if "*x" in pull else 0.0045, rel=1e-12, abs=1e-12)
+    assert found.amplitude["x"] < 1e-12
+
+
+@pytest.mark.parametrize("mu", [0.5, 0.76])
+def test_below_the_onset_of_mode_coupling_all_comes_to_rest(mu: float) -> None:
+    """Sliding on; just below the onset, at 0.765, the decay takes hundreds of periods."""
+    found = hs.steady_state("mode-coupling", params={"mu": mu})
+    rest = hs.linearize("mode-coupling", "slip-", params={"mu": mu})
+    assert found.kind == "equilibrium" and rest.is_equilibrium
+    assert [found.mean[name] for name in ("x", "u", "y", "w")] == pytest.approx(rest.x.tolist(), abs=1e-12)
+
+
 def test_a_mapping_of_measures_is_a_mapping() -> None:
     found = hs.steady_state("dfcs")
     assert "q" not in found.amplitude

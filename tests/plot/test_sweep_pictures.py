@@ -48,6 +48,14 @@ def test_lines_of_two_parameters_say_where_there_is_nothing() -> None:
     assert list(panel.lines[1].get_ydata()) == [1e-4 * w / 40 for w in sorted(OMEGA)]
 
 
+def test_a_bifurcation_diagram_is_dots_over_the_parameter() -> None:
+    found = hs.bifurcation("dfcs", "F0", [22, 30], settle=20, samples=4)
+    (panel,) = found.plot("x")
+    assert panel.get_xlabel() == "F0 [N]" and panel.get_ylabel().startswith("x [")
+    upward = panel.get_lines()[0]
+    assert sorted(set(upward.get_xdata())) == [22.0, 30.0] and len(upward.get_xdata()) == 8
+
+
 def test_many_lines_are_named_in_part() -> None:
     (panel,) = sweep_lines(swept(omega=OMEGA, N=np.linspace(30, 60, 40).tolist()), "a", over="omega")
     names = [text.get_text() for text in panel.get_legend().get_texts()]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, Step, duration
+from hybridsim.analysis.advise.ladder import FULL, WHERE_TRIED, WITHOUT_TRIAL, Step, duration
 from hybridsim.analysis.advise.question import Number
 from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
@@ -165,6 +165,11 @@ def _remarks(advice: Advice) -> list[str]:
     where = " everywhere in the region" if advice.region is not None else ""
     if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
         found.append("no simpler model could be tried: no rung applies to this model")
+    elif untried := [step.name for step in advice.ladder if step.verdict == WHERE_TRIED]:
+        found.append(
+            f"the map says what is simplest at each point; whether {' or '.join(untried)} would do at all of them "
+            f"was not tried: rungs=[{untried[-1]!r}] tells"
+        )
     elif simplest.verdict == FULL and len(advice.ladder) > 1:
         found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:

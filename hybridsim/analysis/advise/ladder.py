@@ -18,7 +18,7 @@ from hybridsim.analysis.steady.measures import Measures
 from hybridsim.model import Model
 
 ADEQUATE, NOT_ADEQUATE, NOT_APPLICABLE, FULL = "adequate", "not adequate", "does not apply", "full model"
-NOTHING_TO_DROP = "nothing to drop"
+NOTHING_TO_DROP, WHERE_TRIED = "nothing to drop", "adequate where tried"
 WITHOUT_TRIAL = (NOT_APPLICABLE, NOTHING_TO_DROP)  # verdicts that no run stands behind
 _AGAIN_BELOW = (
     2.0  # seconds: what takes longer is not done twice to have it without making the model's functions
@@ -43,7 +43,7 @@ class Step:
     seconds : measured, for the value.
     verdict : "adequate", "not adequate", "does not apply", "nothing to drop" where the model has not got what the
         rung would drop, "full model"; "stopped" for a rung that has become far
-        dearer than the full model, "not started" where the budget was spent.
+        dearer than the full model, "not started" where the budget was spent; over a region "adequate where tried".
     why : a sentence.
     model : the simpler model, where it is one.
     """

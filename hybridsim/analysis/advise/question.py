@@ -180,9 +180,9 @@ class Question:
         value = self.function(given)
         try:
             found = complex(value) if isinstance(value, complex) else float(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise NoAnswer(f"it returned {value!r}, which is no number") from None
-        if math.isnan(abs(found)):
+        if not math.isfinite(abs(found)):
             raise NoAnswer(f"it returned {value!r}")
         return found
 

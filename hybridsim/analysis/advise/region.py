@@ -15,6 +15,7 @@ from hybridsim.analysis.advise.ladder import (
     FULL,
     NOT_ADEQUATE,
     NOT_APPLICABLE,
+    WHERE_TRIED,
     Limits,
     Step,
     by_theory,
@@ -57,9 +58,10 @@ class _Point:
             raise SimulationError(str(reason)) from reason
         scene = scene_of(model, full.motion, self.v0)
         errors, stopped = np.full(len(self.rungs), math.inf), np.zeros(len(self.rungs))
+        tried = np.zeros(len(self.rungs))
         simplest = None
         for k, step in enumerate(climb(self.rungs, scene, self.question, full, self.tol, self.limits)):
-            errors[k], stopped[k] = step.error, step.verdict == STOPPED
+            errors[k], stopped[k], tried[k] = step.error, step.verdict == STOPPED, 1.0
             if simplest is None and step.is_adequate:
                 simplest = k
             following = self.rungs[k + 1 : k + 2]
@@ -71,6 +73,7 @@ class _Point:
             "value": full.value,
             "errors": errors,
             "stopped": stopped,
+            "tried": tried,
         }
 
 
@@ -99,13 +102,18 @@ def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
     steps = []
     for k, rung in enumerate(rungs):
         known = errors[:, k]
+        tried = int(found["tried"][done][:, k].sum())
         serves, first = int((known <= tol).sum()), int((simplest == rung.name).sum())
-        verdict = ADEQUATE if serves == total else NOT_ADEQUATE if serves else NOT_APPLICABLE
-        if not np.isfinite(known).any():
+        verdict = NOT_ADEQUATE
+        if serves == total:
+            verdict = ADEQUATE
+        elif serves and serves == tried:
+            verdict = WHERE_TRIED
+        elif not np.isfinite(known).any():
             verdict = NOT_APPLICABLE
-        elif verdict == NOT_APPLICABLE:
-            verdict = NOT_ADEQUATE
         why = f"serves at {serves} of {total} points, is the simplest at {first}"
+        if tried < total:
+            why = f"serves at {serves} of the {tried} points where nothing simpler does"
         if given_up := int(found["stopped"][done][:, k].sum()):
             why += f", dearer than the full model at {given_up} and stopped there"
         steps.append(

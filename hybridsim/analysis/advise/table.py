@@ -62,7 +62,7 @@ def _spread(advice: Advice) -> str:
     spread = advice.spread
     assert spread is not None
     ranges = ", ".join(f"{name} in [{low:g}, {high:g}]" for name, (low, high) in spread.ranges.items())
-    return f"with {ranges}: {spread.low:.7g} to {spread.high:.7g}, +-{spread.relative:.2g} of the value"
+    return f"with {ranges}, at the ends: {spread.low:.7g} to {spread.high:.7g}, +-{spread.relative:.2g} of the value"
 
 
 def _cost(seconds: float) -> str:

@@ -58,7 +58,8 @@ class Special:
     kind : "fold" (the branch turns back in the parameter), "branch point" (a multiplier passes +1 and it does not turn:
         another branch crosses, as where a symmetry breaks), "period doubling" (a multiplier passes -1), "torus" (a pair
         passes the unit circle), "sequence" (the modes it goes through change: a graze, or a stop that appears).
-    parameter : its value there, interpolated.
+    parameter : its value there, interpolated between two points of the branch: three or four digits of a period
+        doubling, more of a fold.
     index : number of the point before it.
     """
 

@@ -139,16 +139,25 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
     return Passings(times, values, scale_of(solution, late), point_at_end(solution))
 
 
-def free_passings(motion: Motion, start: Point | None, duration: float) -> Passings:
-    """At every rise of the state that moves most through the middle of its range, in the later half of a run."""
+def free_passings(motion: Motion, start: Point | None, duration: float, largest: np.ndarray) -> Passings:
+    """At every rise of the state that moves most through the middle of its range, in the later half of a run.
+
+    largest (n,): the scale of each state when it moved most, brought up to date. A motion that has died out beside that
+    rests: what is left of it may be rounding, which may repeat.
+    """
     solution = motion.run(start, duration)
     n, scale = len(motion.names), scale_of(solution, 0.0)
+    np.maximum(largest, scale[:n], out=largest)
     late = motion.run(point_at(solution, 0.5 * duration), 0.5 * duration)
     orbit = orbit_of(late, states_only=True)
     low, high = orbit.extremes
     moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
     end = point_at_end(late)
     if moves.max(initial=0.0) <= RESTS:
+        return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
+    if died_out(low, high, largest):
+        for _ in range(_LONGER):  # to where it goes
+            end = point_at_end(motion.run(end, duration))
         return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
     j = int(np.argmax(moves))
     times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
@@ -157,4 +166,11 @@ def free_passings(motion: Motion, start: Point | None, duration: float) -> Passi
     return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
 
 
+def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
+    """Whether nothing is left of a motion whose states (n,) stay between low and high."""
+    return bool((high - low <= _DIED_OUT * largest).all())
+
+
+_DIED_OUT = 1e-9
+_LONGER = 2  # times as long again
 RESTS = 1e-12  # no state moves by more, relative to its largest size

@@ -15,8 +15,9 @@ from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
-from hybridsim.analysis.steady.settling import Passings, forced_passings, free_passings, relative
+from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
+from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
 
@@ -163,6 +164,7 @@ class _Search:
         self.newton_steps, self.periods = 0, 0
         self.duration = motion.model.duration_value() or _DURATION
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
+        self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
         self.expected = 0  # periods that the motion is expected to need until it has settled
 
     def run(self) -> SteadyState:
@@ -192,7 +194,7 @@ class _Search:
             self.periods += count
             return forced_passings(self.motion, start, self.period, count)
         for _ in range(_LONGER):
-            passings = free_passings(self.motion, start, self.duration)
+            passings = free_passings(self.motion, start, self.duration, self.largest)
             if passings.rests or len(passings.times) >= _FEWEST:
                 break
             self.duration *= 4.0
@@ -204,6 +206,17 @@ class _Search:
 
     def _closed(self, passings: Passings) -> Orbit | None:
         """The periodic orbit that the motion is on, or comes to by Newton's method."""
+        orbit = self._repeated(passings)
+        return None if orbit is None or self._has_died_out(orbit) else orbit
+
+    def _has_died_out(self, orbit: Orbit) -> bool:
+        """Whether a closed orbit without forcing is a point of rest, about which rounding goes round."""
+        if self.period is not None:
+            return False
+        low, high = ranges(self.motion.run(orbit.start, orbit.period), 0.0)
+        return died_out(low, high, self.largest)
+
+    def _repeated(self, passings: Passings) -> Orbit | None:
         multiple = passings.repeats_after(self.tol)
         if multiple is not None:
             return self._orbit(passings, multiple)
@@ -269,7 +282,11 @@ class _Search:
             kind = UNSETTLED
         message = (
             f"{kind} after {self.periods} periods: largest Lyapunov exponent {exponent:.3g} per unit of time"
-            + (f", and {leaving} goes on moving away: leave out what only adds up" if leaving else "")
+            + (
+                f", and {leaving} goes on moving away: nothing holds it back, or it only adds up"
+                if leaving
+                else ""
+            )
         )
         found = _found(self.motion, kind, replace(self._orbit(passings, 1), residual=passings.residual(1)))
         found.lyapunov, found.message, found.periods = exponent, message, self.periods

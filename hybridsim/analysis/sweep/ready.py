@@ -127,6 +127,11 @@ def ready_measure(
     for word in asked:
         stem, _, last = word.rpartition(".")
         is_harmonic = word.startswith("harmonic.") and last.isdecimal()
+        if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
+            raise UsageError(
+                f"{word} is of a steady state, and after reads a period of a plain run",
+                remedy="leave one of them out; residual says how far a run is from repeating",
+            )
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
                 f"there is no measure {word!r}",
