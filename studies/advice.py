@@ -209,12 +209,14 @@ def page(
         "",
         "## The map",
         "",
-        "![The simplest adequate model over F0/N and r: nothing moves at the lower edge, Karnopp's band above it, then "
-        "the closed form, and equivalent viscous damping at resonance](../images/advice-map.png)",
+        "![The simplest adequate model over force and frequency: nothing moves at the lower edge, Karnopp's band above "
+        "it and at low frequencies, then tanh, then the closed form, and equivalent viscous damping at resonance]"
+        "(../images/advice-map.png)",
         "",
-        "*The same question on a grid. Below F0/N = 0.5 nothing moves. Where the motion stops no linear model serves; "
-        "what does is a force that is set-valued in all but name (Karnopp, v0 = 1 % of the largest speed), as dear as "
-        "the full model. Where it does not stop, Den Hartog's formula is exact; near resonance a damper is enough.*",
+        "*The same question on a grid; N = 40 N. Below F0 = 20 N nothing moves. Where the motion stops, what serves is "
+        "mostly a force that is set-valued in all but name (Karnopp, v0 = 1 % of the largest speed), at some "
+        "frequencies one that is smoothed over the same speed (tanh, arctan); these are as dear as the full model or "
+        "dearer. Where it does not stop, Den Hartog's formula is exact; near resonance a damper is enough.*",
         "",
     ]
     return "\n".join(lines)

@@ -85,6 +85,13 @@ step comes after the claims: where the motion stops, for how long, and how far o
 | --- | --- | --- |
 {rows}
 
+**Words.** r = omega/omega_n; A is half the range of x in a period, E the integral of x**2 over it. A0, E0: without
+friction; A1, E1: "stick-slip not considered" (`rk4-sign`); A2, E2: considered; A_D = |A1 - A2|/A2, E_D likewise. What
+the paper leaves open about the dichotomy, each with its readings: *v kept* or *v zero*, what becomes of the velocity of
+a body that has come to stick; *release step* or *located*, whether it breaks away at the next step or where the load
+reaches the limit; *force by step* or *by stage*, whether the side of friction is taken once a step or at each of RK4's
+stages (*sign by step*, *by stage* for A1); *full-step* or *rest-of-step*, how far it goes on after an event.
+
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
 `hybridsim study he2026{quick} --out FOLDER`."""
 
