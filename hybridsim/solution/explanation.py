@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 _LEGEND = """\
   (a mode lasts while its guards g are >= 0; g', g'' are their rates along the motion in that mode, and the first that
   is not zero decides; exactly: the event itself makes it zero, so that there is no rounding in it)"""
-_SERIES = 12  # events that are looked at to say how they accumulated
+_SERIES = 24  # events that are looked at to say how they accumulated
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,8 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
     """What led to an instant at which no segment ends: the limit of a series of events."""
     times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
-    turn, factor = turn_of(gaps, 3, 2.0 * SAME_FACTOR)
+    told = takewhile(lambda gap: gap * SAME_FACTOR > math.ulp(event.t), gaps)  # from rounding of the instants
+    turn, factor = turn_of(list(told), 3, 2.0 * SAME_FACTOR)
     shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
     every = "each" if turn == 1 else f"every {turn} of them"
     series = f", {every} shorter by the factor {factor:.6g}" if turn else ""

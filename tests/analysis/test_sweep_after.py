@@ -187,7 +187,7 @@ def test_what_has_no_last_period_is_refused() -> None:
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=0)
     with pytest.raises(UsageError, match="save is given beside after"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, save="all")
-    with pytest.raises(UsageError, match="no measure 'kind'"):
+    with pytest.raises(UsageError, match="kind is of a steady state"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["kind"], after=3)
 
 
