@@ -175,10 +175,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
 
 @allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
-    """A block of several coordinates: exp(mean d) times the series of the rest, in parts where that is large.
-
-    NaN where there would be too many parts: their roundings alone would be more than what is asked for.
-    """
+    """A block of several coordinates: exp(mean d) times the series of the rest; NaN where that takes too many parts."""
     size = end - first
     mean = 0.0 + 0.0j
     for j in range(first, end):
@@ -243,10 +240,7 @@ def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
 
 @inlined
 def state_sizes(lin: Any, k: int, before: Any, after: Any, scale: Any) -> None:
-    """What the states are summed from, in size: at least so large is a rounding error relative to a unit roundoff.
-
-    before, after: modal coordinates at both ends of a segment.
-    """
+    """What the states are summed from, in size, with modal coordinates before and after at the ends of a segment."""
     for i in range(scale.shape[0]):
         total = 0.0
         for j in range(lin.counts[k]):
@@ -275,10 +269,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @polynomial_kernel
 def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
-    """A polynomial of d and its derivative: Horner's rule on `start` and then the coefficients, highest first.
-
-    The even powers and the odd ones are two polynomials of d**2: neither waits for the other.
-    """
+    """A polynomial, `start` and then its coefficients, highest first, and its derivative: even and odd powers apart."""
     square = d * d
     even, odd = (start, 0.0) if count % 2 == 0 else (0.0, start)
     even_rate = odd_rate = 0.0
