@@ -149,8 +149,7 @@ def sum_up(
     """Add segments first to last - 1 of a record to a `Stretch`, the first one from local time `begin` on.
 
     record: ends, rows, modes, coordinates, jumps as `hybridsim.engine.exact_leap` writes them; hold: of each component.
-    room: v (J,); slopes and bounds of
-    third derivatives (3, n). False where a segment turns too often.
+    room: v (J,); slopes and bounds of third derivatives (3, n). False where a segment turns too often.
     """
     ends, rows, modes, coordinates, jumps = record
     v, slopes = room

@@ -169,6 +169,14 @@ def test_a_motion_that_dies_out_rests(pull: str) -> None:
     assert found.amplitude["x"] < 1e-12
 
 
+def test_a_small_cycle_is_not_taken_for_rest_because_its_start_was_far_away() -> None:
+    """r' = r (1 - r**2) comes from far away, by both states, to a circle of radius 1, with a period of 2 pi."""
+    states = [hs.State("x", 1e10, "x - y - x*(x**2 + y**2)"), hs.State("y", 1e10, "x + y - y*(x**2 + y**2)")]
+    found = hs.steady_state(hs.Model("circle", states=states))
+    assert found.kind == "periodic"
+    assert (found.period, found.amplitude["x"]) == pytest.approx((2.0 * math.pi, 1.0), rel=1e-10)
+
+
 @pytest.mark.parametrize("mu", [0.5, 0.76])
 def test_below_the_onset_of_mode_coupling_all_comes_to_rest(mu: float) -> None:
     """Sliding on; just below the onset, at 0.765, the decay takes hundreds of periods."""

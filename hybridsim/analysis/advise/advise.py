@@ -72,7 +72,7 @@ def advise(
         Values of parameters as in `sweep`: a map of the simplest adequate rung.
     uncertain : mapping of str to tuple of float, optional
         Ranges of parameters, {"mu": (0.28, 0.32)}, to be told whether the tolerance is finer than what they leave
-        open.
+        open, by the corners of the box they make: an extreme inside, as at a resonance, is not seen.
     t_span : tuple of float, optional
         Of the run that is asked about; without it the question is about the steady motion.
     params, x0 : mapping of str to float, optional

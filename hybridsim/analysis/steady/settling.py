@@ -156,9 +156,13 @@ def free_passings(motion: Motion, start: Point | None, duration: float, largest:
     if moves.max(initial=0.0) <= RESTS:
         return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
     if died_out(low, high, largest):
-        for _ in range(_LONGER):  # to where it goes
-            end = point_at_end(motion.run(end, duration))
-        return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
+        following = motion.run(end, _LONGER * duration)  # to where it goes
+        left = np.subtract(*ranges(following, following.t_end - 0.5 * duration)[::-1])
+        # what is small beside its start alone, and a motion of its own, goes on as it is
+        if ((left <= 0.5 * (high - low)) | (left <= _ROUNDED * largest)).all():
+            end = point_at_end(following)
+            return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
+        largest[:] = 0.5 * (high - low)
     j = int(np.argmax(moves))
     times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
     points = [point_at(late, t) for t in times]
@@ -171,6 +175,6 @@ def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
     return bool((high - low <= _DIED_OUT * largest).all())
 
 
-_DIED_OUT = 1e-9
+_DIED_OUT, _ROUNDED = 1e-9, 1e-13
 _LONGER = 2  # times as long again
 RESTS = 1e-12  # no state moves by more, relative to its largest size
