@@ -13,6 +13,7 @@ from hybridsim.engine.packs import packed
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
 FIRED, DISCRETE, DISCRETE_AT = range(3)  # of `Work.whole`
 AT, AT_ERROR = range(2)  # of `Work.real`
+SETTLE, LEAP = range(2)  # of `Work.reached`
 
 
 class Functions(NamedTuple):
@@ -40,7 +41,8 @@ class Work(NamedTuple):
     """Room for one event: series with bounds (registers, 4), judged (2, guards, 4): those of guards and their bounds,
     what holds after it, candidates.
 
-    functions (5,): those of `Functions`. reached (1,): address of the kernel that settles it. whole, real: what the
+    functions (5,): those of `Functions`. reached (2,): addresses of kernels: the one that settles it, and that of
+    a leap. whole, real: what the
     places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes (n,) of the flow there.
     x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
     factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled. sides,
@@ -103,6 +105,13 @@ def find_modes(modes: Any, z: Any) -> int:
     return -1
 
 
+@inlined
+def called_by(work: Any) -> Any:
+    """The functions that the loop calls which a work space is for."""
+    f = work.functions
+    return Functions(f[0], f[1], f[2], f[3], f[4])
+
+
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
     """Room for the events of one system; for linear modes also for their functions of time."""
     guards, count = system.guard_count, len(system.automata)
@@ -119,7 +128,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
     work: Work = packed(
         Work(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
-            reached=numbers(1),
+            reached=numbers(2),
             whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at], dtype=np.int64),
             real=np.zeros(2),
             **{name: np.empty(system.n) for name in ("y", "y_error", "slopes", "x_after")},

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import find_modes, put
+from hybridsim.engine.event_work import LEAP, called_by, find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
@@ -28,18 +28,35 @@ from hybridsim.engine.linear_kernels import (
     states_of,
     to_modal,
 )
-from hybridsim.engine.segment_end import is_crowded, moved_on, settle_and_move_on, state_errors
+from hybridsim.engine.packs import packed
+from hybridsim.engine.segment_end import (
+    is_crowded,
+    moved_on,
+    reach_settling,
+    settle_and_move_on,
+    state_errors,
+)
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
 _DONE = -1.0  # in place of a guard's size: its first zero is known
 
 
 class Room(NamedTuple):
-    """Scratch arrays: modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state.
+    """What a leap is to do, and scratch arrays.
 
-    hints (K, G): how long a segment lasted that a guard ended.
+    rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), instants: target (2,)
+    and clock (2,), which is moved on; how many segments were
+    committed (1,). Modal coordinates (J,), terms of
+    a guard (2, TERMS), those at the start (G, TERMS + 2), a state; hints (K, G): how long a segment lasted that a guard
+    ended.
     """
 
+    rates: np.ndarray
+    places: np.ndarray
+    longest: np.ndarray
+    target: np.ndarray
+    clock: np.ndarray
+    committed: np.ndarray
     c: np.ndarray
     v: np.ndarray
     terms: np.ndarray
@@ -125,29 +142,42 @@ def first_exit_of(
         horizon *= 4.0
 
 
-@kernel
-def exact_leap(
-    functions: Any,
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    places: Any,
-    longest: float,
-    target: Any,
-    clock: Any,
-    state: Any,
-    work: Any,
-    room: Any,
-    record: Any,
-) -> tuple[int, int]:
-    """Go from event to event; returns why it ended and how many segments were committed.
+def room_for(system: Any, tables: Any) -> Room:
+    """Room for leaps of a system by tables like these, as kernels take it."""
+    n, widest, layout = system.n, tables.values.shape[1], system.layout
+    room: Room = packed(
+        Room(
+            rates=np.zeros(layout.phases),
+            places=np.array([layout.origin_at, layout.phases_at], dtype=np.int64),
+            longest=np.zeros(1),
+            target=np.zeros(2),
+            clock=np.zeros(2),
+            committed=np.zeros(1, dtype=np.int64),
+            c=np.zeros(widest, dtype=complex),
+            v=np.zeros(widest, dtype=complex),
+            terms=np.zeros((2, TERMS)),
+            starts=np.zeros((system.guard_count, TERMS + 2)),
+            hints=np.zeros(tables.farthest.shape),
+            scale=np.empty(n),
+            pace=np.empty(3),
+        )
+    )
+    return room
 
-    places, target, clock, state, work as for `leap`; longest: of a segment. room: scratch arrays. record: what the
-    segments and events are written to.
+
+def exact_leap(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+) -> int:
+    """Go from event to event; returns why it ended. It is reached by its address, so that
+    it is compiled once for all that go by it.
+
+    automata, tapes, inputs, state, work as for `leap`; lin: tables of linear modes. record: what the segments and
+    events are written to.
     """
-    rates, origin_at, phases_at = places
-    place = (origin_at, phases_at)
+    place, rates = (room.places[0], room.places[1]), room.rates
+    longest, target, clock, functions = room.longest[0], room.target, room.clock, called_by(work)
+    committed = room.committed
+    committed[0] = 0
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
     c, v, terms, scale = room.c, room.v, room.terms, room.scale
@@ -165,20 +195,20 @@ def exact_leap(
         k = find_modes(tapes.modes, z)
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
-            return AT_TARGET, n_segments
+            return AT_TARGET
         if k < 0:
-            return STOPPED, n_segments
+            return STOPPED
         if n_segments >= ends.shape[0]:
-            return FULL, n_segments
+            return FULL
         if not is_known:
             set_origin(place, rates, clock[0], clock[1], p)
             functions_of_time(lin, 0.0, p, work.factors, work.w)
         to_modal(lin, k, x, work.w, c)
         fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, hints, room.starts, terms, v)
         if fired == _OPEN:
-            return STOPPED, n_segments
+            return STOPPED
         if s > longest:
-            return STOPPED, n_segments
+            return STOPPED
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
         state_sizes(lin, k, c, v, scale)
@@ -187,7 +217,7 @@ def exact_leap(
             put(y1, y)
         for i in range(n):
             if not abs(y[i]) < math.inf:
-                return STOPPED, n_segments
+                return STOPPED
         ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
         rows[n_segments], fires[n_segments] = k, fired
         put(z, modes[n_segments])
@@ -201,9 +231,10 @@ def exact_leap(
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
             clock[0], clock[1] = target[0], target[1]
-            return AT_TARGET, n_segments + 1
+            committed[0] = n_segments + 1
+            return AT_TARGET
         if is_crowded(s, clock, pace):
-            return STOPPED, n_segments
+            return STOPPED
         # the event is settled at the origin of the segment that follows, whose functions of time these are
         high, low = clock[0], clock[1]
         clock[0], clock[1] = moved_on(high, low, s)
@@ -219,10 +250,27 @@ def exact_leap(
         if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
-            return STOPPED, n_segments
+            return STOPPED
         is_known = automata.hold[automata.owner[fired]] >= 0  # others may have changed what is in p
         put(y1, jumps[n_segments, 2])
         n_segments += 1
+        committed[0] = n_segments
+
+
+@kernel
+def leap_at_address(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+) -> int:
+    """Call `exact_leap`."""
+    return call_kernel(work.reached[LEAP], (automata, tapes, inputs, lin, state, work, room, record))
+
+
+def reach_leap(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+) -> None:
+    """Compile what a leap needs, if need be, and put the addresses where kernels find them."""
+    reach_settling(automata, tapes, inputs, lin, state, work)
+    work.reached[LEAP] = kernel_address(exact_leap, automata, tapes, inputs, lin, state, work, room, record)
 
 
 @inlined

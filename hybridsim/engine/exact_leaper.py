@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.desk import Desk
-from hybridsim.engine.event_work import functions_of, work_space
-from hybridsim.engine.exact_leap import Record, Room, exact_leap
+from hybridsim.engine.event_work import work_space
+from hybridsim.engine.exact_leap import Record, leap_at_address, reach_leap, room_for
 from hybridsim.engine.jit import Door
 from hybridsim.engine.leap import AT_TARGET, FULL
-from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
-from hybridsim.engine.packs import Sheet, packed
-from hybridsim.engine.segment_end import reach_settling
+from hybridsim.engine.packs import Sheet
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -28,7 +25,7 @@ from hybridsim.engine.trajectory import Trajectory
 _SEGMENTS = 1024  # room for one call
 _NONE = np.zeros(0, dtype=np.int64)
 
-_leap = Door(exact_leap)
+_leap = Door(leap_at_address)
 
 
 class ExactLeaper:
@@ -37,13 +34,7 @@ class ExactLeaper:
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # the farthest that a segment might have gone so far
-        self.shelf, self.automata, self.functions = (
-            shelf_of(system),
-            automata_of(system),
-            functions_of(system),
-        )
-        layout = system.layout
-        self.places = (system.rates, layout.origin_at, layout.phases_at)
+        self.shelf, self.automata = shelf_of(system), automata_of(system)
 
     @property
     def place(self) -> np.ndarray:
@@ -65,41 +56,29 @@ class ExactLeaper:
         if found is None:
             return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         tables, spare = found
+        sheet = self._sheet(tables)
+        memory = sheet.blank()
+        rows = sheet.packed(memory)
         try:
             desk = spare.pop()
         except IndexError:
-            desk = Desk.of(outcome, p, *self._scratch(tables))
-            reach_settling(self.automata, tapes, inputs, tables, desk.as_packed, desk.work)
+            work = work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1)
+            desk = Desk.of(outcome, p, work, room_for(self.system, tables))
+            reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
         desk.take_up(outcome, p)
-        sheet = self._sheet(tables)
-        clock, to, memory = np.array(origin), np.array(target), sheet.blank()
-        rows, began = sheet.packed(memory), perf_counter()
-        code, count = _leap(
-            self.functions, self.automata, tapes, inputs, tables, self.places, self.longest,
-            to, clock, desk.as_packed, desk.work, desk.room, rows,
-        )  # fmt: skip
+        room = desk.room
+        room.rates[:], room.longest[0] = self.system.rates, self.longest
+        room.clock[:], room.target[:] = origin, target
+        began = perf_counter()
+        code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
         record.counters.kernel_time += perf_counter() - began
-        after = desk.outcome()
+        after, clock, count = desk.outcome(), room.clock.copy(), int(room.committed[0])
         spare.append(desk)
         instants, owners = self._commit(tables, sheet.rows(memory), count, after.z, clock, record)
         self.shelf.surround(after.z)
         goes_on = code == FULL or (count > 0 and len(self.shelf.tapes.modes) != len(tapes.modes))
         end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
         return Landing(Instant(*clock.tolist()), after, end, instants, owners)
-
-    def _scratch(self, tables: LinearTables) -> tuple[Any, Any]:
-        """Room for events, and scratch arrays of the kernel."""
-        n, widest = self.system.n, tables.values.shape[1]
-        room = Room(
-            c=np.zeros(widest, dtype=complex),
-            v=np.zeros(widest, dtype=complex),
-            terms=np.zeros((2, TERMS)),
-            starts=np.zeros((self.system.guard_count, TERMS + 2)),
-            hints=np.zeros(tables.farthest.shape),
-            scale=np.empty(n),
-            pace=np.empty(3),
-        )
-        return work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1), packed(room)
 
     def _sheet(self, tables: LinearTables) -> Sheet:
         """What the kernel writes to; the trajectory keeps it, events longer than segments."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from hybridsim.engine.decide import FINE, choose
 from hybridsim.engine.event_verdicts import guard_series, judge_candidate, judge_members
-from hybridsim.engine.event_work import Before, find_modes, put
+from hybridsim.engine.event_work import Before, called_by, find_modes, put
 from hybridsim.engine.jets import UNIT, run_series
 from hybridsim.engine.jit import call, kernel, merged
 from hybridsim.engine.leap import set_origin
@@ -21,7 +21,6 @@ _UNKNOWN = -1  # in place of a mode
 
 @kernel
 def plain_start(
-    functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -39,7 +38,7 @@ def plain_start(
     surfaces, and the component of each surface.
     """
     rates, origin_at, phases_at, pin_at = places
-    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    x, x_error, z, p, functions = state.x, state.x_error, state.z, state.p, called_by(work)
     set_origin((origin_at, phases_at), rates, t0, 0.0, p)
     for i in range(x.shape[0]):
         x_error[i] = 0.0

@@ -28,6 +28,11 @@ class FleetTables:
     numbers : of the points (m,).
     fields : of the tables, by name, where they differ from point to point one behind the other.
     modes : how many vectors of modes they are for.
+
+    Attributes
+    ----------
+    first : the tables of the first point, for kernels; its type is that of all.
+    addresses : of the packs of all points (m,).
     """
 
     def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
@@ -35,28 +40,27 @@ class FleetTables:
         self.form = len(fields["kinds"]), len(fields["factor_start"]), modes, fields["values"].shape[1]
         counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
         shared = {name for name in LinearTables._fields if _is_shared(name)}
-        self._arrays = fields  # the pack holds addresses alone
-        first = LinearTables(
-            **{
-                name: array if name in shared else array[0] if name in _COMPUTED else array[: counts[name]]
-                for name, array in fields.items()
-            }
+        self._arrays = fields  # the packs hold addresses alone
+        self.first: Any = packed(
+            LinearTables(
+                **{
+                    name: array
+                    if name in shared
+                    else array[0]
+                    if name in _COMPUTED
+                    else array[: counts[name]]
+                    for name, array in fields.items()
+                }
+            )
         )
-        self._pack: Any = packed(first)
-        self._rows = self._pack.table.reshape(len(LinearTables._fields), -1)
-        self._starts = self._rows[:, 0].copy()
-        self._steps = np.array(
-            [
-                0 if name in shared else fields[name].strides[0] * counts[name]
-                for name in LinearTables._fields
-            ],
-            dtype=np.int64,
-        )
-
-    def at(self, k: int) -> Any:
-        """The tables of the k-th point of the group, until the next call."""
-        self._rows[:, 0] = self._starts + k * self._steps
-        return self._pack
+        steps = [
+            0 if name in shared else fields[name].strides[0] * counts[name] for name in LinearTables._fields
+        ]
+        rows = np.tile(self.first.table, (len(numbers), 1))
+        by_array = rows.reshape(len(numbers), len(steps), -1)
+        by_array[:, :, 0] += np.arange(len(numbers))[:, None] * np.array(steps, dtype=np.int64)
+        self._rows = rows
+        self.addresses = rows.ctypes.data + np.arange(len(numbers)) * rows.strides[0]
 
 
 def _is_shared(name: str) -> bool:

@@ -26,7 +26,7 @@ from hybridsim.engine.event_work import (
     DISCRETE_AT,
     FIRED,
     Before,
-    Functions,
+    called_by,
     find_modes,
     put,
 )
@@ -175,8 +175,7 @@ def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, w
 
     lin: tables of linear modes, empty for others. state: `hybridsim.engine.segment_end.State`.
     """
-    f, fired = work.functions, work.whole[FIRED]
-    functions = Functions(f[0], f[1], f[2], f[3], f[4])
+    functions, fired = called_by(work), work.whole[FIRED]
     at = Before(work.real[AT], work.real[AT_ERROR], work.y, work.y_error, state.p, state.z)
     x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
     if not settle_ordinary(functions, automata, tapes, inputs, lin, at, fired, x, x_error, z, p, work):

@@ -29,6 +29,7 @@ if ENABLED:
     from numba.extending import (
         NativeValue,
         infer_getattr,
+        intrinsic,
         lower_getattr_generic,
         models,
         register_model,
@@ -114,6 +115,17 @@ if ENABLED:
         data = builder.inttoptr(loaded(0), context.get_data_type(array_type.dtype).as_pointer())
         populate_array(array, data=data, shape=shape, strides=strides, itemsize=word(size), meminfo=None)
         return array._getvalue()
+
+    @intrinsic
+    def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
+        """The pack whose table is at an address, of the type of another."""
+        return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
+
+else:
+
+    def pack_at(address: int, like: Any) -> Any:
+        """Nothing is compiled: there are no addresses."""
+        raise NotImplementedError
 
 
 def packed(arrays: Any) -> Any:

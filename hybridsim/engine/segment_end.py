@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.accumulation import CLOSING_IN
-from hybridsim.engine.event_work import AT, AT_ERROR, FIRED
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, SETTLE
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
@@ -65,7 +65,7 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
 
 def reach_settling(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
     """Compile the kernel that settles events, if need be, and put its address where loops find it."""
-    work.reached[0] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
+    work.reached[SETTLE] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
 
 
 @inlined
@@ -87,7 +87,7 @@ def settle_and_move_on(
     `State`, moved on with the clock.
     """
     work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
-    if call_kernel(work.reached[0], (automata, tapes, inputs, lin, state, work)) == 0:
+    if call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work)) == 0:
         return False
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)
     return True

@@ -83,10 +83,13 @@ class Batch(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """How a worker that shares memory with the sweep is stopped, and tells that a point is done."""
+    """How a worker that shares memory with the sweep is asked to stop, and tells how many more points are done."""
 
-    stopped: Callable[[], bool]
-    tell: Callable[[], None]
+    goes_on: Callable[[], bool]
+    tell: Callable[[int], None]
+
+
+_NOBODY = Watch(lambda: True, lambda points: None)
 
 
 def new_token() -> str:
@@ -100,7 +103,7 @@ _jobs: dict[str, Job] = {}
 def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) -> Batch:
     """Measure the model at some points, one after the other."""
     if watch is None:
-        job = _kept(job)
+        job, watch = _kept(job), _NOBODY
     began = time.perf_counter()
     together = None if job.chained else _together(job, points, watch)
     if together is not None:
@@ -108,30 +111,21 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
     outcomes = []
     previous: Any = None
     for settings in points:
-        if watch is not None and watch.stopped():
+        if not watch.goes_on():
             break
         outcome, result = _run(job, settings, previous)
         outcomes.append(outcome)
         previous = result if job.chained else None
-        if watch is not None:
-            watch.tell()
+        watch.tell(1)
     return Batch(outcomes, time.perf_counter() - began)
 
 
-def _together(job: Job, points: Sequence[Settings], watch: Watch | None) -> list[Outcome] | None:
+def _together(job: Job, points: Sequence[Settings], watch: Watch) -> list[Outcome] | None:
     """By a measure that takes many points at once, where it takes these."""
     together = getattr(job.measure, "together", None)
     if together is None:
         return None
-
-    def goes_on() -> bool:
-        if watch is not None:
-            watch.tell()
-        return watch is None or not watch.stopped()
-
-    found: list[Outcome] | None = together(
-        job, points, lambda settings: _run(job, settings, None)[0], goes_on
-    )
+    found: list[Outcome] | None = together(job, points, lambda settings: _run(job, settings, None)[0], watch)
     return found
 
 

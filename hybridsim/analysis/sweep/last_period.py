@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.analysis.steady.measures import Measures
-from hybridsim.analysis.sweep.job import DONE, Job, Outcome, Settings
+from hybridsim.analysis.sweep.job import DONE, Job, Outcome, Settings, Watch
 from hybridsim.analysis.sweep.parameters import Setter
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
-    from hybridsim.engine.fleet import Last
+    from hybridsim.engine.fleet import LastPeriods
     from hybridsim.solution import Solution
 
 OF_MOTION = ("period", "residual", "word")
@@ -38,7 +38,7 @@ class MeasuredPeriod(Measures):
         low, high = self._orbit.extremes
         ends = self.solution.y[:, [0, -1]]
         n = len(ends)
-        return _residual(low[:n], high[:n], ends[:, 0], ends[:, 1])
+        return float(_residual(low[:n], high[:n], ends[:, 0], ends[:, 1]))
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ class LastPeriod:
         job: Job,
         points: Sequence[Settings],
         alone: Callable[[Settings], Outcome],
-        goes_on: Callable[[], bool],
+        watch: Watch,
     ) -> list[Outcome] | None:
         """All points in compiled code, but for those that it leaves to `alone`; None where it takes none of them.
 
-        goes_on: asked after each; the outcomes are those of the first points, as far as they were run.
+        Where the watch says to stop, the outcomes are those of the first points, as far as they were run.
         """
         from hybridsim.engine.fleet import Fleet, sails
         from hybridsim.engine.recent import system_of
@@ -88,26 +88,18 @@ class LastPeriod:
             return None
         parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
         outcomes: list[Outcome | None] = [None] * len(points)
-        for i, last in Fleet(system, goes_on).runs(parameters[sound], starts[sound], self.after):
-            number = int(sound[i])
-            if last is None and not goes_on():
-                break
-            if last is None:
-                outcomes[number] = alone(points[number])
-            else:
-                found = {word: read(last) for word, read in zip(self.words, readers, strict=True) if read}
-                outcomes[number] = _outcome(found)
-            if not goes_on():
-                break
-        else:
-            for number in np.flatnonzero([outcome is None for outcome in outcomes]).tolist():
-                outcomes[number] = alone(points[number])
-                if not goes_on():
-                    break
+        for last in Fleet(system, watch.goes_on).runs(parameters[sound], starts[sound], self.after):
+            rows = np.array([read(last) for read in readers if read]).T.tolist()
+            for number, row in zip(sound[last.numbers].tolist(), rows, strict=True):
+                outcomes[number] = _outcome(dict(zip(self.words, row, strict=True)))
+            watch.tell(len(rows))
         known: list[Outcome] = []
-        for outcome in outcomes:
+        for outcome, settings in zip(outcomes, points, strict=True):
             if outcome is None:
-                break
+                if not watch.goes_on():
+                    break
+                outcome = alone(settings)
+                watch.tell(1)
             known.append(outcome)
         return known
 
@@ -142,41 +134,47 @@ def _outcome(found: dict[str, Any]) -> Outcome:
     return Outcome(f"not a number: {', '.join(missing)}" if missing else DONE, found)
 
 
-def _reader(word: str, system: Any) -> Callable[[Last], float] | None:
-    """What reads a word off the sums over the last period; None where they do not hold it."""
+def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | None:
+    """What reads a word off the sums over the last periods (m,); None where they do not hold it."""
     head, _, rest = word.partition(".")
     if head == "period":
-        return lambda last: last.period
+        return lambda last: last.periods
     if head == "residual":
-        return lambda last: _residual(*last.stretch.extremes, *last.stretch.ends)
+        return _residuals
     if head in _OF_STATES and rest in system.names:
         return _of_state(head, system.names.index(rest))
     contacts = [automaton.name for automaton in system.automata]
     if head in _OF_CONTACTS and rest in contacts:
         c = contacts.index(rest)
         if head == "stick_fraction":
-            return lambda last: float(last.stretch.held[0, c] / last.period)
+            return lambda last: last.stretch.held[:, 0, c] / last.periods
         # a stretch that goes on over the end of the period counts once, one without end not at all
-        return lambda last: float(last.stretch.held[1, c] - last.stretch.holding[:, c].all())
+        return lambda last: last.stretch.held[:, 1, c] - last.stretch.holding[:, :, c].all(axis=1)
     return None
 
 
-def _of_state(head: str, i: int) -> Callable[[Last], float]:
-    def read(last: Last) -> float:
-        low, high = last.stretch.extremes[:, i].tolist()
-        whole, squares = last.stretch.integrals[:, i].tolist()
+def _of_state(head: str, i: int) -> Callable[[LastPeriods], np.ndarray]:
+    def read(last: LastPeriods) -> np.ndarray:
+        low, high = last.stretch.extremes[:, :, i].T
+        whole, squares = last.stretch.integrals[:, :, i].T
         if head == "amplitude":
-            return float(0.5 * (high - low))
+            return np.asarray(0.5 * (high - low))
         if head == "peak":
-            return float(max(abs(low), abs(high)))
+            return np.maximum(np.abs(low), np.abs(high))
         if head == "mean":
-            return float(whole / last.period)
-        return float({"maximum": high, "minimum": low, "energy": squares}[head])
+            return np.asarray(whole / last.periods)
+        return {"maximum": high, "minimum": low, "energy": squares}[head]
 
     return read
 
 
-def _residual(low: np.ndarray, high: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+def _residuals(last: LastPeriods) -> np.ndarray:
+    extremes, ends = last.stretch.extremes, last.stretch.ends
+    return _residual(extremes[:, 0], extremes[:, 1], ends[:, 0], ends[:, 1])
+
+
+def _residual(low: np.ndarray, high: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The largest change relative to half of the range, over the last axis: of the states."""
     scale = np.maximum(0.5 * (high - low), _SMALLEST * np.maximum(abs(low), abs(high)))
-    moved = scale > 0.0
-    return float((np.abs(after - before)[moved] / scale[moved]).max(initial=0.0))
+    change = np.abs(after - before)
+    return np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0).max(axis=-1, initial=0.0)

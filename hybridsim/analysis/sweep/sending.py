@@ -78,7 +78,7 @@ class Sending:
             Where the executor cannot take the work.
         """
         shares = isinstance(executor, ThreadPoolExecutor)
-        watch = Watch(self._stop.is_set, self._count) if shares else None
+        watch = Watch(lambda: not self._stop.is_set(), self._count) if shares else None
         waiting = self._pieces.next()
         try:
             while waiting is not None or self._under_way:
@@ -113,9 +113,9 @@ class Sending:
     def _done(self) -> int:
         return max(self._collected.done, self._shared_done)
 
-    def _count(self) -> None:
+    def _count(self, points: int) -> None:
         with self._lock:
-            self._shared_done += 1
+            self._shared_done += points
 
     def _take(self, done: set[Future[Batch]]) -> None:
         for future in done:
