@@ -13,9 +13,9 @@ from hybridsim.engine.decide import (
     open_question,
     side_after,
 )
-from hybridsim.engine.event_work import find_modes
+from hybridsim.engine.event_work import called_by, find_modes, located
 from hybridsim.engine.jets import ORDER, run_series
-from hybridsim.engine.jit import call, call_series, inlined, kernel
+from hybridsim.engine.jit import call, call_series, inlined, kernel, merged
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
 
 UNKNOWN = -2  # in place of a verdict
@@ -155,32 +155,39 @@ def judge_members(
     return verdict
 
 
+@merged
+def cluster_of(automata: Any, c: int) -> Any:
+    """The components whose modes are decided together with that of one."""
+    return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
+
+
 @kernel
 def judge_candidate(
-    functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    at: Any,
+    state: Any,
+    work: Any,
     fired: int,
     is_known: bool,
-    x: Any,
-    x_error: Any,
-    cluster: Any,
+    c: int,
     number: int,
-    work: Any,
 ) -> int:
     """Verdict on the modes in `work.trial`, with what goes with it in the work space's rows of that number.
 
-    UNKNOWN where these modes are not on the shelf. is_known: their guards' series are there.
+    state: before the event; what follows it has the states `work.x_after`, which are good to `work.slopes`. c: one of
+    the components that are decided. UNKNOWN where these modes are not on the shelf. is_known: their guards' series are
+    there.
     """
     k = find_modes(tapes.modes, work.trial)
     if k < 0:
         return UNKNOWN
+    at, cluster = located(state, work), cluster_of(automata, c)
+    x, x_error = work.x_after, work.slopes
     if not is_known:
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-    continuous = is_continuous(functions, automata, at, x, work.trial, cluster, fired, work.jumps)
+    continuous = is_continuous(called_by(work), automata, at, x, work.trial, cluster, fired, work.jumps)
     work.smooth[number] = continuous
     return judge_members(
         automata, lin, k, at, x, x_error, work.trial, cluster, fired, True, continuous, work,

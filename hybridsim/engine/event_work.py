@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.jets import ORDER
-from hybridsim.engine.jit import ENABLED, inlined
+from hybridsim.engine.jit import ENABLED, inlined, merged
 from hybridsim.engine.packs import packed
 
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
@@ -110,6 +110,12 @@ def called_by(work: Any) -> Any:
     """The functions that the loop calls which a work space is for."""
     f = work.functions
     return Functions(f[0], f[1], f[2], f[3], f[4])
+
+
+@merged
+def located(state: Any, work: Any) -> Before:
+    """The event in a work space; state: at the beginning of the segment that it ends."""
+    return Before(work.real[AT], work.real[AT_ERROR], work.y, work.y_error, state.p, state.z)
 
 
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:

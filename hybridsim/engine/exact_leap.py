@@ -82,26 +82,14 @@ class Record(NamedTuple):
 
 
 @kernel
-def first_exit_of(
-    lin: Any,
-    tapes: Any,
-    k: int,
-    c: Any,
-    bound: float,
-    sides: Any,
-    orders: Any,
-    floors: Any,
-    hints: Any,
-    starts: Any,
-    room: Any,
-    v: Any,
-) -> tuple[int, float]:
+def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
     """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
 
     Waves have their zeros in closed form. Of the others the guard that falls fastest goes first: the rest need to be
     followed no farther than it lasts. All are followed up to one horizon, and then to one four times as far: most stay
     positive for long.
     """
+    c, starts, hints, sides, orders = room.c, room.starts, room.hints, state.sides, state.orders
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
     lead, soonest, horizon, known, until = first, math.inf, bound, _NONE, bound
     for i in range(first, last):
@@ -128,9 +116,7 @@ def first_exit_of(
             if starts[i - first, TERMS] == _DONE:
                 continue
             g = tapes.active[i]
-            outcome, at = first_zero(
-                lin, k, g, c, s, sides[g], orders[g], floors[g], hints[k, g], starts[i - first], room, v
-            )
+            outcome, at = first_zero(lin, k, g, i - first, s, state, room)
             if outcome == OPEN:
                 return _OPEN, at
             if outcome == FOUND:
@@ -179,8 +165,7 @@ def exact_leap(
     committed = room.committed
     committed[0] = 0
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
-    sides, orders, floors = state.sides, state.orders, state.floors
-    c, v, terms, scale = room.c, room.v, room.terms, room.scale
+    c, v, scale = room.c, room.v, room.scale
     y, y1, y_error, slopes = work.y, work.x_after, work.y_error, work.slopes
     ends, clocks, rows, modes = record.ends, record.clocks, record.rows, record.modes
     vectors, coordinates, fires, jumps = record.vectors, record.coordinates, record.fires, record.jumps
@@ -204,7 +189,7 @@ def exact_leap(
             set_origin(place, rates, clock[0], clock[1], p)
             functions_of_time(lin, 0.0, p, work.factors, work.w)
         to_modal(lin, k, x, work.w, c)
-        fired, s = first_exit_of(lin, tapes, k, c, bound, sides, orders, floors, hints, room.starts, terms, v)
+        fired, s = first_exit_of(lin, tapes, k, bound, state, room)
         if fired == _OPEN:
             return STOPPED
         if s > longest:

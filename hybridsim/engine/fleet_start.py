@@ -9,8 +9,8 @@ import math
 from typing import Any
 
 from hybridsim.engine.decide import FINE, choose
-from hybridsim.engine.event_verdicts import guard_series, judge_candidate, judge_members
-from hybridsim.engine.event_work import Before, called_by, find_modes, put
+from hybridsim.engine.event_verdicts import cluster_of, guard_series, judge_candidate, judge_members
+from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by, find_modes, put
 from hybridsim.engine.jets import UNIT, run_series
 from hybridsim.engine.jit import call, kernel, merged
 from hybridsim.engine.leap import set_origin
@@ -38,19 +38,19 @@ def plain_start(
     surfaces, and the component of each surface.
     """
     rates, origin_at, phases_at, pin_at = places
-    x, x_error, z, p, functions = state.x, state.x_error, state.z, state.p, called_by(work)
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
     set_origin((origin_at, phases_at), rates, t0, 0.0, p)
     for i in range(x.shape[0]):
         x_error[i] = 0.0
     if not _take_sides(automata, inputs, surfaces, pin_at, state, work):
         return False
-    at = Before(0.0, 0.0, x, x_error, p, z)
     for c in range(z.shape[0]):
-        if z[c] == _UNKNOWN and not _decide_cluster(functions, automata, tapes, inputs, none, at, c, work):
+        if z[c] == _UNKNOWN and not _decide_cluster(automata, tapes, inputs, none, state, c, work):
             return False
     k = find_modes(tapes.modes, z)
     if k < 0:
         return False
+    at = Before(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
     verdict = judge_members(
         automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
@@ -81,13 +81,13 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 
 @merged
 def _decide_cluster(
-    functions: Any, automata: Any, tapes: Any, inputs: Any, none: Any, at: Any, first: int, work: Any
+    automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
     """The one motion that `choose` prefers, of those that a component on its surface may begin with the others."""
-    x, x_error, z, p = at.x, at.x_error, at.z, at.p
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
     members, candidates, current, holds = work.members, work.candidates, work.current, work.holds
     verdicts, trial, y = work.verdicts, work.trial, work.y
-    cluster = automata.cluster[automata.cluster_start[first] : automata.cluster_start[first + 1]]
+    cluster = cluster_of(automata, first)
     count = 0
     for i in range(cluster.shape[0]):
         c = cluster[i]
@@ -100,13 +100,16 @@ def _decide_cluster(
         trial[c] = max(z[c], 0)
     for i in range(count):
         trial[members[i]] = holds[i]
-    call(functions.project, 0.0, x, p, trial, y)
+    call(called_by(work).project, 0.0, x, p, trial, y)
     put(y, x)
     for i in range(count):
         for j in range(automata.pin.shape[1]):
             held = automata.pin[members[i], j]
             if held >= 0:
                 x_error[held] = UNIT * abs(x[held])
+    work.real[AT] = work.real[AT_ERROR] = 0.0
+    put(x, work.x_after)
+    put(x_error, work.slopes)
     total = 3**count
     for number in range(total):
         rest = number
@@ -116,7 +119,7 @@ def _decide_cluster(
         for i in range(count):
             trial[members[i]] = candidates[number, i]
         verdicts[number] = judge_candidate(
-            functions, automata, tapes, inputs, none, at, -1, False, x, x_error, cluster, number, work
+            automata, tapes, inputs, none, state, work, -1, False, first, number
         )
         if verdicts[number] < -1:  # modes that are not on the shelf
             return False

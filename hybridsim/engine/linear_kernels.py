@@ -428,29 +428,24 @@ def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[
 
 
 @kernel
-def first_zero(
-    lin: Any,
-    k: int,
-    g: int,
-    c: Any,
-    bound: float,
-    side: int,
-    order: int,
-    floor: float,
-    hint: float,
-    start: Any,
-    room: Any,
-    v: Any,
-) -> tuple[int, float]:
+def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
     """When a guard first goes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s): a question of rounding.
 
-    The guard is positive just after 0; its first `order` coefficients are zero by decree, to within `floor`. start: its
-    Taylor coefficients at 0, and behind them the bounds that come with them. hint: where it may be zero (0: no idea);
-    if it is, and positive up to there for certain, that is the zero. Else, from point to point, the guard is bounded
-    from below by its Taylor polynomial less the largest remainder, so that no zero is jumped over; once the polynomial
-    holds to rounding up to the zero, that is the polynomial's. room (2, TERMS), v: scratch.
+    The guard is positive just after 0; its first `orders` coefficients are zero by decree, to within `floors`. starts,
+    row i: its Taylor coefficients at 0, and behind them the bounds that come with them. hints: where it may be zero (0:
+    no idea); if it is, and positive up to there for certain, that is the zero. Else, from point to point, the guard is
+    bounded from below by its Taylor polynomial less the largest remainder, so that no zero is jumped over; once the
+    polynomial holds to rounding up to the zero, that is the polynomial's.
     """
-    terms, lower = room[0], room[1]
+    side, order, floor = state.sides[g], state.orders[g], state.floors[g]
+    c, v, start, hint, terms, lower = (
+        room.c,
+        room.v,
+        room.starts[i],
+        room.hints[k, g],
+        room.terms[0],
+        room.terms[1],
+    )
     size, rest = start[TERMS], start[TERMS + 1]
     if not size < math.inf:
         return OPEN, 0.0

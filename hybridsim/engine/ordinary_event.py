@@ -20,14 +20,13 @@ from hybridsim.engine.event_verdicts import (
     size_at,
 )
 from hybridsim.engine.event_work import (
-    AT,
-    AT_ERROR,
     DISCRETE,
     DISCRETE_AT,
     FIRED,
     Before,
     called_by,
     find_modes,
+    located,
     put,
 )
 from hybridsim.engine.jets import UNIT
@@ -98,26 +97,15 @@ def take_choice(
 
 
 @merged
-def settle_ordinary(
-    functions: Any,
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    at: Any,
-    fired: int,
-    x: Any,
-    x_error: Any,
-    z: Any,
-    p: Any,
-    work: Any,
-) -> bool:
-    """Whether the event is ordinary; then what holds just after it is written to x, x_error and z.
+def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
+    """Whether the event is ordinary; then what holds just after it is in the work space: x_after, slopes and z_after.
 
-    A transition of a component without a surface may change the run-time vector: it is written to p then. Another event
-    is left to others, whatever has been written. Sides, orders and floors of the guards in the new modes are in the
-    work space.
+    A transition of a component without a surface may change the run-time vector: it is written to p_after then. Another
+    event is left to others, whatever has been written. Sides, orders and floors of the guards in the new modes are in
+    the work space as well.
     """
+    functions, fired, at = called_by(work), work.whole[FIRED], located(state, work)
+    x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
     put(at.x, x)
     put(at.x_error, x_error)
     put(at.z, z)
@@ -137,9 +125,7 @@ def settle_ordinary(
         if automata.is_unilateral[automata.cluster[i]]:
             return False
     if automata.hold[c] >= 0:
-        number = decide_surface(
-            functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, z, work
-        )
+        number = decide_surface(automata, tapes, inputs, lin, state, work, fired, is_known)
         if number < 0:
             return False
         if (
@@ -175,16 +161,13 @@ def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, w
 
     lin: tables of linear modes, empty for others. state: `hybridsim.engine.segment_end.State`.
     """
-    functions, fired = called_by(work), work.whole[FIRED]
-    at = Before(work.real[AT], work.real[AT_ERROR], work.y, work.y_error, state.p, state.z)
-    x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
-    if not settle_ordinary(functions, automata, tapes, inputs, lin, at, fired, x, x_error, z, p, work):
+    if not settle_ordinary(automata, tapes, inputs, lin, state, work):
         return 0
-    put(x, state.x)
-    put(x_error, state.x_error)
-    put(z, state.z)
-    if automata.hold[automata.owner[fired]] < 0:
-        put(p, state.p)
+    put(work.x_after, state.x)
+    put(work.slopes, state.x_error)
+    put(work.z_after, state.z)
+    if automata.hold[automata.owner[work.whole[FIRED]]] < 0:
+        put(work.p_after, state.p)
     put(work.sides, state.sides)
     put(work.orders, state.orders)
     put(work.floors, state.floors)

@@ -5,43 +5,35 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.decide import FINE, LEAVES, NONE, NONUNIQUE, choose, preference
-from hybridsim.engine.event_verdicts import UNKNOWN, judge_candidate
-from hybridsim.engine.event_work import put
+from hybridsim.engine.event_verdicts import UNKNOWN, cluster_of, judge_candidate
+from hybridsim.engine.event_work import called_by, located, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, merged
 
 
 @merged
 def decide_single(
-    functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    at: Any,
+    state: Any,
+    work: Any,
     fired: int,
     is_known: bool,
-    x: Any,
-    x_error: Any,
-    z: Any,
-    cluster: Any,
     c: int,
-    work: Any,
 ) -> int:
     """As `decide_surface`, for one component at its surface: what `choose` makes of its three modes, one by one."""
-    now, hold, trial = z[c], automata.hold[c], work.trial
+    z, trial = work.z_after, work.trial
+    now, hold = z[c], automata.hold[c]
     trial[c] = now
-    verdict = judge_candidate(
-        functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, cluster, now, work
-    )
+    verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
     if verdict != LEAVES:
         return now if verdict == FINE else -1
     if now != hold:
         for mode in (hold, 3 - hold - now):
             trial[c] = mode
-            verdict = judge_candidate(
-                functions, automata, tapes, inputs, lin, at, fired, False, x, x_error, cluster, mode, work
-            )
+            verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, False, c, mode)
             if verdict == FINE:
                 z[c] = mode
                 return mode
@@ -53,9 +45,7 @@ def decide_single(
         if mode == hold:
             continue
         trial[c] = mode
-        verdict = judge_candidate(
-            functions, automata, tapes, inputs, lin, at, fired, False, x, x_error, cluster, mode, work
-        )
+        verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, False, c, mode)
         if verdict == LEAVES:
             continue
         if verdict != FINE or found >= 0:
@@ -68,29 +58,19 @@ def decide_single(
 
 @merged
 def decide_surface(
-    functions: Any,
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    at: Any,
-    fired: int,
-    is_known: bool,
-    x: Any,
-    x_error: Any,
-    z: Any,
-    work: Any,
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, fired: int, is_known: bool
 ) -> int:
-    """The admissible modes, written to z, of the components of a cluster that are at their surfaces.
+    """The admissible modes, written to `work.z_after`, of the components of a cluster that are at their surfaces.
 
     Returns the number of that candidate; -1 where it is not plain. Candidates are tried in the order in which `choose`
     prefers them, up to the first that it will take. is_known: the guards' series of the modes before are there.
     """
+    at, x, x_error, z = located(state, work), work.x_after, work.slopes, work.z_after
     members, trial, candidates, verdicts = work.members, work.trial, work.candidates, work.verdicts
     hold, pin, current, holds = automata.hold, automata.pin, work.current, work.holds
     ranks = work.ranks
     c = automata.owner[fired]
-    cluster = automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
+    cluster = cluster_of(automata, c)
     count, is_meeting = 0, False
     for i in range(cluster.shape[0]):
         d = cluster[i]
@@ -106,16 +86,14 @@ def decide_surface(
     put(z, trial)
     for i in range(count):
         trial[members[i]] = hold[members[i]]
-    call(functions.project, at.s, at.x, at.p, trial, x)
+    call(called_by(work).project, at.s, at.x, at.p, trial, x)
     for i in range(count):
         if pin[members[i], 0] >= 0:  # a unilateral contact, which has two, is not ordinary
             x_error[pin[members[i], 0]] = UNIT * abs(x[pin[members[i], 0]])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     if count == 1:
-        return decide_single(
-            functions, automata, tapes, inputs, lin, at, fired, is_known, x, x_error, z, cluster, members[0], work
-        )  # fmt: skip
+        return decide_single(automata, tapes, inputs, lin, state, work, fired, is_known, members[0])
     total = 3**count  # a surface has three modes
     for number in range(total):
         rest = number
@@ -135,9 +113,8 @@ def decide_surface(
                 trial[members[i]] = candidates[number, i]
             is_current = rank >= (count + 1) * count
             verdict = judge_candidate(
-                functions, automata, tapes, inputs, lin, at, fired, is_current and is_known, x, x_error, cluster,
-                number, work,
-            )  # fmt: skip
+                automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number
+            )
             if verdict == UNKNOWN:
                 return -1
             verdicts[number] = verdict
