@@ -11,30 +11,27 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
+from hybridsim.engine.guard_polynomials import (
+    falls_over,
+    past_dip,
+    safe_step,
+    stays_positive,
+    zero_of_terms,
+)
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import allocating_kernel, inlined, kernel, polynomial_kernel
+from hybridsim.engine.jit import allocating_kernel, inlined, kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_guards import FARTHEST, TERMS
 
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
-_NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
-_POLISH = 6  # iterations of it from nearby
 # points from which a guard is followed: a second; a run that is to be stopped must not wait for more
 _POINTS = 10**6
-_SAFE = 0.95  # to end on the safe side
-_HALVINGS = 5
-# a parabola stays positive up to 4; iterations towards the lowest point; times its error that it stays above there
-_DIPS, _TURNS, _CLEAR = 6.0, 3, 4.0
-# c (x - v)**2 + e has positive coefficients in Bernstein form of degree 15 up to v + 7.5 e/(c v)
-_PAST = 3.0
+# A row's rounding is at least ten units of the row in absolute values: what errors of y make of it, in terms of that.
+_IN_UNITS = 0.125 / UNIT
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
-# a monomial x**i on [0, 1] in Bernstein form of degree TERMS - 1: C(j, i)/C(TERMS - 1, i)
-_BERNSTEIN = np.array(
-    [[math.comb(j, i) / math.comb(TERMS - 1, i) for j in range(TERMS)] for i in range(TERMS)]
-)
 
 
 @inlined
@@ -130,8 +127,19 @@ def linear_side(
     lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, w: Any, w_error: Any
 ) -> tuple[int, int, bool]:
     """As `hybridsim.engine.decide.side_after`, coefficient by coefficient; and whether it is a question of rounding."""
-    is_open = False
+    is_open, n, size = False, x.shape[0], 0.0
+    for m in range(n):
+        size += abs(x[m]) + _IN_UNITS * x_error[m]
+    for m in range(w.shape[0]):
+        size += abs(w[m]) + _IN_UNITS * w_error[m]
     for order in range(decreed, ORDER + 1):
+        value = 0.0
+        for m in range(n):
+            value += lin.series[k, g, order, m] * x[m]
+        for m in range(w.shape[0]):
+            value += lin.series[k, g, order, n + m] * w[m]
+        if abs(value) > lin.largest[k, g, order] * size:  # far beyond its bound
+            return (1 if value > 0.0 else -1), order, False
         value, bound = linear_coefficient(lin, k, g, order, x, x_error, w, w_error)
         if value > bound:
             return 1, order, False
@@ -146,12 +154,14 @@ def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
     """Modal coordinates of y = (x, w)."""
     n = x.shape[0]
     for j in range(lin.counts[k]):
-        total = 0.0 + 0.0j
+        real = imaginary = 0.0
         for m in range(n):
-            total += lin.inverse[k, j, m] * x[m]
+            weight = lin.inverse[k, j, m]
+            real, imaginary = real + weight.real * x[m], imaginary + weight.imag * x[m]
         for m in range(w.shape[0]):
-            total += lin.inverse[k, j, n + m] * w[m]
-        c[j] = total
+            weight = lin.inverse[k, j, n + m]
+            real, imaginary = real + weight.real * w[m], imaginary + weight.imag * w[m]
+        c[j] = complex(real, imaginary)
 
 
 @inlined
@@ -265,140 +275,6 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
         for i in range(TERMS):
             terms[i] += lin.terms[k, g, j, 0, i] * real - lin.terms[k, g, j, 1, i] * imaginary
     return size, rest
-
-
-@polynomial_kernel
-def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
-    """A polynomial, `start` and then its coefficients, highest first, and its derivative: even and odd powers apart."""
-    square = d * d
-    even, odd = (start, 0.0) if count % 2 == 0 else (0.0, start)
-    even_rate = odd_rate = 0.0
-    if count % 2 == 1:
-        even = backward[0]
-    for i in range(count % 2, count, 2):
-        odd_rate = odd_rate * square + odd
-        odd = odd * square + backward[i]
-        even_rate = even_rate * square + even
-        even = even * square + backward[i + 1]
-    return even + d * odd, odd + 2.0 * d * (even_rate + d * odd_rate)
-
-
-@inlined
-def safe_step(terms: Any, first: int, rest: float, longest: float, lower: Any) -> float:
-    """A step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] > 0, m the number of terms.
-
-    Positive terms after the first negative one are left out, so that the bound has one zero (Descartes' rule), and is
-    positive before every point at which it is. lower: room for its terms.
-    """
-    m = TERMS - first
-    is_down = False
-    for i in range(m):
-        a = terms[first + i]
-        is_down = is_down or a < 0.0
-        lower[m - 1 - i] = min(a, 0.0) if is_down else a
-    d = longest
-    a, b, c = lower[m - 1], lower[m - 2], lower[m - 3]
-    if b < 0.0 or c < 0.0:  # the zero of three terms is a good guess
-        d = min(d, 2.0 * a / (math.sqrt(b * b - 4.0 * a * c) - b))
-    for _ in range(_ITERATIONS):
-        value, slope = value_and_slope(lower, m, d, -rest)
-        if value > 0.0:
-            return d
-        closer = (d - value / slope) * _SAFE if slope < 0.0 else 0.0
-        d = closer if 0.0 < closer < d else 0.5 * d
-    return 0.0
-
-
-@inlined
-def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
-    """The zero just ahead of a guard that falls, by its Taylor polynomial; NaN where that is not good to rounding."""
-    if not terms[1] < 0.0:
-        return math.nan
-    d = -terms[0] / terms[1]
-    left_out = rest
-    for _ in range(TERMS):
-        left_out *= abs(d)
-    if not left_out <= 0.25 * UNIT * size:
-        return math.nan
-    for i in range(TERMS):
-        backward[i] = terms[TERMS - 1 - i]
-    change = math.inf
-    for _ in range(_POLISH):
-        value, slope = value_and_slope(backward, TERMS, d, 0.0)
-        if not slope < 0.5 * terms[1]:
-            return math.nan
-        change = value / slope
-        d -= change
-        if abs(change) <= _NEAR * abs(d):
-            break
-    if not abs(change) <= _NEAR * abs(d):
-        return math.nan
-    left_out, rising, power = rest, terms[1], 1.0
-    for i in range(2, TERMS):
-        power *= abs(d)
-        rising += i * power * (max(terms[i], 0.0) if d > 0.0 else abs(terms[i]))
-    for _ in range(TERMS):
-        left_out *= abs(d)
-    # a guard that falls all the way has one zero there; else Newton's method may have passed over the first
-    return d if left_out <= 0.25 * UNIT * size and rising < 0.0 else math.nan
-
-
-@inlined
-def stays_positive(terms: Any, first: int, rest: float, d: float, backward: Any) -> bool:
-    """Whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], m the number of terms.
-
-    By its coefficients in Bernstein form there. backward: room for them.
-    """
-    for j in range(TERMS):
-        backward[j] = 0.0
-    power, total = 1.0, 0.0
-    for i in range(TERMS - first):
-        value = terms[first + i] * power
-        power *= d
-        total += abs(value)
-        for j in range(TERMS):
-            backward[j] += _BERNSTEIN[i, j] * value
-    lowest = rest * power + 2.0 * TERMS * UNIT * total
-    for j in range(TERMS):
-        if not backward[j] > lowest:
-            return False
-    return True
-
-
-@inlined
-def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
-    """Just past the lowest point of a guard that falls and rises again; 0 if it does not, or comes near its error."""
-    a, b, c = terms[first], terms[first + 1], terms[first + 2]
-    if not (b < 0.0 < c and b * b < _DIPS * a * c):
-        return 0.0
-    m = TERMS - first
-    for i in range(m):
-        backward[m - 1 - i] = terms[first + i]
-    lowest, value = -0.5 * b / c, 0.0
-    for _ in range(_TURNS):
-        value, slope = value_and_slope(backward, m, lowest, 0.0)
-        lowest -= 0.5 * slope / c
-    if not (value > _CLEAR * error and lowest > 0.0):
-        return 0.0
-    return min(lowest + min(lowest, _PAST * value / (c * lowest)), longest)
-
-
-@inlined
-def falls_over(terms: Any, rest: float, longest: float) -> float:
-    """How far on either side a guard falls at least half as fast as here, by its Taylor polynomial; 0 if not at all."""
-    steepness = -terms[1]
-    if not steepness > 0.0:
-        return 0.0
-    d = min(longest, 0.25 * steepness / abs(terms[2])) if terms[2] != 0.0 else longest
-    for _ in range(_HALVINGS):
-        change, power = TERMS * rest * d ** (TERMS - 1), 1.0
-        for i in range(2, TERMS):
-            power *= d
-            change += i * abs(terms[i]) * power
-        if change <= 0.5 * steepness:
-            return d
-        d *= 0.5
-    return 0.0
 
 
 @inlined

@@ -29,12 +29,12 @@ class LinearTables(NamedTuple):
     kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factor_start (M + 1,), factors: the
     monomials, 2*atom + part. phases (2,): the sources in p that are angles known to rounding only.
     series (K, G, 4, n + M): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
-    y of size 1. counts (K,), values (K, J), upper (K, J, J), ends (K, J): the flow in modal coordinates; basis (K, n,
-    J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2, TERMS): Taylor coefficients of the guards
-    in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J): bounds of the guard and of
-    the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds, but for a factor. slopes (K,
-    n, n + M): rates of the states. waves (K, G): the modal coordinate that turns without damping, where a guard sees
-    one such and else constants; -1 otherwise.
+    y of size 1; largest (K, G, 4): of those of a coefficient. counts (K,), values (K, J), upper (K, J, J), ends (K, J):
+    the flow in modal coordinates; basis (K, n, J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2,
+    TERMS): Taylor coefficients of the guards in modal coordinates, factors of their real and imaginary parts; sizes,
+    rests (K, G, J): bounds of the guard and of the first coefficient left out; farthest, grown (K, G): how far ahead
+    the latter holds, but for a factor. slopes (K, n, n + M): rates of the states. waves (K, G): the modal coordinate
+    that turns without damping, where a guard sees one such and else constants; -1 otherwise.
     """
 
     kinds: np.ndarray
@@ -48,6 +48,7 @@ class LinearTables(NamedTuple):
     phases: np.ndarray
     series: np.ndarray
     roundings: np.ndarray
+    largest: np.ndarray
     counts: np.ndarray
     values: np.ndarray
     upper: np.ndarray
@@ -68,7 +69,8 @@ def no_tables() -> LinearTables:
     i, f, c = np.int64, np.float64, np.complex128
     tables: LinearTables = packed(LinearTables(
         np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros(1, i),
-        np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f), np.zeros(0, i),
+        np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f),
+        np.zeros((0, 0, 0)), np.zeros(0, i),
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0), c), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
         np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0), i),
@@ -131,6 +133,7 @@ def of_matrices(A: np.ndarray, rows: np.ndarray, n: int, horizon: float) -> dict
     return {
         "series": series,
         "roundings": roundings,
+        "largest": roundings.max(axis=-1),
         "counts": flows.counts,
         "values": flows.values,
         "upper": flows.upper,
