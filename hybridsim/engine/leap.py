@@ -15,7 +15,7 @@ from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_series, inlined, kernel
-from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import is_crowded, may_turn_back, settle_and_move_on, state_errors
 from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -307,7 +307,7 @@ def leap(
             return AT_TARGET, n_steps, n_segments + 1
         if is_crowded(s, clock, pace):
             return STOPPED, first_step, n_segments
-        s_error = 2.0 * 2.0**-52 * s
+        s_error, slope, bend = 2.0 * 2.0**-52 * s, 0.0, 0.0
         if holds:
             values_at(values_code, rows, flow_places, s, y, watched, constants, values, rates_now)
         for i in range(count):
@@ -315,9 +315,13 @@ def leap(
                 slope = guard_series[i, 1]
                 for j in range(2, order + 1):
                     slope += j * guard_series[i, j] * ahead[j - 1]
+                    bend += 0.5 * j * (j - 1) * guard_series[i, j] * ahead[j - 2]
                 if slope != 0.0 and math.isfinite(values[i] / slope):
                     s_error = max(s_error, abs(values[i] / slope))
         state_errors(automata, s_error, y, scale, x_error, z, rates_now, y_error)
+        length = steps[n_steps - 1, 1]
+        if may_turn_back(tapes, inputs, lin, k, fired, slope, bend, length, s, s_error, y, p, z, work):
+            return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments
         put(work.x_after, jumps[n_segments, 1])

@@ -19,7 +19,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
-from hybridsim.engine.segment_end import is_crowded, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import is_crowded, may_turn_back, settle_and_move_on, state_errors
 from hybridsim.engine.taylor import advance, expand
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
@@ -278,7 +278,7 @@ def rk_leap(
         put(floors, floor_now)
         s, fired, is_holding, is_sure = 0.0, -1, holding(automata, z), True
         lands = landing(automata, z)
-        value, slope = 0.0, 0.0
+        value, slope, bend, d = 0.0, 0.0, 0.0, 0.0
         forget(room.memory)
         put(x, y)
         for i in range(n):
@@ -339,7 +339,11 @@ def rk_leap(
                         put(orders, order_now)
                         put(floors, floor_now)
                     continue
-                value, slope = W[tapes.guards[k, g], 0], W[tapes.guards[k, g], 1]
+                value, slope, bend = (
+                    W[tapes.guards[k, g], 0],
+                    W[tapes.guards[k, g], 1],
+                    W[tapes.guards[k, g], 2],
+                )
                 d, is_last, fired, is_sure = at, False, g, code == LANDED
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             for i in range(n):
@@ -378,6 +382,8 @@ def rk_leap(
             s_error = max(s_error, abs(value / slope))
         call(functions.flow, s, y, p, z, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, work.y_error)
+        if may_turn_back(tapes, inputs, lin, k, fired, slope, bend, d, s, s_error, y, p, z, work):
+            return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments
         put(y1, jumps[n_segments, 1])

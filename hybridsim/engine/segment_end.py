@@ -7,13 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.accumulation import CLOSING_IN
-from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, SETTLE
+from hybridsim.engine.event_verdicts import guard_series
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, SETTLE, Before
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
 from hybridsim.engine.timepair import two_sum
 
 _STEADY = 1e-3  # of the ratio of intervals between events: what it may change by in a series that accumulates
+_SHALLOW = 2.0**-18  # of a guard's values on the last step: how far below zero it goes, times four, at least
+_HIDDEN = 16.0  # four times its rounding, at least
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
@@ -54,6 +57,34 @@ def state_errors(
                 i = automata.pin[c, j]
                 if i >= 0:
                     out[i] = UNIT * abs(y[i])
+
+
+@inlined
+def may_turn_back(
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    k: int,
+    g: int,
+    slope: float,
+    bend: float,
+    length: float,
+    s: float,
+    s_error: float,
+    y: Any,
+    p: Any,
+    z: Any,
+    work: Any,
+) -> bool:
+    """Whether a guard that was located at zero might as well touch it: it comes back before it is beyond its rounding.
+
+    slope, bend: its first and second coefficient there; as far as it turns for a step of this length before its
+    rounding is not asked for, whose bound takes all that its expression is made of. `work.y_error` bounds the state.
+    """
+    if not (bend > 0.0 and slope * slope < _SHALLOW * bend * length * (abs(slope) + bend * length)):
+        return False
+    guard_series(tapes, inputs, lin, k, Before(s, s_error, y, work.y_error, p, z), y, work.y_error, work)
+    return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 
 @inlined

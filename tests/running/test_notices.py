@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -109,6 +110,43 @@ def test_a_touch_is_told_where_a_compiled_loop_runs(integrator: str) -> None:
     crossed = any(event.kind == "transition" for event in sol.events)
     assert crossed or told(sol, "near-grazing: guard top of c")
     assert [e.t for e in sol.events] == pytest.approx([1.0], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "options"),
+    [
+        ("dop853", {"rtol": 1e-13}),
+        ("dop853", {"rtol": 1e-9}),
+        ("tsit5", {"rtol": 1e-9}),
+        ("rodas5p", {"rtol": 1e-9}),
+        ("taylor", {"rtol": 1e-12}),
+        ("taylor", {"rtol": 1e-12, "max_step": 0.05}),
+        ("exact", {}),
+        ("scipy-dop853", {"rtol": 1e-9}),
+        ("cvode-adams", {"rtol": 1e-9}),
+        ("rk4-dichotomy", {"step": 1e-3}),
+    ],
+)
+def test_a_guard_that_touches_zero_and_is_never_negative_ends_no_mode(integrator: str, options: dict) -> None:
+    """a (1 + cos(w t + phi)): at its zeros all that is left of it is rounding of the sum, however short the steps."""
+    model = hs.Model(
+        "touch",
+        parameters={"a": 1.0, "w": 1.0, "phi": 0.0},
+        states=[hs.State("x", 1, der="v"), hs.State("v", 0, der="cos(3*t) - x - 0.1*v")],
+        components=[
+            hs.Component(
+                "c",
+                [hs.Mode("below", hs.Guard("top", "a*(1 + cos(w*t + phi))", "above")), hs.Mode("above")],
+                initial="below",
+            )
+        ],
+    )
+    draw = np.random.default_rng(26)
+    for _ in range(8):
+        a, w, phi = 10.0 ** draw.uniform(-3, 3), draw.uniform(0.3, 3.0), draw.uniform(-3.0, 3.0)
+        sol = hs.simulate(model.with_(a=a, w=w, phi=phi), (0, 8), integrator=integrator, **options)
+        assert sol.success, sol.message
+        assert not [event for event in sol.events if event.kind == "transition"], (a, w, phi)
 
 
 CRAWL = 'schema = 1\nname = "crawl"\n[states]\nx = { start = 1, der = "-sign(x)" }\n'
