@@ -105,9 +105,8 @@ def first_linear_guard(
         for i in range(count):
             room.totals[i] = sum_sizes(V, watched[i], degree + 2, room.powers)
         outcome, g, at = earliest_exit(
-            tapes, k, degree + 2, d, sides, orders, floors, V, watched, room.powers, room.totals, room.a, room.b,
-            room.stack, room.bernstein,
-        )  # fmt: skip
+            tapes, k, degree + 2, d, V, watched, room.powers, room.totals, room, room.bernstein
+        )
     if outcome == NEVER:
         begin_positive(sides, orders, floors)
     return outcome, g, at
@@ -164,9 +163,8 @@ def first_guard(
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes, k, order, w, room.sides, room.orders, room.floors, V, watched, room.powers, room.totals, room.a,
-            room.b, room.stack, room.bernstein,
-        )  # fmt: skip
+            tapes, k, order, w, V, watched, room.powers, room.totals, room, room.bernstein
+        )
         if outcome == OPEN:
             return OPEN, g, q + at
         while True:

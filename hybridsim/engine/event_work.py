@@ -41,10 +41,9 @@ class Work(NamedTuple):
     """Room for one event: series with bounds (registers, 4), judged (2, guards, 4): those of guards and their bounds,
     what holds after it, candidates.
 
-    functions (5,): those of `Functions`. reached (2,): addresses of kernels: the one that settles it, and that of
-    a leap. whole, real: what the
-    places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes (n,) of the flow there.
-    x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
+    functions (5,): those of `Functions`. reached (2,): addresses of kernels: the one that settles it, and that of a
+    leap. whole, real: what the places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes
+    (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
     factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled. sides,
     orders, floors (G,): of the guards just after it. The last ones have a row for each joint candidate.
     """

@@ -17,6 +17,7 @@ from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_addr
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
+    POINTS,
     errors_of_time,
     first_zero,
     first_zero_of_wave,
@@ -45,10 +46,9 @@ class Room(NamedTuple):
     """What a leap is to do, and scratch arrays.
 
     rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), instants: target (2,)
-    and clock (2,), which is moved on; how many segments were
-    committed (1,). Modal coordinates (J,), terms of
-    a guard (2, TERMS), those at the start (G, TERMS + 2), a state; hints (K, G): how long a segment lasted that a guard
-    ended.
+    and clock (2,), which is moved on; how many segments were committed (1,), from how many points guards were followed
+    (1,). Modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state; hints (K, G):
+    how long a segment lasted that a guard ended.
     """
 
     rates: np.ndarray
@@ -57,6 +57,7 @@ class Room(NamedTuple):
     target: np.ndarray
     clock: np.ndarray
     committed: np.ndarray
+    points: np.ndarray
     c: np.ndarray
     v: np.ndarray
     terms: np.ndarray
@@ -139,6 +140,7 @@ def room_for(system: Any, tables: Any) -> Room:
             target=np.zeros(2),
             clock=np.zeros(2),
             committed=np.zeros(1, dtype=np.int64),
+            points=np.zeros(1, dtype=np.int64),
             c=np.zeros(widest, dtype=complex),
             v=np.zeros(widest, dtype=complex),
             terms=np.zeros((2, TERMS)),
@@ -154,16 +156,15 @@ def room_for(system: Any, tables: Any) -> Room:
 def exact_leap(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
 ) -> int:
-    """Go from event to event; returns why it ended. It is reached by its address, so that
-    it is compiled once for all that go by it.
+    """Go from event to event; returns why it ended: FULL too where guards were followed for a second.
 
-    automata, tapes, inputs, state, work as for `leap`; lin: tables of linear modes. record: what the segments and
-    events are written to.
+    It is reached by its address, so that it is compiled once for all that go by it. automata, tapes, inputs, state,
+    work as for `leap`; lin: tables of linear modes. record: what the segments and events are written to.
     """
     place, rates = (room.places[0], room.places[1]), room.rates
     longest, target, clock, functions = room.longest[0], room.target, room.clock, called_by(work)
     committed = room.committed
-    committed[0] = 0
+    committed[0] = room.points[0] = 0
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     c, v, scale = room.c, room.v, room.scale
     y, y1, y_error, slopes = work.y, work.x_after, work.y_error, work.slopes
@@ -183,7 +184,7 @@ def exact_leap(
             return AT_TARGET
         if k < 0:
             return STOPPED
-        if n_segments >= ends.shape[0]:
+        if n_segments >= ends.shape[0] or room.points[0] > POINTS:
             return FULL
         if not is_known:
             set_origin(place, rates, clock[0], clock[1], p)

@@ -129,14 +129,25 @@ def change_of_sign(b: Any) -> float:
 
 @polynomial_kernel
 def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
-    """The polynomial without its first `order` coefficients, its slope, and half its second derivative."""
-    n = a.shape[0] - 1
-    value, slope, curvature = a[n], 0.0, 0.0
-    for k in range(n - 1, order - 1, -1):
-        curvature = curvature * theta + slope
-        slope = slope * theta + value
-        value = value * theta + a[k]
-    return value, slope, curvature
+    """The polynomial without its first `order` coefficients, its slope, and half its second derivative.
+
+    As E(q) + theta O(q), q = theta**2: even and odd powers are summed side by side, and need not wait for each other.
+    """
+    q, last = theta * theta, a.shape[0] - 1
+    even = even_slope = even_bend = odd = odd_slope = odd_bend = 0.0
+    if (last - order) % 2 == 0:  # one even power more than odd ones
+        even = a[last]
+        last -= 1
+    for k in range(last, order, -2):
+        odd_bend = odd_bend * q + odd_slope
+        odd_slope = odd_slope * q + odd
+        odd = odd * q + a[k]
+        even_bend = even_bend * q + even_slope
+        even_slope = even_slope * q + even
+        even = even * q + a[k - 1]
+    slope = odd + 2.0 * theta * (even_slope + theta * odd_slope)
+    bend = even_slope + 4.0 * q * even_bend + theta * (3.0 * odd_slope + 4.0 * q * odd_bend)
+    return even + theta * odd, slope, bend
 
 
 @kernel

@@ -97,7 +97,7 @@ def run_fleet(
             at[BEGUN], at[KEPT], at[RESUMED] = 1, 0, 0
         code = call_kernel(work.reached[LEAP], (automata, tapes, inputs, tables, state, work, room, late))
         count = room.committed[0]
-        segments += count
+        segments += count if code != FULL else _AT_ONCE
         if code == AT_TARGET:
             first, begin = _begin(record, at[KEPT], count, runs.ends[i] - runs.periods[i])
             if first >= 0:

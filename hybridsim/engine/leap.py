@@ -15,7 +15,7 @@ from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_series, inlined, kernel
-from hybridsim.engine.segment_end import is_crowded, may_turn_back, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
 from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
 from hybridsim.engine.taylor import advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -114,27 +114,14 @@ def series_at(
 
 @kernel
 def earliest_exit(
-    tapes: Any,
-    k: int,
-    order: int,
-    h: float,
-    sides: Any,
-    orders: Any,
-    floors: Any,
-    U: Any,
-    watched: Any,
-    powers: Any,
-    totals: Any,
-    a: Any,
-    b: Any,
-    stack: Any,
-    bernstein: Any,
-) -> tuple[int, int, float]:
+    tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, room: Any, bernstein: Any
+) -> tuple[int, int, float]:  # fmt: skip
     """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time).
 
-    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
-    bernstein: see `first_exit`, by the number of leading zeros.
+    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`. room:
+    sides, orders and floors of all guards, scratch arrays. bernstein: see `first_exit`, by the number of leading zeros.
     """
+    sides, orders, floors, a, b, stack = room.sides, room.orders, room.floors, room.a, room.b, room.stack
     found, best, begin = -1, 1.0, tapes.active_start[k]
     for i in range(watched.shape[0]):
         g = tapes.active[begin + i]
@@ -191,7 +178,7 @@ def leap(
     rtol, atol, order, max_step, longest = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    V, W, a, b, stack = room.V, room.W, room.a, room.b, room.stack
+    V, W = room.V, room.W
     guard_series, ahead = room.guard_series, room.ahead
     powers, totals = room.sizes[: order + 1], room.sizes[order + 1 :]
     y, y_error, scale = work.y, work.y_error, room.scale
@@ -248,9 +235,8 @@ def leap(
             if not h > _SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments
             outcome, g, d = earliest_exit(
-                tapes, k, order, h, side_now, order_now, floor_now, guard_series, numbers, powers, totals,
-                a, b, stack, codes.bernstein,
-            )  # fmt: skip
+                tapes, k, order, h, guard_series, numbers, powers, totals, room, codes.bernstein
+            )
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             trials = 0
@@ -319,8 +305,9 @@ def leap(
                 if slope != 0.0 and math.isfinite(values[i] / slope):
                     s_error = max(s_error, abs(values[i] / slope))
         state_errors(automata, s_error, y, scale, x_error, z, rates_now, y_error)
-        length = steps[n_steps - 1, 1]
-        if may_turn_back(tapes, inputs, lin, k, fired, slope, bend, length, s, s_error, y, p, z, work):
+        if is_shallow(slope, bend, steps[n_steps - 1, 1]) and is_hidden(
+            tapes, inputs, lin, k, fired, slope, bend, s, s_error, p, z, work
+        ):
             return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments

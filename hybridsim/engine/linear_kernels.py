@@ -26,8 +26,9 @@ from hybridsim.engine.linear_guards import FARTHEST, TERMS
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
-# points from which a guard is followed: a second; a run that is to be stopped must not wait for more
-_POINTS = 10**6
+# From so many points a guard is followed: a second; a run that is to be stopped must not wait for more. A block of many
+# coordinates moves as much more slowly as it has entries.
+POINTS = 10**6
 # A row's rounding is at least ten units of the row in absolute values: what errors of y make of it, in terms of that.
 _IN_UNITS = 0.125 / UNIT
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
@@ -346,8 +347,11 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
                 return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
     for i in range(TERMS):
         terms[i] = start[i]
-    s, error = 0.0, margin * size + floor
-    for _ in range(_POINTS):
+    s, error, widest = 0.0, margin * size + floor, 1
+    for j in range(lin.counts[k]):
+        widest = max(widest, lin.ends[k, j] - j)
+    for _ in range(POINTS // (widest * widest)):
+        room.points[0] += widest * widest
         reach = min(bound - s, farthest)
         d = past_dip(terms, order, reach, error, lower)
         if d == 0.0 or not stays_positive(terms, order, grown * rest, d, lower):

@@ -19,7 +19,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
-from hybridsim.engine.segment_end import is_crowded, may_turn_back, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
 from hybridsim.engine.taylor import advance, expand
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
@@ -382,7 +382,9 @@ def rk_leap(
             s_error = max(s_error, abs(value / slope))
         call(functions.flow, s, y, p, z, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, work.y_error)
-        if may_turn_back(tapes, inputs, lin, k, fired, slope, bend, d, s, s_error, y, p, z, work):
+        if is_shallow(slope, bend, d) and is_hidden(
+            tapes, inputs, lin, k, fired, slope, bend, s, s_error, p, z, work
+        ):
             return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
             return STOPPED, first_step, n_segments

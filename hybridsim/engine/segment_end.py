@@ -60,7 +60,17 @@ def state_errors(
 
 
 @inlined
-def may_turn_back(
+def is_shallow(slope: float, bend: float, length: float) -> bool:
+    """Whether a guard that was located at zero turns back so soon that it may do no more than touch it.
+
+    slope, bend: its first and second coefficient there; length: of the step before, over which they say how large it
+    was. Then `is_hidden` has the last word.
+    """
+    return bend > 0.0 and slope * slope < _SHALLOW * bend * length * (abs(slope) + bend * length)
+
+
+@kernel
+def is_hidden(
     tapes: Any,
     inputs: Any,
     lin: Any,
@@ -68,22 +78,18 @@ def may_turn_back(
     g: int,
     slope: float,
     bend: float,
-    length: float,
     s: float,
     s_error: float,
-    y: Any,
     p: Any,
     z: Any,
     work: Any,
 ) -> bool:
-    """Whether a guard that was located at zero might as well touch it: it comes back before it is beyond its rounding.
+    """Whether a guard comes back before it is beyond the rounding of all that its expression is made of.
 
-    slope, bend: its first and second coefficient there; as far as it turns for a step of this length before its
-    rounding is not asked for, whose bound takes all that its expression is made of. `work.y_error` bounds the state.
+    At the state in the work space, at local time s.
     """
-    if not (bend > 0.0 and slope * slope < _SHALLOW * bend * length * (abs(slope) + bend * length)):
-        return False
-    guard_series(tapes, inputs, lin, k, Before(s, s_error, y, work.y_error, p, z), y, work.y_error, work)
+    at = Before(s, s_error, work.y, work.y_error, p, z)
+    guard_series(tapes, inputs, lin, k, at, work.y, work.y_error, work)
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 

@@ -287,6 +287,12 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
         totals[j] = sum_sizes(U, watched[j], order, powers)
 
 
+@inlined
+def _root(x: float, n: int) -> float:
+    """x**(1/n) for x >= 0, to some digits: cheaper than a power."""
+    return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
+
+
 @kernel
 def reach(
     code: int,
@@ -322,10 +328,10 @@ def reach(
             first = scale / one
         if two > 0.0 and two * last > scale:
             last = scale / two
-    h = min(h, first ** (1.0 / (order - 1)))
+    h = min(h, _root(first, order - 1))
     measure(code, U, watched, order, h, powers, totals)
     if last < powers[order]:
-        h = min(h, last ** (1.0 / order))
+        h = min(h, _root(last, order))
         measure(code, U, watched, order, h, powers, totals)
     for j in range(watched.shape[0]):
         r = watched[j]
@@ -340,7 +346,7 @@ def reach(
                 largest = max(largest, abs(U[r, k]) * powers[k])
             if term <= rtol * largest:
                 break
-            h *= max(_SHORTER, 0.9 * (rtol * largest / term) ** (1.0 / order)) if largest > 0.0 else _SHORTER
+            h *= max(_SHORTER, 0.9 * _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
             measure(code, U, watched, order, h, powers, totals)
     return h
 
