@@ -45,7 +45,8 @@ def method(rtol: float) -> Method:
 
         return Runs(lambda: jax.block_until_ready(alone()), lambda: jax.block_until_ready(on_grid()), read)
 
-    return Method(f"diffrax@{rtol:.0e}", f"diffrax Tsit5 {rtol:.0e}".replace("e-0", "e-"), "rival", start)
+    label = f"diffrax Tsit5 {rtol:.0e}".replace("e-0", "e-")
+    return Method(f"diffrax@{rtol:.0e}", label, "rival", start, has_threads=True)
 
 
 def _whole(scene: Scene, parts: Any, rtol: float, atol: Any, with_grid: bool) -> Any:

@@ -53,6 +53,8 @@ class Method:
     start : a scene's runs; None where the method does not apply. What it needs for building is timed.
     has_modes : whether its events can be judged.
     shown : whether it stands in the charts; other settings are there for the ratios.
+    has_threads : whether it computes on threads of its own, whose processor time the system tells late: its calls are
+        timed by the clock.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Method:
     start: Callable[[Scene], Runs | None]
     has_modes: bool = True
     shown: bool = True
+    has_threads: bool = False
 
 
 def columns(rows: list[tuple[float, int, int]], states: list[Any], n: int) -> tuple[np.ndarray, ...]:

@@ -20,10 +20,11 @@ _LEAST = 2  # turns that even the slowest has
 
 @dataclass
 class Times:
-    """Seconds that the first call took on the clock; seconds of processor time of the later ones, of the same on the
-    clock, and inside a compiled loop, where it is known."""
+    """Seconds that the first call took on the clock; seconds of the later ones, in processor time unless it is of a
+    method with threads of its own, of the same on the clock, and inside a compiled loop, where it is known."""
 
     first: float = 0.0
+    has_threads: bool = False
     calls: list[float] = field(default_factory=list)
     clock: list[float] = field(default_factory=list)
     inside: list[float] = field(default_factory=list)
@@ -70,10 +71,10 @@ def race(
         if runs is None:
             continue
         outcome = runs.grid()
-        first = Times(time.perf_counter() - began)
+        first = Times(time.perf_counter() - began, method.has_threads)
         errors = exact.errors(scene, runs.read(outcome), method.has_modes)
         say(f"  {method.label}: first call {first.first:.3g} s, {described(errors)}")
-        events = Times() if runs.events is not None else None
+        events = Times(has_threads=method.has_threads) if runs.events is not None else None
         lines.append(Line(method, errors, events, first))
         if runs.events is not None and events is not None:
             alone = exact.errors(scene, runs.read(runs.events()), method.has_modes)
@@ -101,8 +102,9 @@ def take_turns(running: Sequence[Running], turns: int) -> None:
                 for _ in range(_MOST_CALLS):
                     clock, began = time.perf_counter(), time.process_time()
                     outcome = call()
-                    times.calls.append(time.process_time() - began)
+                    taken = time.process_time() - began
                     times.clock.append(time.perf_counter() - clock)
+                    times.calls.append(times.clock[-1] if times.has_threads else taken)
                     if parts is not None:
                         times.inside.append(parts(outcome))
                     if times.calls[-1] > _TURN / _MOST_CALLS and sum(times.calls[-_MOST_CALLS:]) > _TURN:
