@@ -8,7 +8,7 @@ from typing import Any
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import inlined, kernel
+from hybridsim.engine.jit import call_series, inlined, kernel
 from hybridsim.engine.leap import earliest_exit
 from hybridsim.engine.steps_ahead import keeps_up, sum_at
 from hybridsim.engine.taylor import advance, reach, sum_sizes, tabulate
@@ -22,20 +22,62 @@ _MOST_STRETCHES = (
 )
 
 
-@kernel
-def shifted(coefficients: Any, q: float, states: Any, order: int, V: Any) -> None:
-    """Polynomials about a point q of theirs into the registers of the states; (n, m) coefficients, zeros above."""
+@inlined
+def shifted(coefficients: Any, q: float, out: Any) -> None:
+    """Polynomials (n, m) about a point q of theirs; zeros above."""
     n, m = coefficients.shape
     for i in range(n):
-        r = states[i]
         for j in range(m):
-            V[r, j] = coefficients[i, j]
-        for j in range(m, order + 1):
-            V[r, j] = 0.0
+            out[i, j] = coefficients[i, j]
+        for j in range(m, out.shape[1]):
+            out[i, j] = 0.0
         if q != 0.0:
             for j in range(m - 1):
                 for k in range(m - 2, j - 1, -1):
-                    V[r, k] += q * V[r, k + 1]
+                    out[i, k] += q * out[i, k + 1]
+
+
+@inlined
+def series_along(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any
+) -> None:
+    """Coefficients of the watched functions, a row each, from local time s on along states with the coefficients x.
+
+    rows: what the functions need of the tape. V, W: with its constants in their registers. code: address of a function
+    that does the same (`along` of `hybridsim.engine.series_code`); 0 for none.
+    """
+    if code != 0:
+        call_series(code, s, 0.0, x, out, W, out)
+        return
+    time, states, size = inputs.time[0], inputs.states, out.shape[1]
+    for i in range(states.shape[0]):
+        for j in range(size):
+            V[states[i], j] = x[i, j]
+    if time >= 0:
+        V[time, 0], V[time, 1] = s, 1.0
+    for j in range(size):
+        advance(rows, V, j)
+    for i in range(watched.shape[0]):
+        for j in range(size):
+            out[i, j] = V[watched[i], j]
+
+
+@inlined
+def guards_at(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
+) -> None:
+    """Values of the watched functions at (s, x); code: as `values` of `hybridsim.engine.series_code`, writes rates."""
+    if code != 0:
+        call_series(code, s, 0.0, x, out, W, rates)
+        return
+    time, states = inputs.time[0], inputs.states
+    for i in range(states.shape[0]):
+        W[states[i], 0] = x[i]
+    if time >= 0:
+        W[time, 0] = s
+    advance(rows, W, 0)
+    for j in range(watched.shape[0]):
+        out[j] = W[watched[j], 0]
 
 
 @inlined
@@ -131,6 +173,7 @@ def first_guard(
     k: int,
     rows: Any,
     inputs: Any,
+    codes: Any,
     order: int,
     rtol: float,
     s: float,
@@ -141,46 +184,41 @@ def first_guard(
 ) -> tuple[int, int, float]:
     """The guard of mode row k that first goes negative on a step: (FOUND, guard, time from s), (NEVER, -1, d), OPEN.
 
-    rows: what the guards need of the tape. room: `polynomial` (n, m), the states in powers of the time from s; V and W
-    with the constants of the tape in their registers; sides, orders, floors of the guards just after s, as in
-    `earliest_exit`, moved on. The series of a guard serves as far as its last terms stay below rtol of its largest and
-    it meets the guard at its end; there the next stretch begins.
+    rows: what the guards need of the tape; codes: `EndsCodes`. room: `polynomial` (n, m), the states in powers of the
+    time from s; V and W with the constants of the tape in their registers; sides, orders, floors of the guards just
+    after s, as in `earliest_exit`, moved on. The series of a guard serves as far as its last terms stay below rtol of
+    its largest and it meets the guard at its end; there the next stretch begins.
     """
-    time, states, V, W = inputs.time[0], inputs.states, room.V, room.W
-    none = states[:0]
+    along, values_code = codes.along[k], codes.values[k]
+    x, U, values, y, rates = room.states, room.guard_series, room.values, room.ahead, room.rates
+    everyone = room.everyone[: watched.shape[0]]
+    none = everyone[:0]
     q = 0.0
     for _ in range(_MOST_STRETCHES):
         if not q < d:
             return NEVER, -1, d
-        shifted(room.polynomial, q, states, order, V)
-        if time >= 0:
-            V[time, 0], V[time, 1] = s + q, 1.0
-        for j in range(order + 1):
-            advance(rows, V, j)
+        shifted(room.polynomial, q, x)
+        series_along(along, rows, inputs, s + q, x, watched, room.V, room.W, U)
         left = d - q
-        longest = min(left, likely_reach(V, watched, order, rtol))
-        w = reach(0, V, none, V, watched, order, rtol, atol, longest, room.powers, room.totals)
+        longest = min(left, likely_reach(U, everyone, order, rtol))
+        w = reach(0, U, none, U, everyone, order, rtol, atol, longest, room.powers, room.totals)
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes, k, order, w, V, watched, room.powers, room.totals, room, room.bernstein
+            tapes, k, order, w, U, everyone, room.powers, room.totals, room, room.bernstein
         )
         if outcome == OPEN:
             return OPEN, g, q + at
         while True:
-            for i in range(states.shape[0]):
-                W[states[i], 0] = V[states[i], order]
+            for i in range(x.shape[0]):
+                y[i] = x[i, order]
                 for j in range(order - 1, -1, -1):
-                    W[states[i], 0] = W[states[i], 0] * at + V[states[i], j]
-            if time >= 0:
-                W[time, 0] = s + q + at
-            advance(rows, W, 0)
+                    y[i] = y[i] * at + x[i, j]
+            guards_at(values_code, rows, inputs, s + q + at, y, watched, room.W, rates, values)
             tabulate(at, order, room.powers)
-            values = room.values
             for j in range(watched.shape[0]):
-                values[j] = W[watched[j], 0]
-                room.sums[j] = sum_at(V, watched[j], order, room.powers)
-            if keeps_up(V, watched, order, room.powers, rtol, values, room.sums):
+                room.sums[j] = sum_at(U, j, order, room.powers)
+            if keeps_up(U, everyone, order, room.powers, rtol, values, room.sums):
                 break
             at, outcome = _SHORTER * at, NEVER
             if not at > _SHORTEST * d:

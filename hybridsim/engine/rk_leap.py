@@ -16,7 +16,7 @@ from hybridsim.engine.event_work import Before, find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.jit import call, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
@@ -30,8 +30,8 @@ _PASSES = 3  # of the tolerance at a step's end, which the first step's length i
 
 
 @kernel
-def first_length(leading: Any, x: Any, tolerances: Any, states: Any, V: Any, longest: float) -> float:
-    """The length at which the error estimate of a step from the origin of the series V meets the tolerance.
+def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: float) -> float:
+    """The length at which the error estimate of a step from the origin of the series (n, q + 2) meets the tolerance.
 
     leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then q and
     one such coefficient of the low estimate, q = 0 where there is none; see `leading_terms`.
@@ -42,15 +42,14 @@ def first_length(leading: Any, x: Any, tolerances: Any, states: Any, V: Any, lon
     for turn in range(_PASSES):
         size, size_next, size_low = 0.0, 0.0, 0.0
         for i in range(n):
-            r = states[i]
-            end = V[r, q]
+            end = series[i, q]
             for k in range(q - 1, -1, -1):
-                end = end * h + V[r, k]
+                end = end * h + series[i, k]
             scale = atol[i] + rtol * (max(abs(x[i]), abs(end)) if turn > 0 else abs(x[i]))
             if scale > 0.0:
-                size += (c * V[r, q] / scale) ** 2
-                size_next += (c_next * V[r, q + 1] / scale) ** 2
-                size_low += (c_low * V[r, q_low] / scale) ** 2
+                size += (c * series[i, q] / scale) ** 2
+                size_next += (c_next * series[i, q + 1] / scale) ** 2
+                size_low += (c_low * series[i, q_low] / scale) ** 2
         if not size + size_next + size_low < math.inf:
             return math.nan
         size, size_next, size_low = math.sqrt(size / n), math.sqrt(size_next / n), math.sqrt(size_low / n)
@@ -65,24 +64,30 @@ def first_length(leading: Any, x: Any, tolerances: Any, states: Any, V: Any, lon
 
 
 @inlined
-def coefficients_of(states: Any, V: Any, out: Any) -> bool:
-    """Coefficients of the states (n, K) out of their registers; whether all are numbers."""
+def gather(registers: Any, W: Any, out: Any) -> None:
+    """Coefficients of some registers, a row each."""
+    for i in range(registers.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = W[registers[i], j]
+
+
+@inlined
+def is_finite(series: Any) -> bool:
+    """Whether all coefficients are numbers."""
     total = 0.0
-    for i in range(out.shape[0]):
-        for k in range(out.shape[1]):
-            out[i, k] = V[states[i], k]
-            total += abs(out[i, k])
+    for i in range(series.shape[0]):
+        for k in range(series.shape[1]):
+            total += abs(series[i, k])
     return total < math.inf
 
 
 @kernel
-def series_of(
-    rows: Any, guard_rows: Any, time: int, states: Any, derivatives: Any, s: float, x: Any, W: Any, out: Any
-) -> bool:
-    """Coefficients of the states (n, K) along the flow from (s, x), and in W of all registers; whether all are finite.
+def expand_ends(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: Any, out: Any) -> None:
+    """Coefficients of the states (n, K) along the flow from (s, x), and in W of all registers.
 
     rows: what the flow needs of the tape, and what else is wanted; guard_rows: those of them that guards need.
     """
+    time, states, derivatives = places
     n, last = out.shape
     last -= 1
     if time >= 0:
@@ -94,15 +99,32 @@ def series_of(
         for i in range(n):
             W[states[i], k + 1] = W[derivatives[i], k] / (k + 1)
     advance(guard_rows, W, last)
-    return coefficients_of(states, W, out)
+    gather(states, W, out)
 
 
 @inlined
-def gather(watched: Any, W: Any, out: Any) -> None:
-    """Coefficients of the watched functions, a row each."""
-    for i in range(watched.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = W[watched[i], j]
+def series_of(
+    code: int,
+    rows: Any,
+    guard_rows: Any,
+    places: Any,
+    s: float,
+    x: Any,
+    watched: Any,
+    W: Any,
+    out: Any,
+    guards: Any,
+) -> bool:
+    """Coefficients of the states (n, K) along the flow from (s, x) and of the watched functions, a row each.
+
+    code: address of a function that does so; 0 for none. Returns whether those of the states are numbers.
+    """
+    if code != 0:
+        call_series(code, s, 0.0, x, guards, W, out)
+    else:
+        expand_ends(rows, guard_rows, places, s, x, W, out)
+        gather(watched, W, guards)
+    return is_finite(out)
 
 
 @inlined
@@ -124,7 +146,9 @@ def land(
     k: int,
     guard_rows: Any,
     inputs: Any,
-    register: int,
+    code: int,
+    watched: Any,
+    place: int,
     s: float,
     d: float,
     h: float,
@@ -134,19 +158,16 @@ def land(
     room: Any,
     work: Any,
 ) -> tuple[int, float]:
-    """Repeat the step of length h up to where a function (a register of the tape) is zero, at d by the dense output.
+    """Repeat the step of length h up to where a watched function, by its place, is zero, at d by the dense output.
 
-    The step starts from work.y; its end is in work.x_after, the series there in room.right, of all registers in room.W.
+    The step starts from work.y; its end is in work.x_after, the series there in room.right and room.guards_right.
+    code: see `series_of`.
     Newton's method corrects the time until it is good to rounding; a correction within reach of the series at the end
     needs no new step.
     """
     W, right, y, y1, last = room.W, room.right, work.y, work.x_after, room.right.shape[1] - 1
-    rows, time, states = (
-        tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]],
-        inputs.time[0],
-        inputs.states,
-    )
-    derivatives = tapes.derivatives[k]
+    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+    places = (inputs.time[0], inputs.states, tapes.derivatives[k])
     low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
     error = 0.0
     if not is_still(room.stages):
@@ -158,9 +179,9 @@ def land(
         if is_holding:
             call(functions.project, s + d, y1, p, z, work.slopes)
             put(work.slopes, y1)
-        if not series_of(rows, guard_rows, time, states, derivatives, s + d, y1, W, right):
+        if not series_of(code, rows, guard_rows, places, s + d, y1, watched, W, right, room.guards_right):
             return LOST, d
-        value, slope = W[register, 0], W[register, 1]
+        value, slope = room.guards_right[place, 0], room.guards_right[place, 1]
         move = -value / slope if slope != 0.0 else math.nan
         if not abs(move) < math.inf:
             return LOST, d
@@ -220,6 +241,7 @@ def rk_leap(
     parts: Any,
     inputs: Any,
     lin: Any,
+    codes: Any,
     places: Any,
     method: Any,
     control: Any,
@@ -232,9 +254,10 @@ def rk_leap(
 ) -> tuple[int, int, int]:
     """Go from event to event; returns why it ended and how many steps and segments were committed.
 
-    parts: `Parts` of the tapes. method: tableau, leading terms of its estimates, error order, matrices of the Hermite
-    polynomial. control: rtol, atol, order of the guards' series, max_step, longest segment, and in an array the length
-    of the first step of all (0: to be found), which is used up. The others are as for `leap`.
+    parts: `Parts` of the tapes; codes: `EndsCodes` of them. method: tableau, leading terms of its estimates, error
+    order, matrices of the Hermite polynomial. control: rtol, atol, order of the guards' series, max_step, longest
+    segment, and in an array the length of the first step of all (0: to be found), which is used up. The others are as
+    for `leap`.
     """
     rates, origin_at, phases_at = places
     tableau, leading, error_order, hermite = method
@@ -265,8 +288,8 @@ def rk_leap(
         step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
         is_linear = parts.is_linear[k]
         step_guards = guard_rows if is_linear else guard_rows[:0]
-        derivatives = tapes.derivatives[k]
-        flow_places = (time, states, derivatives)
+        flow_places = (time, states, tapes.derivatives[k])
+        ends_code, first_code = codes.ends[k], codes.first[k]
         load(inputs, tapes, k, p, room.V)
         load(inputs, tapes, k, p, W)
         watched = room.watched[: tapes.active_start[k + 1] - tapes.active_start[k]]
@@ -283,13 +306,20 @@ def rk_leap(
         put(x, y)
         for i in range(n):
             scale[i] = abs(x[i])
-        expand(step_rows, flow_places, leading[0] + 1, 0.0, y, W)
-        h = first_length(leading, y, tolerances, states, W, min(bound, max_step))
+        if first_code != 0:
+            call_series(first_code, 0.0, 0.0, y, room.guards_left, W, room.first)
+        else:
+            expand(step_rows, flow_places, leading[0] + 1, 0.0, y, W)
+            gather(states, W, room.first)
+            gather(watched, W, room.guards_left)
+        h = first_length(leading, y, tolerances, room.first, min(bound, max_step))
         if first[0] > 0.0:
             h, first[0] = first[0], 0.0
-        if not (coefficients_of(states, W, left) and h > 0.0):
+        for i in range(n):
+            for j in range(terms):
+                left[i, j] = room.first[i, j]
+        if not (is_finite(left) and h > 0.0):
             return STOPPED, n_steps, n_segments
-        gather(watched, W, room.guards_left)
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
                 return FULL, first_step, n_segments
@@ -308,26 +338,39 @@ def rk_leap(
                 put(slopes, y1)
             if not (
                 error <= 1.0
-                and series_of(step_rows, step_guards, time, states, derivatives, s + d, y1, W, right)
+                and series_of(
+                    ends_code,
+                    step_rows,
+                    step_guards,
+                    flow_places,
+                    s + d,
+                    y1,
+                    watched,
+                    W,
+                    right,
+                    room.guards_right,
+                )
             ):
                 room.counts[1] += 1
                 h = min(h, _HALF * d) if error <= 1.0 else h
                 continue
             if is_linear:
-                gather(watched, W, room.guards_right)
                 outcome, g, at = first_linear_guard(tapes, k, watched.shape[0], d, hermite, room)
             elif fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, room.polynomial):
                 outcome, g, at = first_guard(
-                    tapes, k, guard_rows, inputs, order, rtol, s, d, atol, watched, room
+                    tapes, k, guard_rows, inputs, codes, order, rtol, s, d, atol, watched, room
                 )
             else:
                 outcome, g, at = OPEN, -1, 0.0
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             if outcome == FOUND:
+                place = 0
+                while room.numbers[place] != g:
+                    place += 1
                 code, at = land(
-                    functions, tableau, tolerances, tapes, k, guard_rows, inputs, tapes.guards[k, g], s, at, d, p, z,
-                    is_holding, room, work,
+                    functions, tableau, tolerances, tapes, k, guard_rows, inputs, ends_code, watched, place, s, at, d,
+                    p, z, is_holding, room, work,
                 )  # fmt: skip
                 if code == LOST:
                     return STOPPED, first_step, n_segments
@@ -339,11 +382,8 @@ def rk_leap(
                         put(orders, order_now)
                         put(floors, floor_now)
                     continue
-                value, slope, bend = (
-                    W[tapes.guards[k, g], 0],
-                    W[tapes.guards[k, g], 1],
-                    W[tapes.guards[k, g], 2],
-                )
+                ahead = room.guards_right[place]
+                value, slope, bend = ahead[0], ahead[1], ahead[2]
                 d, is_last, fired, is_sure = at, False, g, code == LANDED
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             for i in range(n):
@@ -352,10 +392,13 @@ def rk_leap(
                     left[i, j] = right[i, j]
                 y[i] = y1[i]
                 scale[i] = max(scale[i], abs(y1[i]))
-            if is_linear:
-                gather(watched, W, room.guards_left)
+            for i in range(watched.shape[0]):
+                for j in range(terms):
+                    room.guards_left[i, j] = room.guards_right[i, j]
             n_steps += 1
             s = bound if is_last else s + d
+        if ends_code == 0:
+            codes.lacked[k] += n_steps - first_step + 1
         if is_holding:
             call(functions.project, s, y, p, z, y1)
             put(y1, y)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.ends_shelf import EndsShelf
 from hybridsim.engine.guard_parts import GuardParts
 from hybridsim.engine.hermite import Hermite, bernstein_weights, fit_all, right_system, shift_matrix
 from hybridsim.engine.jit import Door
@@ -26,7 +27,7 @@ _HERMITE = packed(Hermite(shift_matrix(TERMS), right_system(TERMS), bernstein_we
 
 
 class Room(NamedTuple):
-    """Scratch arrays of the kernel: series of all registers, of a guard, of the states at both ends, vectors."""
+    """Scratch arrays of the kernel: series of all registers, of guards, of the states at both ends, vectors."""
 
     V: np.ndarray
     W: np.ndarray
@@ -39,6 +40,10 @@ class Room(NamedTuple):
     totals: np.ndarray
     bernstein: np.ndarray
     stages: np.ndarray
+    states: np.ndarray
+    guard_series: np.ndarray
+    everyone: np.ndarray
+    first: np.ndarray
     left: np.ndarray
     right: np.ndarray
     polynomial: np.ndarray
@@ -48,6 +53,8 @@ class Room(NamedTuple):
     lack: np.ndarray
     scale: np.ndarray
     dx: np.ndarray
+    ahead: np.ndarray
+    rates: np.ndarray
     watched: np.ndarray
     numbers: np.ndarray
     sides: np.ndarray
@@ -78,16 +85,18 @@ class RungeKuttaLeaper(Leaper):
     def __init__(self, system: System, tolerances: Tolerances, longest: float, tableau: Tableau) -> None:
         rtol = tolerances.rtol
         self.tableau, leading = tableau, tableau.leading_terms
-        order = max(series_order(rtol), 2 * TERMS + 1)
-        self.columns_of_room = max(order, leading[0] + 1) + 1
-        super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.columns_of_room}")
+        first = leading[0] + 1  # order of the states where a segment begins
+        self.order = max(series_order(rtol), 2 * TERMS + 1, first)
+        super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
         self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
+        shape = (TERMS, first, self.order)
+        self.codes: EndsShelf = system.code.shared(f"ends of {shape}", lambda: EndsShelf(system, *shape))
         self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
-        first = np.array([tolerances.first_step or 0.0])
-        self.control = (rtol, tolerances.atol, order, tolerances.max_step, longest, first)
+        given = np.array([tolerances.first_step or 0.0])
+        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest, given)
 
     def _room(self) -> Room:
-        system, n, columns = self.system, self.system.n, self.columns_of_room
+        system, n, columns = self.system, self.system.n, self.order + 1
         guards, registers = system.guard_count, system.registers.count
         room: Room = packed(
             Room(
@@ -100,6 +109,10 @@ class RungeKuttaLeaper(Leaper):
                 **{name: np.empty(guards) for name in ("values", "sums", "totals")},
                 bernstein=np.zeros(0, dtype=np.int64),
                 stages=np.empty((len(self.tableau.c), n)),
+                states=np.empty((n, columns)),
+                guard_series=np.empty((guards, columns)),
+                everyone=np.arange(guards, dtype=np.int64),
+                first=np.empty((n, self.tableau.leading_terms[0] + 2)),
                 left=np.empty((n, TERMS)),
                 right=np.empty((n, TERMS)),
                 polynomial=np.empty((n, 2 * TERMS)),
@@ -107,7 +120,7 @@ class RungeKuttaLeaper(Leaper):
                 guards_left=np.empty((guards, TERMS)),
                 guards_right=np.empty((guards, TERMS)),
                 lack=np.empty(TERMS),
-                **{name: np.empty(n) for name in ("scale", "dx")},
+                **{name: np.empty(n) for name in ("scale", "dx", "ahead", "rates")},
                 **{
                     name: np.empty(guards, dtype=np.int64)
                     for name in ("watched", "numbers", "sides", "orders")
@@ -131,10 +144,12 @@ class RungeKuttaLeaper(Leaper):
     ) -> tuple[int, int, int]:
         room.counts[:] = 0
         tapes = self.shelf.tapes  # one and the same for both: another thread may put more on the shelf
+        codes = self.codes.of(tapes)
         code, steps, count = _leap(
-            self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs,
-            NOT_LINEAR, self.places, self.method, self.control, to, clock, state, work, room, rows,
+            self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs, NOT_LINEAR, codes,
+            self.places, self.method, self.control, to, clock, state, work, room, rows,
         )  # fmt: skip
+        self.codes.look(tapes, codes)
         return code, steps, count
 
     def _count(self, counters: Counters, steps: int, room: Any) -> None:

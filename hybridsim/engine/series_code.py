@@ -25,6 +25,7 @@ from hybridsim.engine.lean_tape import (
     SCALE,
     SINCOS_LINEAR,
     SUB_CONSTANT,
+    needed_rows,
 )
 from hybridsim.engine.tape import ADD, COPY, DIV, EXP, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
 from hybridsim.engine.taylor import EXACTLY
@@ -152,22 +153,29 @@ class _Expansion(Lines):
 
     def expand(self, s: str, x: list[str]) -> None:
         """All coefficients from a local time and a state on."""
-        tape, order, stride, is_known = self.tape, self.order, self.stride, self.is_known
+        tape, order = self.tape, self.order
         self.series: dict[int, list[str]] = {r: [value] for r, value in zip(tape.states, x, strict=True)}
-        if tape.time >= 0:
-            self.series[tape.time] = [s, ONE] + [ZERO] * order
+        self._set_time(s)
         for k in range(order + 1):
-            for op, a, b, c, out in tape.rows:
-                if k == 0 and op in _COSTLY and is_known:
-                    values = tuple(self.load("%c", r * stride) for r in (out, out + 1)[: _results(op)])
-                else:
-                    values = self._advance(op, a, b, c, out, k)
-                for r, value in zip((out, out + 1), values, strict=False):
-                    self.series.setdefault(r, []).append(value)
+            self._run(tape.rows, k)
             if k < order:
                 rates = [self.at(r, k) for r in tape.rates]
                 for r, rate in zip(tape.states, rates, strict=True):
                     self.series[r].append(self.over(rate, k + 1))
+
+    def _run(self, rows: Iterable[tuple[int, ...]], k: int) -> None:
+        """Coefficient k of every operation, in order."""
+        for op, a, b, c, out in rows:
+            if k == 0 and op in _COSTLY and self.is_known:
+                values = tuple(self.load("%c", r * self.stride) for r in (out, out + 1)[: _results(op)])
+            else:
+                values = self._advance(op, a, b, c, out, k)
+            for r, value in zip((out, out + 1), values, strict=False):
+                self.series.setdefault(r, []).append(value)
+
+    def _set_time(self, s: str) -> None:
+        if self.tape.time >= 0:
+            self.series[self.tape.time] = [s, ONE] + [ZERO] * self.order
 
     def at(self, r: int, k: int) -> str:
         """Coefficient k of a register."""
@@ -283,6 +291,19 @@ def series_function(name: str, tape: ModeTape, order: int) -> str:
     return function(name, [*begin, *_start(tape, size).lines, "  br label %go", "go:", *code.lines])
 
 
+def short_function(name: str, tape: ModeTape, order: int, count: int, stride: int) -> str:
+    """The function that writes the coefficients (n, order + 1) of the states and (guards, count).
+
+    stride: columns of the array with the constants.
+    """
+    code = _Expansion(tape, order, stride)
+    for array, registers, size in (("%out", tape.states, order + 1), ("%g", tape.guards, count)):
+        for i, r in enumerate(registers):
+            for k in range(size):
+                code.store(code.at(r, k), array, i * size + k)
+    return function(name, code.lines)
+
+
 def values_function(name: str, tape: ModeTape, stride: int) -> str:
     """The function that writes the rates of the states and the values of the guards."""
     code = _start(tape, stride)
@@ -334,6 +355,31 @@ def ahead_function(name: str, tape: ModeTape, order: int) -> str:
     return function(name, _kept_order(_Ahead(tape, order)).lines)
 
 
+class _Along(_Expansion):
+    """Coefficients of the guards, those of the states being given."""
+
+    def __init__(self, tape: ModeTape, order: int) -> None:
+        Lines.__init__(self, "u")
+        self.tape, self.order, self.stride, self.is_known = tape, order, order + 1, False
+        size = order + 1
+        self.series = {
+            r: [self.load("%x", i * size + k) for k in range(size)] for i, r in enumerate(tape.states)
+        }
+        self._set_time("%s")
+        rows = needed_rows(list(tape.rows), set(tape.guards))
+        for k in range(size):
+            self._run(rows, k)
+
+
+def along_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes the coefficients (guards, order + 1) along states whose own (n, order + 1) are given."""
+    code, size = _Along(tape, order), order + 1
+    for i, r in enumerate(tape.guards):
+        for k in range(size):
+            code.store(code.at(r, k), "%g", i * size + k)
+    return function(name, code.lines)
+
+
 def sizes_function(name: str, guards: int, order: int) -> str:
     """The function of h that writes its powers, and for each guard sum_k |c_k| h**k: even and odd terms apart."""
     code, size = Lines(), order + 1
@@ -364,6 +410,22 @@ def _kept_order(code: _Expansion) -> _Expansion:
             for r in (out, out + 1)[: _results(op)]:
                 code.store(code.at(r, 0), "%c", r * stride)
     return code
+
+
+def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
+    """A module with ends_0, first_0, along_0 and values_0.
+
+    ends_0: so many terms; first_0: the states up to an order of their own; see `short_function`. along_0: guards up to
+    the last order; see `along_function`.
+    """
+    stride = order + 1
+    parts = (
+        short_function("ends_0", tape, terms - 1, terms, stride),
+        short_function("first_0", tape, first, terms, stride),
+        along_function("along_0", tape, order),
+        values_function("values_0", tape, stride),
+    )
+    return DECLARATIONS + "".join(parts)
 
 
 def series_text(tape: ModeTape, order: int) -> str:

@@ -96,7 +96,7 @@ def test_first_estimate_of_dop853() -> None:
     assert low == pytest.approx(h**q_low * c_low / math.factorial(q_low), rel=0.1)
     V = np.array([[1 / math.factorial(k) for k in range(q + 2)]])
     control = (1e-9, np.zeros(1))
-    h = first_length((q, c, c_next, q_low, c_low), np.ones(1), control, np.zeros(1, dtype=np.int64), V, 9.0)
+    h = first_length((q, c, c_next, q_low, c_low), np.ones(1), control, V, 9.0)
     main, low = estimate(h, Dop853.tableau.e), estimate(h, Dop853.tableau.e_low)
     assert 0.2 < main**2 / math.hypot(main, 0.1 * low) / (1e-9 * math.exp(h)) <= 1.0
 

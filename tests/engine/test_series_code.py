@@ -6,26 +6,29 @@ import itertools
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import mode_tables, series_shelf
+from hybridsim.engine import code_shelf, mode_tables
 from hybridsim.engine.bernstein_code import LEADING, bernstein_text
 from hybridsim.engine.bounds_code import bounds_text, can_bound
+from hybridsim.engine.code_shelf import CodeShelf
+from hybridsim.engine.dense_guards import guards_at, series_along
 from hybridsim.engine.first_exit import to_bernstein
 from hybridsim.engine.jets import ORDER
 from hybridsim.engine.jit import ENABLED, call_series, compile_series, kernel
 from hybridsim.engine.mode_code import constant_rows, given, mode_tape
 from hybridsim.engine.mode_tables import shelf_of
-from hybridsim.engine.series import SeriesRun, series_order
-from hybridsim.engine.series_code import series_text
-from hybridsim.engine.series_shelf import SeriesShelf
+from hybridsim.engine.rk_leap import series_of
+from hybridsim.engine.series import SeriesRun
+from hybridsim.engine.series_code import ends_text, series_text
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.steps_ahead import look_ahead, room_ahead
 from hybridsim.engine.system import System
-from hybridsim.engine.taylor import measure
+from hybridsim.engine.taylor import expand, measure
 from hybridsim.engine.timepair import Instant
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="there is no machine code")
@@ -60,6 +63,28 @@ def looked(
 def sized(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
     """Sizes of series."""
     measure(code, U, watched, order, h, powers, totals)
+
+
+@kernel
+def ended(
+    code: int, rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, out: Any, guards: Any
+) -> bool:
+    """Series at the end of a step."""
+    return series_of(code, rows, rows, places, s, x, watched, W, out, guards)
+
+
+@kernel
+def went(code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any) -> None:
+    """Guards along a step."""
+    series_along(code, rows, inputs, s, x, watched, V, W, out)
+
+
+@kernel
+def met(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
+) -> None:
+    """Values of guards."""
+    guards_at(code, rows, inputs, s, x, watched, W, rates, out)
 
 
 def systems() -> dict[str, System]:
@@ -164,20 +189,73 @@ def test_bernstein_forms(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found, expected)
 
 
-def test_a_run_is_the_same_with_code_and_without(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_series_at_the_ends_of_steps_and_guards_along_them(name: str, tmp_path: Path) -> None:
+    system, terms, first, order, s = SYSTEMS[name], 4, 7, 11, 0.1
+    p, x = start_of(system)
+    for i, z in enumerate(modes_of(system)):
+        tape, lean = mode_tape(system, z), system.lean_tape(z)
+        watched = np.array(tape.guards, dtype=np.int64)
+        constants = SeriesRun(system, p, z, Tolerances(1e-9, np.zeros(system.n))).V
+        V, W = (np.pad(constants[:, :1], ((0, 0), (0, order))) for _ in range(2))
+        codes, _keep = compile_series(
+            tmp_path / f"{i}",
+            [f"{part}_0" for part in ("ends", "first", "along", "values")],
+            partial(ends_text, tape, terms, first, order),
+        )
+        inputs, n, count = system.registers.inputs, system.n, len(watched)
+        places = (inputs.time[0], inputs.states, lean.derivatives)
+        made = []
+        for code in (0, codes[0]):
+            out, guards = np.empty((n, terms)), np.empty((count, terms))
+            assert ended(code, lean.rows, places, s, x, watched, W, out, guards)
+            made.append((out, guards))
+        compare(*made)
+        U, C = np.empty((count, terms)), np.empty((n, first + 1))
+        called(codes[1], s, 0.0, x, U, W, C)
+        expand(lean.rows, places, first, s, x, V)
+        compare((C, U), (V[inputs.states, : first + 1], V[watched, :terms]))
+        along = np.cos(np.arange(n * (order + 1.0)) ** 2).reshape(n, order + 1)
+        made = []
+        for code in (0, codes[2]):
+            U = np.empty((count, order + 1))
+            went(code, lean.rows, inputs, s, along, watched, V, W, U)
+            made.append((U,))
+        compare(*made)
+        made = []
+        for code in (0, codes[3]):
+            values = np.empty(count)
+            met(code, lean.rows, inputs, s, x, watched, W, np.empty(n), values)
+            made.append((values,))
+        compare(*made)
+
+
+def compare(first: Any, second: Any) -> None:
+    """The same to the last bit."""
+    for one, other in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
+@pytest.mark.parametrize("name", ["dfcs-stribeck", "dfcs"])
+def test_a_run_is_the_same_with_code_and_without(
+    name: str, integrator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first run goes by the interpreters alone, the last by machine code."""
-    model, rtol, runs = hs.load("dfcs-stribeck"), 3e-10, []
-    system = System(model)
-    order = series_order(rtol, system.is_linear)
-    for steps in (2**62, 1, 1):
-        for module in (series_shelf, mode_tables):
-            monkeypatch.setattr(module, "KNOWN", steps)
-            monkeypatch.setattr(module, "WORTH", steps)
-        runs.append(hs.simulate(model, (0, 0.05), integrator="taylor", rtol=rtol))
-    tapes = shelf_of(system).tapes
-    codes = system.code.shared(f"series of order {order}", lambda: SeriesShelf(system, order)).of(tapes)
-    assert codes.series.all() and tapes.bounds.all()
-    assert len(runs[0].events) > 10
+    model, runs = hs.load(name), []
+    code = System(model).code
+    with patch.dict(code._shared, clear=True):  # what other runs have left behind is code already
+        for steps in (2**62, 1, 1):
+            for module in (code_shelf, mode_tables):
+                monkeypatch.setattr(module, "KNOWN", steps)
+                monkeypatch.setattr(module, "WORTH", steps)
+            runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))
+        tapes, shelves = shelf_of(System(model)).tapes, code._shared.values()
+        made = [
+            kept.of(tapes).arrays[: len(kept.functions)] for kept in shelves if isinstance(kept, CodeShelf)
+        ]
+        assert any(np.all(addresses) for addresses in made) and tapes.bounds.all()
+    assert len(runs[0].events) > 4
     for other in runs[1:]:
         np.testing.assert_array_equal(other.t, runs[0].t)
         np.testing.assert_array_equal(other.y, runs[0].y)
