@@ -155,6 +155,21 @@ def judge_members(
     return verdict
 
 
+@inlined
+def goes_on(
+    automata: Any, lin: Any, k: int, z: Any, fired: int, is_known: bool, x: Any, x_error: Any, work: Any
+) -> bool:
+    """Whether the located guard certainly leaves the modes z in row k, in which it was located, after its zero as well.
+
+    Then that is the verdict on them: LEAVES. is_known: the guards' series there are known.
+    """
+    if not (is_known or is_linear(lin)):
+        return False
+    c = automata.owner[fired]
+    zeros = decreed_zeros(automata.place[fired] == 0, True, z[c] == automata.hold[c], False, True, False)
+    return guard_side(lin, k, fired, zeros, x, x_error, work)[0] < 0
+
+
 @merged
 def cluster_of(automata: Any, c: int) -> Any:
     """The components whose modes are decided together with that of one."""

@@ -125,7 +125,7 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
         if automata.is_unilateral[automata.cluster[i]]:
             return False
     if automata.hold[c] >= 0:
-        number = decide_surface(automata, tapes, inputs, lin, state, work, fired, is_known)
+        number = decide_surface(automata, tapes, inputs, lin, state, work, fired, k, is_known)
         if number < 0:
             return False
         if (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.decide import FINE, LEAVES, NONE, NONUNIQUE, choose, preference
-from hybridsim.engine.event_verdicts import UNKNOWN, cluster_of, judge_candidate
+from hybridsim.engine.event_verdicts import UNKNOWN, cluster_of, goes_on, judge_candidate
 from hybridsim.engine.event_work import called_by, located, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, merged
@@ -20,16 +20,18 @@ def decide_single(
     state: Any,
     work: Any,
     fired: int,
+    k: int,
     is_known: bool,
     c: int,
 ) -> int:
     """As `decide_surface`, for one component at its surface: what `choose` makes of its three modes, one by one."""
     z, trial = work.z_after, work.trial
     now, hold = z[c], automata.hold[c]
-    trial[c] = now
-    verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
-    if verdict != LEAVES:
-        return now if verdict == FINE else -1
+    if not goes_on(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
+        trial[c] = now
+        verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
+        if verdict != LEAVES:
+            return now if verdict == FINE else -1
     if now != hold:
         for mode in (hold, 3 - hold - now):
             trial[c] = mode
@@ -58,12 +60,21 @@ def decide_single(
 
 @merged
 def decide_surface(
-    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, fired: int, is_known: bool
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    state: Any,
+    work: Any,
+    fired: int,
+    k: int,
+    is_known: bool,
 ) -> int:
     """The admissible modes, written to `work.z_after`, of the components of a cluster that are at their surfaces.
 
     Returns the number of that candidate; -1 where it is not plain. Candidates are tried in the order in which `choose`
-    prefers them, up to the first that it will take. is_known: the guards' series of the modes before are there.
+    prefers them, up to the first that it will take. k: the row of the modes before; is_known: their guards' series are
+    there.
     """
     at, x, x_error, z = located(state, work), work.x_after, work.slopes, work.z_after
     members, trial, candidates, verdicts = work.members, work.trial, work.candidates, work.verdicts
@@ -93,7 +104,7 @@ def decide_surface(
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     if count == 1:
-        return decide_single(automata, tapes, inputs, lin, state, work, fired, is_known, members[0])
+        return decide_single(automata, tapes, inputs, lin, state, work, fired, k, is_known, members[0])
     total = 3**count  # a surface has three modes
     for number in range(total):
         rest = number
@@ -112,6 +123,8 @@ def decide_surface(
             for i in range(count):
                 trial[members[i]] = candidates[number, i]
             is_current = rank >= (count + 1) * count
+            if is_current and goes_on(automata, lin, k, z, fired, is_known, x, x_error, work):
+                continue
             verdict = judge_candidate(
                 automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number
             )
