@@ -56,6 +56,19 @@ def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
     assert all(array.flags.c_contiguous and array.flags.aligned for array in rows)
 
 
+def test_memory_is_handed_on_once_nobody_holds_it() -> None:
+    sheet = Sheet(Rows, FIELDS)
+    blocks = sheet.blank()
+    held = sheet.rows(blocks).numbers[1:]
+    places = [block.ctypes.data for block in blocks]
+    del blocks
+    others = sheet.blank()
+    assert not np.shares_memory(others[0], held)
+    assert others[1].ctypes.data == places[1]
+    del held
+    assert [block.ctypes.data for block in sheet.blank()][0] == places[0]
+
+
 def test_a_door_leads_to_the_same_kernel() -> None:
     arrays = Rows(np.zeros((2, 2)), np.zeros(3, dtype=np.int64), np.zeros((1, 0), dtype=complex))
     door = Door(_number)
