@@ -66,7 +66,7 @@ def test_memory_is_handed_on_once_nobody_holds_it() -> None:
     assert not np.shares_memory(others[0], held)
     assert others[1].ctypes.data == places[1]
     del held
-    assert [block.ctypes.data for block in sheet.blank()][0] == places[0]
+    assert sheet.blank()[0].ctypes.data == places[0]
 
 
 def test_a_door_leads_to_the_same_kernel() -> None:
