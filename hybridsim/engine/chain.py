@@ -160,14 +160,14 @@ class SegmentChain(Chain[Segment]):
         moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
         sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
         first = max(int(np.searchsorted(sign * moved, 0.0, side="right")) - 1, 0)
-        held, s = self[first], instant.minus(Instant(*origins[first].tolist()))
+        self.drop(first)
+        held, s = self[0], instant.minus(Instant(*origins[first].tolist()))
         if sign * s <= sign * held.s[0]:
-            self.drop(first)
             return
-        x = self.states(np.array([first]), np.array([s]))
+        x = self.states(np.array([0]), np.array([s]))
         later = sign * held.s > sign * s
         knots, states = np.append(s, held.s[later]), np.concatenate([x, held.x[later]])
-        self.drop(first + 1)
+        self.drop(1)
         head = self._loose()
         head.append(Segment(held.origin, held.z, held.p, knots, states, held.dense))
         self.blocks.insert(0, head)
