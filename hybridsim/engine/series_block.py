@@ -130,7 +130,9 @@ class SeriesBlock(Sequence[Segment]):
     def since(self, first: int) -> SeriesBlock:
         """Those from the first on."""
         rows = (self.origins, self.modes, self.vectors, self.jumps)
-        return type(self)(self.system, self.ends[first:], self.steps, self.series, *(r[first:] for r in rows))
+        ends, gone = self.ends[first:], self.ends[first]
+        steps, series = self.steps[gone:], self.series[gone:]
+        return type(self)(self.system, ends - gone, steps, series, *(r[first:] for r in rows))
 
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
