@@ -146,9 +146,8 @@ class ModelError(HybridsimError):
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
         """One error out of many: the only one itself, or a list of all, by line, under a title."""
-        every = {
-            str(single): single for error in errors for single in error.errors
-        }  # a fault met twice is one
+        # a fault met twice is one
+        every = {str(single): single for error in errors for single in error.errors}
         found = sorted(every.values(), key=_line)
         if len(found) == 1:
             return found[0]

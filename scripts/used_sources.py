@@ -78,9 +78,8 @@ def _handed_on(package: str, name: str) -> set[tuple[str, str]]:
     file = _file(package)
     assert file is not None
     handed = {one for one in _imports(file) if one[1] == name}
-    if (
-        not handed and _file(f"{package}.{name}") is None
-    ):  # the package defines it, out of whatever it imports
+    # the package defines it, out of whatever it imports
+    if not handed and _file(f"{package}.{name}") is None:
         return set(_imports(file))
     return handed | {(f"{package}.{name}", "")}  # a module and what it defines may have one name
 

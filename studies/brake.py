@@ -63,9 +63,8 @@ def simulated(mu: float, c: float) -> float:
     )
     assert sol.success and not sol.events, (mu, c, sol.message)
     states = sol(np.arange(0.0, WATCHED, STEP)) - rest[:, None]
-    scale = np.abs(states).max(
-        axis=0
-    )  # each pair of instants counts alike, however small the shake is by then
+    # each pair of instants counts alike, however small the shake is by then
+    scale = np.abs(states).max(axis=0)
     before, after = states[:, :-1] / scale[:-1], states[:, 1:] / scale[:-1]
     step, *_ = np.linalg.lstsq(before.T, after.T, rcond=None)
     return float(np.log(np.abs(np.linalg.eigvals(step)).max()) / STEP)

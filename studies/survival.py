@@ -26,9 +26,8 @@ import hybridsim as hs
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "survival.md"
 _SCENES = Path(hs.__file__).parent / "testing" / "scenes"
-FILES = {
-    name: str(_SCENES / f"{name}.toml") for name in ("bar", "rubbing-stop")
-}  # the others are models of the package
+# the others are models of the package
+FILES = {name: str(_SCENES / f"{name}.toml") for name in ("bar", "rubbing-stop")}
 # Ends of the runs. A compiled loop looks at its limits between stretches of a thousand segments or of some thousand
 # fixed steps, so that a run has to be several of them long to be stopped at all.
 SCENES = {

@@ -46,9 +46,8 @@ class Bench:
         from hybridsim.simulate import simulate
 
         solution = simulate(model or self.model, self.t_span, integrator=integrator, **options)
-        if (
-            solution.status == "interrupted"
-        ):  # Ctrl-C means the whole comparison, not the one run that took it
+        # Ctrl-C means the whole comparison, not the one run that took it
+        if solution.status == "interrupted":
             raise KeyboardInterrupt
         return solution
 
@@ -88,9 +87,8 @@ class Bench:
             return replace(
                 row, status="refused" if isinstance(error, UsageError) else "failed", message=error.message
             )
-        except (
-            Exception
-        ) as error:  # an integrator may be anybody's: whatever it raises costs its own row only
+        # an integrator may be anybody's: whatever it raises costs its own row only
+        except Exception as error:
             return replace(row, message=f"{type(error).__name__}: {error}")
         stats = solution.stats
         rhs, guards, steps = (int(stats[name]) for name in ("rhs_evaluations", "guard_evaluations", "steps"))

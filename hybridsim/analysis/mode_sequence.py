@@ -134,10 +134,11 @@ def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -
     a, b = np.array([entry.t for entry in expected]), np.array([entry.t for entry in found])
     lows, highs = np.searchsorted(b, a - window), np.searchsorted(b, a + window, side="right")
     choices: list[NDArray[np.int8]] = []
+    # cost of having aligned the entries so far with the first `low`, low + 1, ... found
     low, cost = (
         0,
         np.zeros(1),
-    )  # cost of having aligned the entries so far with the first `low`, low + 1, ... found
+    )
     for i, (next_low, high) in enumerate(zip(lows, highs, strict=True)):
         count = np.arange(next_low, high + 1)
         beyond = np.maximum(count - (low + len(cost) - 1), 0)

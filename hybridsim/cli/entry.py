@@ -79,9 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         gc.set_threshold(100_000, 50, 50)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(
-                errors="backslashreplace"
-            )  # a title with an accent must not stop an ASCII terminal
+            # a title with an accent must not stop an ASCII terminal
+            stream.reconfigure(errors="backslashreplace")
     session = Session()
     lighter = ""  # what takes less memory, of what a command has
     with warnings.catch_warnings(), session.listening():

@@ -27,15 +27,15 @@ _WEIGHTS = np.array(
     ]
 )
 _GAIN = np.abs(_WEIGHTS[:, 0]).sum(axis=1) * np.array([2.0, 4.0, 2.0])  # of the values' rounding
+# no power of two: a period of one is not met by whole steps
 _SHORTEST, _RATIO, _LEVELS = (
     0.618 * 2.0**-56,
     8.0,
     23,
-)  # no power of two: a period of one is not met by whole steps
+)
 _WORSE = 16.0  # times the best bound: the step has become too long
-_APART = (
-    2.0**10
-)  # roundings by which a state is moved to see what it does: its effect stands out of the noise
+# roundings by which a state is moved to see what it does: its effect stands out of the noise
+_APART = 2.0**10
 _SMALLEST = 2.0**-40  # what a state is moved by where nothing tells its size
 
 

@@ -89,11 +89,8 @@ class ExactLeaper:
                 Record,
                 (
                     (float, (_SEGMENTS,), 0),
-                    (
-                        float,
-                        (_SEGMENTS + 1, 2),
-                        1,
-                    ),  # one row more: where each begins and where the last one ends
+                    # one row more: where each begins and where the last one ends
+                    (float, (_SEGMENTS + 1, 2), 1),
                     (np.int64, (_SEGMENTS,), 0),
                     (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
                     (float, (_SEGMENTS, system.layout.size), 0),

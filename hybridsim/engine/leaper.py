@@ -77,9 +77,8 @@ def compile_leaps(system: System, make: Maker) -> None:
         np.zeros(guards),
         np.zeros(0),
     )
-    with suppress(
-        StepFailure
-    ):  # such as a rate without a value; it is for the run to tell, and compiles by itself
+    # such as a rate without a value; it is for the run to tell, and compiles by itself
+    with suppress(StepFailure):
         leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
         _compiled.append(make)
 
@@ -147,11 +146,8 @@ class Leaper(ABC):
                 (
                     (float, (steps, 2), 0),
                     (float, (steps, system.n, columns), 0),
-                    (
-                        np.int64,
-                        (_SEGMENTS + 1,),
-                        0,
-                    ),  # one row more: where each begins and where the last one ends
+                    # one row more: where each begins and where the last one ends
+                    (np.int64, (_SEGMENTS + 1,), 0),
                     (float, (_SEGMENTS + 1, 2), 1),
                     (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
                     (float, (_SEGMENTS, system.layout.size), 0),

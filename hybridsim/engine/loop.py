@@ -49,9 +49,8 @@ class ModeLoop:
         self.gauge = Gauge(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
-        self.crossed_by_reset: dict[
-            int, int
-        ] = {}  # monitors whose resets an event set off, and their direction
+        # monitors whose resets an event set off, and their direction
+        self.crossed_by_reset: dict[int, int] = {}
         self.adopted: Instant | None = None  # the last instant at which an event was settled
         fastest = float(max(map(abs, system.rates), default=0.0))
         self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf

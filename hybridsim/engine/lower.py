@@ -73,13 +73,11 @@ class Lowering:
         self.unknown: dict[int, Any] = {}  # of each surface
         self.definitions: dict[Any, Any] = {}
         self.effects: list[Any] = []  # of each unknown on the rate of its own surface
-        self.held_rates: dict[
-            int, Any
-        ] = {}  # what each unknown acts on the rate of: a surface, or the rate of a gap
+        # what each unknown acts on the rate of: a surface, or the rate of a gap
+        self.held_rates: dict[int, Any] = {}
         self.open_rates: list[Any] = []  # of the states, over the unknowns
-        self.never_held: set[int] = (
-            set()
-        )  # components whose unknown does not act on the rate of their surface
+        # components whose unknown does not act on the rate of their surface
+        self.never_held: set[int] = set()
         self.partners: dict[int, Partner] = {}  # of those that are held by the surface of their rate
         self.ties: list[Tie] = []
         self.effect: dict[tuple[int, int], Any] = {}  # of unknowns on what is held
@@ -150,9 +148,8 @@ class Lowering:
         """Run all the steps."""
         model, sp = self.model, self.sp
         self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
-        ordered(
-            [Assign(k.name, e) for k, e in definitions.items()]
-        )  # a circle could not be put in without end
+        # a circle could not be put in without end
+        ordered([Assign(k.name, e) for k, e in definitions.items()])
         signals = {self.symbols[i.name]: self.signal(k) for k, i in enumerate(model.inputs)}
         der = [self.convert(s.der) for s in model.states]
         items: list[Item] = [Assign(user("t"), sp.Symbol("origin", real=True) + self.s)]

@@ -106,9 +106,8 @@ def _load(model: Model, name: str) -> Compiled:
         seconds = time.perf_counter() - start
     try:
         return Compiled(_import(name, path), seconds)
-    except (
-        Exception
-    ):  # a damaged file may raise anything; written anew, it tells whether the fault is its own
+    # a damaged file may raise anything; written anew, it tells whether the fault is its own
+    except Exception:
         from hybridsim.engine.emit import emit
 
         write_whole(path, emit(model).encode())

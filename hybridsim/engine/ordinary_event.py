@@ -128,9 +128,8 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
         number = decide_surface(automata, tapes, inputs, lin, state, work, fired, k, is_known)
         if number < 0:
             return False
-        if (
-            automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]
-        ):  # all has been judged there
+        # all has been judged there
+        if automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]:
             put(work.all_sides[number], sides)
             put(work.all_orders[number], orders)
             put(work.all_floors[number], floors)

@@ -184,9 +184,8 @@ class Sheet:
         self._kind = kind
         self._places: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
         self._sizes = [0] * (1 + max(block for *_, block in fields))
-        self._words = np.zeros(
-            (len(fields), _WORDS), dtype=np.int64
-        )  # the table, but for the blocks' addresses
+        # the table, but for the blocks' addresses
+        self._words = np.zeros((len(fields), _WORDS), dtype=np.int64)
         self._steps = np.zeros_like(self._words)  # what a row that is skipped adds to it
         self._owners = np.array([block for *_, block in fields], dtype=np.int64)
         for k, (name, shape, block) in enumerate(fields):

@@ -127,9 +127,8 @@ class Compiler:
             try:
                 named = parameters(*to_fixed_tuple(given, count))
                 _put(function(t, state.copy(), named), out, at, width)
-            except (
-                Exception
-            ):  # the only clause that numba compiles; what it was is found out by calling it again
+            # the only clause that numba compiles; what it was is found out by calling it again
+            except Exception:
                 raised = True
             if raised:
                 if p[origin + 1] > 0.0:  # on the run, not in differences far from it

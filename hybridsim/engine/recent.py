@@ -24,9 +24,8 @@ def system_of(model: Model) -> System:
     ModelError
         With all faults of the model.
     """
-    system = _kept.get(
-        id(model)
-    )  # a system holds its model, so nothing else has that number while it is kept
+    # a system holds its model, so nothing else has that number while it is kept
+    system = _kept.get(id(model))
     if system is not None:
         return system
     system = System(model.validate())

@@ -17,9 +17,8 @@ class Releases:
 
     def __init__(self, system: System, before: np.ndarray) -> None:
         self.system, self.before = system, before
-        self._by = [_NONE] * len(
-            system.automata
-        )  # the first located guard of each: 0 releases above, 1 below
+        # the first located guard of each: 0 releases above, 1 below
+        self._by = [_NONE] * len(system.automata)
 
     def locate(self, located: set[int]) -> None:
         """Note the guards at which the event was located."""

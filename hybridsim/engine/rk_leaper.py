@@ -155,9 +155,8 @@ class RungeKuttaLeaper(Leaper):
     def _count(self, counters: Counters, steps: int, room: Any) -> None:
         tries, rejected = room.counts.tolist()
         counters.rejected += rejected
-        counters.rhs_evaluations += (
-            tries * (len(self.tableau.c) - 1) + steps
-        )  # the slope comes with the series
+        # the slope comes with the series
+        counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + steps
 
     def _block(self, *arrays: np.ndarray) -> HermiteBlock:
         return HermiteBlock(self.system, *arrays)

@@ -32,9 +32,8 @@ _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
 _MOST_PIECES = 200_000  # a guard that needs more oscillates some 20 000 times within one step
 _CLOSEST = 40  # halvings toward the start of a step in search of a value that rounding has not made
-_TOUCHING = (
-    2.0**-40
-)  # of the largest value on a step: a dip to below that is held against the rounding of the values
+# of the largest value on a step: a dip to below that is held against the rounding of the values
+_TOUCHING = 2.0**-40
 _ROUNDINGS_BEFORE = 8.0  # times the rounding of one step: what those before it may have left
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 

@@ -114,9 +114,8 @@ class SegmentRun:
     def run(self, bound: float, first_step: float | None) -> Arrival:
         """Step to the first event, or to the bound."""
         undecided = self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]
-        if (
-            len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all()
-        ):  # rates are told of by the stepper
+        # rates are told of by the stepper
+        if len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all():
             self._refuse_undefined(int(undecided[0]), 0.0)
         stepper = self._start(bound, first_step)
         self.counters.restarts += 1
@@ -431,9 +430,8 @@ class SegmentRun:
                 continue
             wanted = self._wanted(root.number, root.direction)
             if wanted and self.monitors[root.number].action != "record":
-                stopping.append(
-                    root.number
-                )  # its side before the event decides the direction that is recorded
+                # its side before the event decides the direction that is recorded
+                stopping.append(root.number)
                 continue
             self.locator.monitor_sides[root.number] = root.direction
             if wanted:

@@ -69,10 +69,11 @@ class NativeStepper:
                     first_step=first_step,
                     **({"jac": flow.jacobian} if implicit else {}),
                 )
+            # of its root finder, or of a matrix that is no number
             except (
                 RuntimeError,
                 ValueError,
-            ) as failure:  # of its root finder, or of a matrix that is no number
+            ) as failure:
                 raise StepFailure(f"solve_ivp raises {type(failure).__name__}: {failure}") from None
         self.failure = result.message if result.status < 0 else ""
         self.steps = iter(self._cut(result, guards, monitors))

@@ -16,11 +16,12 @@ _NOISE = {
     "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
 }
 _EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
+# roots of |R(-z)| = 1 for their stability polynomials
 _STABLE = {
     "RK23": 2.513,
     "RK45": 3.307,
     "DOP853": 6.394,
-}  # roots of |R(-z)| = 1 for their stability polynomials
+}
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+# mode of a contact at rest (+1, -1: slip forward, backward); no event in sight
 STICK, OPEN_END = (
     0,
     2.0**1000,
-)  # mode of a contact at rest (+1, -1: slip forward, backward); no event in sight
+)
 VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that reaches no further
 DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop came back
 

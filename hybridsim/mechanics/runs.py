@@ -168,9 +168,8 @@ def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, share: float)
         a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         off = size(load(sums, wide + a) - slip * load(W, g * block + out))
         beyond = off - splat(share) * load(sums, 2 * wide + a)
-        worst = worst + choose(
-            slip, larger(beyond, zero) + zero * beyond, zero
-        )  # no number where that is none
+        # no number where that is none
+        worst = worst + choose(slip, larger(beyond, zero) + zero * beyond, zero)
     store(sums, 0, worst)
     for i in range(WIDTH):
         if not sums[0, i] <= 0.0:

@@ -15,13 +15,14 @@ from hybridsim.model.one_sided import number_of
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
+# in units of a usual one: a sign that is wrong at all of these is no detail
 _SPEEDS = (
     1e-3,
     1e-2,
     0.1,
     1.0,
     10.0,
-)  # in units of a usual one: a sign that is wrong at all of these is no detail
+)
 _FRICTION = "a friction force must not be negative: correct the sign"
 
 

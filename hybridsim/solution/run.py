@@ -52,8 +52,7 @@ class Run:
             trajectory.warnings[caution.sentence] = 1
         trajectory.close(self.task.keep)
         run = self
-        if (
-            self.task.record is not None
-        ):  # a solution holds on to what the run left, not to what it began with
+        # a solution holds on to what the run left, not to what it began with
+        if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
         return Solution(run, trajectory, before + wall_time, compile_time)

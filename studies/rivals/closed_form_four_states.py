@@ -119,9 +119,8 @@ def _follow(
     put_in, rest = np.empty(4), np.empty(4)
     count, point, turns, angle = 0, 0, 0, 0.0
     period = 2.0 * math.pi / w
-    released = (
-        -1
-    )  # the mass that has just been released or has turned: its guard is zero where the piece begins
+    # the mass that has just been released or has turned: its guard is zero where the piece begins
+    released = -1
     turn_drive = complex(math.cos(w * h), math.sin(w * h))
     while True:
         start = turns * period + angle / w
@@ -139,9 +138,8 @@ def _follow(
         for j in range(2):
             if mode[j] == 0:
                 rest[2 * j] = x[2 * j]
-        drive = complex(
-            math.sin(angle), -math.cos(angle)
-        )  # exp(i (angle + w s)) / i: its real part is the sine
+        # exp(i (angle + w s)) / i: its real part is the sine
+        drive = complex(math.sin(angle), -math.cos(angle))
         for q in range(2):
             c[q] = 0.0
             for i in range(4):

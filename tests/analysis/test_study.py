@@ -51,9 +51,8 @@ def test_exact_steady_state_with_stops_against_an_independent_run() -> None:
     x = motion(t)[0]
     found = exact(point)
     assert found.stops == 2
-    assert found.amplitude == pytest.approx(
-        0.5 * (x.max() - x.min()), rel=1e-7
-    )  # a stop is flat: sampled well
+    # a stop is flat: sampled well
+    assert found.amplitude == pytest.approx(0.5 * (x.max() - x.min()), rel=1e-7)
     assert found.energy == pytest.approx(np.trapezoid(x**2, t), rel=1e-7)
     assert found.stick == pytest.approx(2.0 * sticks[0] / point.period, rel=1e-9)
     assert found.residual < 1e-10

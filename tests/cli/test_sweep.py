@@ -37,9 +37,8 @@ def test_readings_of_the_last_period(hybridsim: Callable) -> None:
     period = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
     for load, amplitude in zip((22.0, 30.0), json.loads(out)["values"]["amplitude.x"], strict=True):
         x = hs.simulate("dfcs", (0, 40 * period), params={"F0": load}, save="last-period").y[0]
-        assert amplitude == pytest.approx(
-            0.5 * (x.max() - x.min()), rel=1e-12
-        )  # it turns where v is zero: at events
+        # it turns where v is zero: at events
+        assert amplitude == pytest.approx(0.5 * (x.max() - x.min()), rel=1e-12)
     code, _, err = hybridsim("sweep", "dfcs", "F0=22,30", *FINAL, "--after", 40)
     assert code == 2 and "--after is for readings of a period" in err
 

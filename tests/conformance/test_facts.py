@@ -56,9 +56,8 @@ def test_recomputed_truths_agree_with_the_facts(name: str) -> None:
         assert states[12.0][:3] == pytest.approx(fact["q_final"], abs=DIGITS)
     if name == "MSL-elastogap":
         for t, s in fact["s"].items():
-            assert states[float(t)] == pytest.approx(
-                (s, fact["v"][t]), abs=1e-10
-            )  # found with a step by its source
+            # found with a step by its source
+            assert states[float(t)] == pytest.approx((s, fact["v"][t]), abs=1e-10)
     if name == "SIC-relayosc":
         times = [row[0] for row in truth["events"]]
         assert times[:4] == pytest.approx(fact["switch_times_first"], abs=DIGITS)

@@ -259,9 +259,8 @@ def test_decreed_zeros(
         decreed,
     )
     beside = on_surface and not holding
-    at_zero = fired and (
-        continuous or not holding
-    )  # a limit that another unknown's jump may have undone is none
+    # a limit that another unknown's jump may have undone is none
+    at_zero = fired and (continuous or not holding)
     # a gap is held together with its rate
     surface = (2 if released and continuous else 1) + gap if beside else int(at_zero)
     assert decreed.tolist() == [surface, int(at_zero), 7, 0, 7]

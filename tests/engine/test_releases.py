@@ -46,9 +46,8 @@ def verdicts(count: int) -> Counter[str]:
     """How the engine fares at releases: right, undecided (says so), failed (stops), wrong."""
     result: Counter[str] = Counter()
     for case, t, end, mode in first_releases(count):
-        sol = case.run(
-            end, "scipy-dop853"
-        )  # which has its events settled in Python, where the rules can be changed
+        # which has its events settled in Python, where the rules can be changed
+        sol = case.run(end, "scipy-dop853")
         released = [(e.t, e.target) for e in sol.events if e.kind == "transition"]
         if not sol.success:
             result["failed"] += 1

@@ -50,6 +50,7 @@ LINES = [
         "sweep --help",
     )
 ]
+# options that name where something is written
 PATHS = (
     "--csv",
     "--npz",
@@ -57,7 +58,7 @@ PATHS = (
     "--out",
     "--plot",
     "--images",
-)  # options that name where something is written
+)
 WORDS = sorted({word for line in LINES for word in line} | {"--plot", "--images", "--uncertain", "-h", "--"})
 
 

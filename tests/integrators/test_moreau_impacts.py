@@ -34,9 +34,8 @@ def test_the_error_falls_in_proportion_to_the_step(scene: str) -> None:
     model = made if isinstance(made, str) else made()
     reference = hs.simulate(model, (0, end), integrator="taylor", rtol=1e-11)
     assert any(e.source == "open" for e in reference.events)
-    times = np.linspace(
-        0, end, 32001
-    )  # finer than the steps: a velocity that jumps late differs between two of them
+    # finer than the steps: a velocity that jumps late differs between two of them
+    times = np.linspace(0, end, 32001)
     truth = reference(times)
     scale = np.abs(truth).max(axis=1)[:, None]
     errors = np.zeros((3, len(truth)))
@@ -112,9 +111,8 @@ def test_friction_takes_its_share_of_an_impact() -> None:
     assert sol(landed + 0.01)[1] == pytest.approx(left - p["mu"] * p["g"] * 0.01, abs=1e-3)
     assert sol(1.9)[1:].tolist() == [0.0, 0.0, 0.0]
     dead = hs.simulate(model, (0, 2), integrator="moreau", step=2e-5, params={"e": 0, "mu": 3})
-    struck = next(
-        i for i in dead.modes["f"] if i.mode == "stick"
-    )  # 3 times the speed of approach is more than u0
+    # 3 times the speed of approach is more than u0
+    struck = next(i for i in dead.modes["f"] if i.mode == "stick")
     assert struck.t0 == pytest.approx(fall / p["g"], abs=2.1e-5)
 
 

@@ -143,9 +143,8 @@ def test_a_load_that_vanishes(integrator: str) -> None:
         ("f_N", "open", "closed"),
     ]
     assert [e.t for e in sol.events] == pytest.approx([7 * pi / 6, 11 * pi / 6], rel=1e-9)
-    lost = mu * (
-        2 * pi - 2 * pi / 3 + 2 * sqrt(3)
-    )  # 2 (1 - cos) over both parts with contact: 2 sqrt(3) in sum
+    # 2 (1 - cos) over both parts with contact: 2 sqrt(3) in sum
+    lost = mu * (2 * pi - 2 * pi / 3 + 2 * sqrt(3))
     assert sol(2 * pi)[0] == pytest.approx(5 - lost, rel=WITHIN.get(integrator, 1e-8))
     assert sol.output("f", 1.5 * pi) == 0.0
 

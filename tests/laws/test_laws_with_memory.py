@@ -180,9 +180,8 @@ def test_elasto_plastic(integrator: str) -> None:
     sliding = run(driven("elasto-plastic", p, "0.4"), 20.0, integrator)
     assert [e.target for e in sliding.events] == ["slip+"]
     assert sliding.events[0].t == pytest.approx(0.7 * 5 / 50 / 0.4, rel=1e-9)
-    assert sliding.output("f", 20.0) == pytest.approx(
-        5 + 0.3 * 0.4, rel=1e-3
-    )  # alpha is flat at its end: slow
+    # alpha is flat at its end: slow
+    assert sliding.output("f", 20.0) == pytest.approx(5 + 0.3 * 0.4, rel=1e-3)
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "taylor"])

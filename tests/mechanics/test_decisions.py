@@ -13,9 +13,8 @@ MODES = {"stick": 0, "slip+": 1, "slip-": -1}
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(
-    ("seed", "span"), [(4, 6.0), (9, 6.0), (17, 10.0)]
-)  # 17: two in one direction stop together
+# 17: two in one direction stop together
+@pytest.mark.parametrize(("seed", "span"), [(4, 6.0), (9, 6.0), (17, 10.0)])
 def test_every_decision_is_admissible_and_the_order_of_declaration_is_none_of_them(
     law: str, seed: int, span: float
 ) -> None:

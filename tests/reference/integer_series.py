@@ -129,9 +129,8 @@ def _coefficient(
     if op == "sqrt":
         return _leading(_MP.sqrt, a[0]) if n == 0 else ((a[n] << BITS) - _inner(out, n)) // (2 * out[0])
     if op in ("sin", "cos"):
-        sign = (
-            1 if op == "sin" else -1
-        )  # (sin)' = cos a', (cos)' = -sin a'; what goes beside has the other sign
+        # (sin)' = cos a', (cos)' = -sin a'; what goes beside has the other sign
+        sign = 1 if op == "sin" else -1
         other = _MP.cos if op == "sin" else _MP.sin
         if n == 0:
             also.append(_leading(other, a[0]))

@@ -73,9 +73,8 @@ class Structure:
     masses: int
     uniform: dict[str, tuple[float, float]] = field(default_factory=dict)  # range of each parameter
     follow: list[Callable[[Values], None]] = field(default_factory=list)  # values that depend on others
-    springs: list[tuple[int, int, str]] = field(
-        default_factory=list
-    )  # masses (-1: ground) and the spring's name
+    # masses (-1: ground) and the spring's name
+    springs: list[tuple[int, int, str]] = field(default_factory=list)
     dampers: list[tuple[int, int, str]] = field(default_factory=list)
     forces: dict[int, list[str]] = field(default_factory=dict)
     elements: list[Element] = field(default_factory=list)

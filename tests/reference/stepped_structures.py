@@ -181,9 +181,8 @@ def march(plan, q0, v0, end, samples, steps):
                 source = (machine[3] if on[k] else 0.0) + machine[7] * middle[int(machine[2])]
                 warmer = heat[k] + h * (source - heat[k]) / (1.0 + 0.5 * h)
                 edge = machine[5] if on[k] else machine[4]
-                if (
-                    (warmer > edge) if on[k] else (warmer < edge)
-                ):  # the rest of the step with the other source
+                # the rest of the step with the other source
+                if (warmer > edge) if on[k] else (warmer < edge):
                     on[k] = not on[k]
                     rest = h * (1.0 - (edge - heat[k]) / (warmer - heat[k])) if heat[k] != warmer else h
                     source += machine[3] if on[k] else -machine[3]

@@ -105,9 +105,8 @@ def test_a_plastic_impact_and_a_lift_at_one_instant(integrator: str) -> None:
     assert seen(open_) == {("open",): TAKEN, ("closed",): NO}
     assert values(open_) == pytest.approx({("p open", "gap"): 10.0, ("p closed", "force"): -10.0})
     decided = "open is the only mode that is admissible just after"
-    if (
-        sol.events[0].kind == "scheduled"
-    ):  # by a rounding the lift comes first, and the impact leads to no rest
+    # by a rounding the lift comes first, and the impact leads to no rest
+    if sol.events[0].kind == "scheduled":
         assert not closed.candidates and open_.reason == decided
         return
     assert seen(closed) == {("open",): NO, ("closed",): TAKEN}

@@ -149,9 +149,8 @@ def test_all_text_is_escaped() -> None:
     )
     page = Page(text)
     assert not page.all("script") and len(page.all("b")) == 1
-    assert (
-        page.text().count(HOSTILE) == 3 + 1 + 1 + 1 + 4 + 1 + 1
-    )  # head, strip, legend, title, event, warning
+    # head, strip, legend, title, event, warning
+    assert page.text().count(HOSTILE) == 3 + 1 + 1 + 1 + 4 + 1 + 1
 
 
 def test_a_hostile_title_of_a_model() -> None:

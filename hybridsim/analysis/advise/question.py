@@ -22,6 +22,7 @@ OF_CONTACT = ("dissipated", "stick_fraction")
 OF_RUN = ("final", "event_time")
 OF_MOTION = ("period",)
 HEADS = (*OF_QUANTITY, *OF_CONTACT, *OF_MOTION, *OF_RUN)
+# what can be zero but for rounding
 _SIGNED = (
     "amplitude",
     "maximum",
@@ -29,7 +30,7 @@ _SIGNED = (
     "mean",
     "harmonic",
     "final",
-)  # what can be zero but for rounding
+)
 _NEUTRAL = 1e-6  # a disturbance that a period takes less of than that stays
 _STICK = "stick"  # the mode of every contact in which nothing slides
 

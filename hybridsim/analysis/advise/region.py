@@ -30,11 +30,12 @@ from hybridsim.analysis.sweep import Sweep, sweep
 from hybridsim.errors import SimulationError
 from hybridsim.model import Model
 
+# tried only where nothing simpler serves: they cost as much as the full model
 _DEAR = (
     "tanh",
     "arctan",
     "karnopp",
-)  # tried only where nothing simpler serves: they cost as much as the full model
+)
 
 
 @dataclass(frozen=True)

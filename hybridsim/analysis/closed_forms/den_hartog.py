@@ -54,9 +54,8 @@ def no_stops(r: float, zeta: float, f: float) -> NoStops:
     at_turning = (f * (-2.0 * zeta * turning - a) - R * r * r * math.cos(psi)) / r
     top = int(np.argmax(shape))
     highest = max(float(shape[top]), at_turning)
-    if (
-        0 < top < len(s) - 1 and shape[top] > at_turning
-    ):  # the parabola through the largest sample and its neighbours
+    # the parabola through the largest sample and its neighbours
+    if 0 < top < len(s) - 1 and shape[top] > at_turning:
         left, middle, right = shape[top - 1 : top + 2]
         bend = left - 2.0 * middle + right
         highest = float(middle - (right - left) ** 2 / (8.0 * bend)) if bend < 0.0 else highest

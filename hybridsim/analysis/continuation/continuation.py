@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
 _CORRECTIONS = 8
 _TOL = 1e-9  # of the states' sizes and the range: how closely an orbit closes
+# steps along the branch, in units of the range and of the states
 _FIRST, _LARGEST, _SMALLEST = (
     0.01,
     0.05,
     1e-6,
-)  # steps along the branch, in units of the range and of the states
+)
 _MORE, _LESS = 1.5, 0.4
 _FEW = 3  # corrections after which a step may grow
 _DIFFERENCE = 1e-6  # of the parameter, for the forcing's period

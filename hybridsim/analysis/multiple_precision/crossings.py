@@ -68,9 +68,8 @@ def _isolate(
     half = width / 2
     found = _isolate(p, left, low, half, depth + 1, precision)
     found += _isolate(p, right[::-1], low + half, half, depth + 1, precision)
-    if row[0] == 0 and _side_at_end(left) != _side_at_end(
-        right
-    ):  # in the middle itself, seen by neither half
+    # in the middle itself, seen by neither half
+    if row[0] == 0 and _side_at_end(left) != _side_at_end(right):
         found = sorted([*found, low + half])
     return found
 

@@ -214,8 +214,7 @@ def _rounding(sample: Sampler, steps: _Pieces) -> np.ndarray:
     values, misfits = _sampled(
         sample, _Pieces(*(np.concatenate(parts) for parts in zip(*probes, strict=True)))
     )
-    tells = (values.min(axis=1) < values.max(axis=1)) & np.isfinite(
-        misfits
-    )  # else all points are one to a double
+    # else all points are one to a double
+    tells = (values.min(axis=1) < values.max(axis=1)) & np.isfinite(misfits)
     least = np.where(tells, misfits, np.inf).reshape(len(probes), -1, len(sample.names)).min(axis=0)
     return np.where(np.isfinite(least), least, 0.0).max(axis=0, initial=0.0)

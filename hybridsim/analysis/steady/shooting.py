@@ -15,9 +15,8 @@ from hybridsim.errors import HybridsimError
 _STEPS = 12
 _LESS = 0.5  # a step that leaves more of the residual than that is none
 _ROUNDING = 1e-14  # of the states' scale: no step makes the residual smaller
-_ATTRACTS = (
-    1.0 - 1e-6
-)  # what has a multiplier beyond that is not come to by waiting: it repels, or lies among others
+# what has a multiplier beyond that is not come to by waiting: it repels, or lies among others
+_ATTRACTS = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)

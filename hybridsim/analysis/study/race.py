@@ -93,9 +93,8 @@ def race(size: Size, pool: Pool) -> Race:
             len(sample),
             [(row.amplitude, row.energy) for row in rows],
         )
-    pool.map(
-        _by_shooting, sample, 0.8, 0.87
-    )  # which of them meets what is not compiled yet is not known before
+    # which of them meets what is not compiled yet is not known before
+    pool.map(_by_shooting, sample, 0.8, 0.87)
     seconds, orbits = _timed(pool, _by_shooting, sample, 0.87, 0.95)
     found["shooting"] = (seconds, len(sample), orbits)
     settled = pool.map(exact, sample, 0.95, 1.0)

@@ -32,10 +32,11 @@ FORCES = (3.0, 7.0, 15.0, 30.0, 50.0, 90.0, 170.0, 400.0)
 _USUAL = (15.0, 170.0)
 METHODS: tuple[Variant, ...] = (*SIGNS, LITERAL, ZEROED)
 EXACT, STRIBECK = "exact", "Stribeck law"
+# rest holds up to F0/N = 0.6 there; the decay is to 3e-6
 STRIBECK_RATIOS, _STRIBECK_PERIODS = (
     (0.8, 1.2),
     60,
-)  # rest holds up to F0/N = 0.6 there; the decay is to 3e-6
+)
 _CONSTANT = 0.01  # what a picture shows as a constant
 _ROUNDING = 1e-10  # a few hundred periods of roundings; friction's own tolerance of nothing else
 # Steady motions over the whole plane for the test to rounding: a lattice that repeats no value

@@ -29,9 +29,8 @@ class SceneResult:
     def cheapest(self, accuracy: float) -> Row | None:
         """The row of least wall time whose states are within an accuracy over the whole run, in the right modes."""
         good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
-        timed = [
-            row for row in good if row.cost and row.cost.repetitions
-        ]  # others carry the cost of warming up
+        # others carry the cost of warming up
+        timed = [row for row in good if row.cost and row.cost.repetitions]
         good = timed or good
         return min(good, key=lambda row: row.cost.wall_time if row.cost else 0.0, default=None)
 

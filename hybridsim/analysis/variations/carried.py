@@ -107,9 +107,8 @@ class Carrier:
         at = 0
         for segment in self.solution._segments:
             end = segment.end
-            rounding = 4.0 * math.ulp(
-                float(end)
-            )  # an event and the end of its segment are one instant but for that
+            # an event and the end of its segment are one instant but for that
+            rounding = 4.0 * math.ulp(float(end))
             while at < len(waiting) and waiting[at].instant.minus(end) < -rounding:
                 at += 1
             first = at

@@ -136,9 +136,8 @@ def atlas(
     cells: dict[tuple[str, str], Cell] = {}
 
     def keep(cell: Cell) -> None:
-        if (
-            progress is not None
-        ):  # first of all: where Ctrl-C hit compiled code, the cell may be an error of that
+        # first of all: where Ctrl-C hit compiled code, the cell may be an error of that
+        if progress is not None:
             progress((len(cells) + 1) / len(jobs), cell.scene)
         cells[cell.scene, cell.configuration] = cell
 

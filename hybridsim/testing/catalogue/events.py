@@ -32,12 +32,13 @@ def grazing() -> tuple[Scene, ...]:
             Truth(tuple(visits), states),
             needs("transitions", "multiple-roots"),
             params={"gap": -gap},
+            # the level is met at a slope of 1.4e-3
             **{
                 **common,
                 "tol_t": 1e-6,
                 "floor": 1e-7,
                 "effort": 20_000,
-            },  # the level is met at a slope of 1.4e-3
+            },
         ),
     )
 
@@ -145,11 +146,12 @@ def monitored() -> tuple[Scene, ...]:
             Truth(((5 - 1e-3, "dip"), (5 + 1e-3, "dip")), ((5.0, (0.0,)), (10.0, (25.0,)))),
             needs("monitors", "multiple-roots"),
             unit=10.0,
+            # the dip is 1e-6 deep: at 1e-6 a method of low order is off by more
             tolerances=(
                 1e-8,
                 1e-10,
                 1e-12,
-            ),  # the dip is 1e-6 deep: at 1e-6 a method of low order is off by more
+            ),
             **exact,
         ),
         Scene(
