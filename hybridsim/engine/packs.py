@@ -11,18 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from sys import getrefcount
 from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.jit import ENABLED, kernel
+from hybridsim.engine.lent_memory import Lender
 
 _WORDS = 6  # of an array in the table: its address, and up to five lengths
 _ALIGNED = 64  # bytes; numbers of any kind may begin there
-_OURS = 3  # references to a block: of the list of former ones, of the loop over it, of the question
-_FORMER = 4  # blocks of one size that are handed on, and up to how many bytes of each
-_LARGEST = 1 << 21
+_LARGE, _LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -157,17 +155,6 @@ def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, tab
     return address
 
 
-def _unheld(size: int, former: list[np.ndarray]) -> np.ndarray:
-    """A block of so many bytes: one of the former, if nothing else refers to it or to its memory any more."""
-    for block in former:
-        if getrefcount(block) == _OURS:
-            return block
-    block = np.empty(size, dtype=np.uint8)
-    if len(former) < _FORMER and size <= _LARGEST:
-        former.append(block)
-    return block
-
-
 class Sheet:
     """Arrays of rows that lie one behind the other in a few blocks of memory.
 
@@ -195,14 +182,19 @@ class Sheet:
             self._words[k, : 1 + len(shape)] = offset, *shape
             self._steps[k, :2] = row, -1
             self._sizes[block] += -(-row * shape[0] // _ALIGNED) * _ALIGNED
-        self._former: list[list[np.ndarray]] = [[] for _ in self._sizes]
+        self._lenders = [Lender(size) if _LARGE <= size <= _LARGEST else None for size in self._sizes]
         form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
         self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
 
     def blank(self) -> tuple[np.ndarray, ...]:
-        """Blocks that nobody holds: former ones, whose memory the system need not give anew, page by page; or fresh."""
-        return tuple([_unheld(size, former) for size, former in zip(self._sizes, self._former, strict=True)])
+        """Blocks that nobody holds, with anything in them."""
+        return tuple(
+            [
+                np.empty(size, dtype=np.uint8) if lender is None else lender.block()
+                for size, lender in zip(self._sizes, self._lenders, strict=True)
+            ]
+        )
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
         """The arrays as kernels take them, without so many rows of each at the beginning."""

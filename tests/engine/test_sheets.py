@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from hybridsim.engine.jit import Door, kernel
+from hybridsim.engine.lent_memory import Lender
 from hybridsim.engine.packs import Sheet, packed
 
 
@@ -56,17 +58,36 @@ def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
     assert all(array.flags.c_contiguous and array.flags.aligned for array in rows)
 
 
-def test_memory_is_handed_on_once_nobody_holds_it() -> None:
-    sheet = Sheet(Rows, FIELDS)
-    blocks = sheet.blank()
-    held = sheet.rows(blocks).numbers[1:]
-    places = [block.ctypes.data for block in blocks]
-    del blocks
-    others = sheet.blank()
-    assert not np.shares_memory(others[0], held)
-    assert others[1].ctypes.data == places[1]
+@pytest.mark.parametrize(
+    "view", [lambda a: a, lambda a: a[3:], lambda a: a.view(float).reshape(2, -1).T, memoryview]
+)
+def test_memory_is_handed_on_once_nobody_holds_it(view: Callable[[np.ndarray], Any]) -> None:
+    lender = Lender(1 << 12)
+    block = lender.block()
+    block[:] = 1
+    place, held = block.ctypes.data, view(block)
+    before = bytes(held)
+    del block
+    other = lender.block()
+    other[:] = 2
+    assert other.ctypes.data != place
+    assert bytes(held) == before
     del held
-    assert sheet.blank()[0].ctypes.data == places[0]
+    assert lender.block().ctypes.data == place
+
+
+def test_large_sheets_take_such_memory() -> None:
+    sheet = Sheet(Rows, ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
+    numbers = sheet.rows(sheet.blank()).numbers
+    numbers[:] = 1.0
+    place = numbers.ctypes.data
+    last = numbers[-1:]
+    del numbers
+    sheet.rows(sheet.blank()).numbers[:] = 2.0
+    assert sheet.blank()[0].ctypes.data != place
+    assert last.tolist() == [[1.0, 1.0]]
+    del last
+    assert sheet.blank()[0].ctypes.data == place
 
 
 def test_a_door_leads_to_the_same_kernel() -> None:
