@@ -9,7 +9,8 @@ active guards' coefficients go, the constants of the tape in their registers, an
 exponentials and the like at order 0 are left in their registers among the constants: a step begins where the one before
 it was looked at last, and need not work them out again. That of what is `ahead` is void f(s, d, series, guards,
 constants, out), see `hybridsim.engine.steps_ahead`; that of sizes void f(h, ., ., guards, ., out), see `measure` in
-`hybridsim.engine.taylor`.
+`hybridsim.engine.taylor`. Those of Runge-Kutta methods know nothing of a step before: void f(s, ., x, guards,
+constants, out), x the states, or along a step their coefficients.
 """
 
 from __future__ import annotations
