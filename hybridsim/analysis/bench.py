@@ -87,8 +87,7 @@ class Bench:
             return replace(
                 row, status="refused" if isinstance(error, UsageError) else "failed", message=error.message
             )
-        # an integrator may be anybody's: whatever it raises costs its own row only
-        except Exception as error:
+        except Exception as error:  # an integrator may be anybody's: it costs its own row only
             return replace(row, message=f"{type(error).__name__}: {error}")
         stats = solution.stats
         rhs, guards, steps = (int(stats[name]) for name in ("rhs_evaluations", "guard_evaluations", "steps"))

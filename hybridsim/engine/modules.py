@@ -106,8 +106,7 @@ def _load(model: Model, name: str) -> Compiled:
         seconds = time.perf_counter() - start
     try:
         return Compiled(_import(name, path), seconds)
-    # a damaged file may raise anything; written anew, it tells whether the fault is its own
-    except Exception:
+    except Exception:  # a damaged file may raise anything; written anew, it tells whose fault it is
         from hybridsim.engine.emit import emit
 
         write_whole(path, emit(model).encode())

@@ -127,8 +127,7 @@ class Compiler:
             try:
                 named = parameters(*to_fixed_tuple(given, count))
                 _put(function(t, state.copy(), named), out, at, width)
-            # the only clause that numba compiles; what it was is found out by calling it again
-            except Exception:
+            except Exception:  # numba compiles no other clause; what it was a second call tells
                 raised = True
             if raised:
                 if p[origin + 1] > 0.0:  # on the run, not in differences far from it

@@ -58,7 +58,7 @@ follows an event is decided as with all others. Scenes that all of them get righ
 
 def result_of(name: str, number: int, events: str) -> Outcome:
     """An integrator in the scene of that number; in a process of its own."""
-    warnings.simplefilter("ignore")
+    warnings.simplefilter("ignore")  # the table is of results; the tests hold warnings to be errors
     return outcome(name, SCENES[number], **({"events": events} if events else {}))
 
 
@@ -134,7 +134,7 @@ def page(names: Sequence[str]) -> str:
 
 
 def main(names: Sequence[str]) -> None:
-    warnings.simplefilter("ignore")
+    warnings.simplefilter("ignore")  # the table is of results; the tests hold warnings to be errors
     if names:
         print(page(names))
     else:

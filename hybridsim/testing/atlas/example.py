@@ -109,7 +109,7 @@ def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
         rival = RIVALS.get(configuration.integrator, configuration.integrator)
         settings = {"form": configuration.form, **options, **configuration.options}
         with warnings.catch_warnings(), registered(rival) as name:
-            warnings.simplefilter("ignore")
+            warnings.simplefilter("ignore")  # what a naive method provokes is shown by its result
             judge.prepare(scene, name, **settings)
             with bounded_work(2 * SECONDS):
                 return judge.run(scene, name, processor_seconds=SECONDS, limits={"steps": STEPS}, **settings)

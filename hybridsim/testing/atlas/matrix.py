@@ -228,7 +228,7 @@ def _signals_later() -> Iterator[None]:
 def _quiet_worker() -> None:
     """A worker leaves Ctrl-C to its parent, and what a naive method warns of is part of the answer."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    warnings.simplefilter("ignore")
+    warnings.simplefilter("ignore")  # as in the other process: they are part of the answer
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
