@@ -190,6 +190,11 @@ def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, in
     return op, a, b, c
 
 
+def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
+    """The registers whose series a row reads."""
+    return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
+
+
 def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
     """The rows that the wanted registers depend on, in order."""
     wanted = set(wanted)

@@ -86,6 +86,7 @@ def series_at(
     code: int,
     is_known: bool,
     rows: Any,
+    high: Any,
     places: Any,
     order: int,
     s: float,
@@ -102,7 +103,7 @@ def series_at(
     if code != 0:
         call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
         return
-    expand(rows, places, order, s, x, V)
+    expand(rows, high, places, order, s, x, V)
     states = places[1]
     for i in range(states.shape[0]):
         for k in range(order + 1):
@@ -200,6 +201,7 @@ def leap(
             return FULL, n_steps, n_segments
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
         rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+        high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
         flow_places = (time, states, tapes.derivatives[k])
         code, values_code = codes.series[k], codes.values[k]
         ahead_code, sizes_code = codes.ahead[k], codes.sizes[k]
@@ -226,7 +228,9 @@ def leap(
                 return STOPPED, first_step, n_segments
             coefficients = series[n_steps]
             is_known = n_steps > first_step and not lands
-            series_at(code, is_known, rows, flow_places, order, s, y, watched, V, guard_series, coefficients)
+            series_at(
+                code, is_known, rows, high, flow_places, order, s, y, watched, V, guard_series, coefficients
+            )
             left = bound - s
             h = reach(
                 sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, min(left, max_step),

@@ -21,7 +21,7 @@ from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
-from hybridsim.engine.packs import Sheet, packed
+from hybridsim.engine.packs import ALIGNED, LARGEST, Sheet, packed
 from hybridsim.engine.segment_end import reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
@@ -41,10 +41,10 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
 
-_STEPS, _SEGMENTS = 4096, 1024  # room for one call
-# doubles for the series of one call, and how many steps there is room for in any case
-_ROOM, _FEWEST = 1 << 19, 64
-_GROWTH, _LARGEST = 8, 1 << 23  # of that room, for a segment that is longer
+_SEGMENTS = 1024  # room for one call
+# doubles for the steps of one call, those of a block that is handed on; how many steps there is room for in any case
+_ROOM, _FEWEST = LARGEST // 8, 64
+_GROWTH, _LONGEST = 8, 1 << 23  # of that room, for a segment that is longer
 _NONE = np.zeros(0, dtype=np.int64)
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
@@ -103,7 +103,8 @@ class Leaper(ABC):
             layout.phases_at,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
-        self.steps = min(max(_ROOM // (system.n * columns), _FEWEST), _STEPS)  # that there is room for
+        beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
+        self.steps = max((_ROOM - beside) // (system.n * columns + 2), _FEWEST)  # that there is room for
         self._renew()
 
     @abstractmethod
@@ -195,7 +196,7 @@ class Leaper(ABC):
             self.shelf.look()
             self._count(record.counters, steps, room)
             is_too_long = code == FULL and count == 0 and self.used == (0, 0)  # a single segment
-            if is_too_long and self.steps * _GROWTH * n * self.columns <= _LARGEST:
+            if is_too_long and self.steps * _GROWTH * n * self.columns <= _LONGEST:
                 self.steps, is_too_long = self.steps * _GROWTH, False
             is_full = code == FULL and not is_too_long
             if count:

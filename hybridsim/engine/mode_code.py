@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from hybridsim.engine.bounds_code import Given
 from hybridsim.engine.series_code import ModeTape
+from hybridsim.engine.tape import LESS
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -24,11 +26,23 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
     tape, lean = system.code.data["tape"], system.lean_tape(z)
     return ModeTape(
         rows=_rows(lean.rows),
+        high=tuple(system.high_rows(z)),
         time=tape["time"],
         states=tuple(tape["states"]),
         rates=tuple(lean.derivatives.tolist()),
         guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
+        holding=frozenset(_holding(system, z)),
     )
+
+
+def _holding(system: System, z: np.ndarray) -> Iterator[int]:
+    """The registers of pin > 0: so it is but where states are looked at as they are, outside of a mode."""
+    tape = system.code.data["tape"]
+    zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
+    pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
+    for op, a, b, _, out in constant_rows(system, z):
+        if op == LESS and a in zeros and b in pins:
+            yield out
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

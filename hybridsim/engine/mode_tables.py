@@ -51,7 +51,8 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """One row or one slice for each vector of modes: modes, lean rows, constant rows, active guards, registers.
+    """One row or one slice for each vector of modes: modes, lean rows, those of high orders, constant rows, active
+    guards, registers.
 
     bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
     was missed.
@@ -60,6 +61,8 @@ class Tapes(NamedTuple):
     modes: np.ndarray
     lean_start: np.ndarray
     lean: np.ndarray
+    high_start: np.ndarray
+    high: np.ndarray
     constant_start: np.ndarray
     constant: np.ndarray
     active_start: np.ndarray
@@ -211,6 +214,7 @@ class TapeShelf:
             Tapes(
                 modes,
                 *_rows([tape.rows for tape in lean]),
+                *_rows([np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5) for z in met]),
                 *_rows([tape.constant_rows for tape in lean]),
                 *_flat(active),
                 np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),

@@ -19,8 +19,8 @@ from hybridsim.engine.jit import ENABLED, kernel
 from hybridsim.engine.lent_memory import Lender
 
 _WORDS = 6  # of an array in the table: its address, and up to five lengths
-_ALIGNED = 64  # bytes; numbers of any kind may begin there
-_LARGE, _LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
+ALIGNED = 64  # bytes; numbers of any kind may begin there
+_LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -181,8 +181,8 @@ class Sheet:
             self._places.append((shape, dtype, block, offset))
             self._words[k, : 1 + len(shape)] = offset, *shape
             self._steps[k, :2] = row, -1
-            self._sizes[block] += -(-row * shape[0] // _ALIGNED) * _ALIGNED
-        self._lenders = [Lender(size) if _LARGE <= size <= _LARGEST else None for size in self._sizes]
+            self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
+        self._lenders = [Lender(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
         form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
         self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)

@@ -309,7 +309,7 @@ def rk_leap(
         if first_code != 0:
             call_series(first_code, 0.0, 0.0, y, room.guards_left, W, room.first)
         else:
-            expand(step_rows, flow_places, leading[0] + 1, 0.0, y, W)
+            expand(step_rows, step_rows[:0], flow_places, leading[0] + 1, 0.0, y, W)
             gather(states, W, room.first)
             gather(watched, W, room.guards_left)
         h = first_length(leading, y, tolerances, room.first, min(bound, max_step))

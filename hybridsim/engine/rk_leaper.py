@@ -15,7 +15,7 @@ from hybridsim.engine.leaper import NOT_LINEAR, Leaper
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rk_leap import rk_leap
 from hybridsim.engine.rk_step import Tableau
-from hybridsim.engine.series import series_order
+from hybridsim.engine.series import short_order
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.stepping import Counters, Tolerances
 from hybridsim.engine.system import System
@@ -86,7 +86,7 @@ class RungeKuttaLeaper(Leaper):
         rtol = tolerances.rtol
         self.tableau, leading = tableau, tableau.leading_terms
         first = leading[0] + 1  # order of the states where a segment begins
-        self.order = max(series_order(rtol), 2 * TERMS + 1, first)
+        self.order = max(short_order(rtol), 2 * TERMS + 1, first)
         super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
         self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
         shape = (TERMS, first, self.order)

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from hybridsim.engine.high_orders import FACTOR, HAS_B, HAS_C, INTEGRATE, NEGATIVE, OVER_B, OVER_C
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -31,8 +32,8 @@ from hybridsim.engine.lean_tape import (
 from hybridsim.engine.tape import ADD, COPY, DIV, EXP, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
 from hybridsim.engine.taylor import EXACTLY
 
-# A function of so many lines is compiled in a quarter of a second; a longer one is left to the interpreter.
-_LONGEST = 6000
+# A function of so many lines is compiled in half a second; a longer one is left to the interpreter.
+_LONGEST = 12000
 TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # they keep a companion series in the next register
 _COSTLY = (*TWINS, EXP)  # of which order 0 takes as long as all other orders
 _COMMUTES = ("fadd", "fmul")
@@ -130,13 +131,16 @@ class Lines:
 
 @dataclass(frozen=True)
 class ModeTape:
-    """What is needed of the lean tape of one vector of modes: rows, registers of time, states, rates, active guards."""
+    """What is needed of the lean tape of one vector of modes: rows, those of high orders, registers of time, states,
+    rates, active guards; conditions that hold while time goes on."""
 
     rows: tuple[tuple[int, ...], ...]
+    high: tuple[tuple[int, ...], ...]
     time: int
     states: tuple[int, ...]
     rates: tuple[int, ...]
     guards: tuple[int, ...]
+    holding: frozenset[int]
 
     @property
     def is_known(self) -> bool:
@@ -158,6 +162,9 @@ class _Expansion(Lines):
         self.series: dict[int, list[str]] = {r: [value] for r, value in zip(tape.states, x, strict=True)}
         self._set_time(s)
         for k in range(order + 1):
+            if k > EXACTLY and tape.high:
+                self._run(tape.high if k < order else tape.high[: -len(tape.states)], k)
+                continue
             self._run(tape.rows, k)
             if k < order:
                 rates = [self.at(r, k) for r in tape.rates]
@@ -204,9 +211,24 @@ class _Expansion(Lines):
             return self.op("fmul", self.at(a, 0), self.at(b, 0))
         return self.op("fadd", self._inner(a, b, k), self._pair(a, b, 0, k, False))
 
-    def _slope(self, a: int, b: int, k: int) -> str:
-        last = self.op("fmul", self.op("fmul", self.at(a, k), number(k)), self.at(b, 0))
-        return self.op("fmul", self.op("fadd", self._inner(a, b, k, True), last), number(1.0 / k))
+    def _rise(self, a: int, b: int, k: int) -> str:
+        newest, part = self.op("fmul", self.at(a, k), number(k)), number(1.0 / k)
+        if k <= EXACTLY:
+            last = self.op("fmul", newest, self.at(b, 0))
+            return self.op("fmul", self.op("fadd", self._inner(a, b, k, True), last), part)
+        last = self.op("fmul", self.at(a, k), self.at(b, 0))
+        return self.op("fadd", self.op("fmul", self._inner(a, b, k, True), part), last)
+
+    def _scaled(self, a: str, flags: int, b: int, c: int, part: str) -> str:
+        """A coefficient times a factor; see `hybridsim.engine.high_orders`."""
+        f = ONE
+        for has, over, r in ((HAS_B, OVER_B, b), (HAS_C, OVER_C, c)):
+            if flags & has:
+                g = self.op("fdiv", ONE, self.at(r, 0)) if flags & over else self.at(r, 0)
+                f = g if f == ONE else self.op("fmul", f, g)
+        if flags & NEGATIVE:
+            f = self.negative(f)
+        return self.op("fmul", a, part if f == ONE else f if part == ONE else self.op("fmul", f, part))
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
         """Coefficient k of an operation, and of its companion."""
@@ -217,6 +239,8 @@ class _Expansion(Lines):
             return (u,)
         if op == NEG:
             return (self.negative(u),)
+        if op == SELECT and a in self.tape.holding:
+            return (self.at(b, k),)
         if op == SELECT:
             return (self.choice("une", self.at(a, 0), ZERO, self.at(b, k), self.at(c, k)),)
         if op in (ADD, SUB):
@@ -227,6 +251,9 @@ class _Expansion(Lines):
             return (self.op("fsub", self.at(b, 0), u) if k == 0 else self.negative(u),)
         if op == SCALE:
             return (self.op("fmul", u, self.at(b, 0)),)
+        if op >= FACTOR:
+            part, kind = (number(1.0 / (k + 1)), INTEGRATE) if op >= INTEGRATE else (ONE, FACTOR)
+            return (self._scaled(u, op - kind, b, c, part),)
         if op == MUL:
             return (self._product(a, b, k),)
         if op in (DIVIDE_BY, DIV):
@@ -240,7 +267,7 @@ class _Expansion(Lines):
 
     def _exponential(self, a: int, out: int, k: int) -> str:
         if k > 0:
-            return self._slope(a, out, k)
+            return self._rise(a, out, k)
         u = self.at(a, 0)
         return self.choice("oge", u, number(709.0), INF, self.call("llvm.exp.f64", u))
 
@@ -269,8 +296,8 @@ class _Expansion(Lines):
             sine, cosine = self.at(out, k - 1), self.at(out + 1, k - 1)
             return self.op("fmul", rate, cosine), self.negative(self.op("fmul", rate, sine))
         if op == SINCOS:
-            return self._slope(a, out + 1, k), self.negative(self._slope(a, out, k))
-        self.series[out].append(self._slope(a, out + 1, k))
+            return self._rise(a, out + 1, k), self.negative(self._rise(a, out, k))
+        self.series[out].append(self._rise(a, out + 1, k))
         w = self._product(out, out, k)
         return self.series[out].pop(), w if b == 0 else self.negative(w)
 
@@ -297,7 +324,7 @@ def short_function(name: str, tape: ModeTape, order: int, count: int, stride: in
 
     stride: columns of the array with the constants.
     """
-    code = _Expansion(tape, order, stride)
+    code = _Expansion(replace(tape, high=()), order, stride)
     for array, registers, size in (("%out", tape.states, order + 1), ("%g", tape.guards, count)):
         for i, r in enumerate(registers):
             for k in range(size):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.differences import DifferenceSeries, run_differences, run_jacobian
+from hybridsim.engine.high_orders import high_rows
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.jit import Door
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
@@ -431,6 +432,13 @@ class System:
             active = np.flatnonzero(self.active(z))
             self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), active, self._registers.twins)
         return self._lean[key]
+
+    def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+        """The rows of that tape for high orders of states, active guards and monitors."""
+        tape = self.lean_tape(z)
+        watched = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
+        rows = list(map(tuple, tape.rows.tolist()))
+        return high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
 
     def series(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float

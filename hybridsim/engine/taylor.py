@@ -13,6 +13,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
+from hybridsim.engine.high_orders import (
+    FACTOR,
+    HAS_B,
+    HAS_C,
+    INTEGRATE,
+    NEGATIVE,
+    OVER_B,
+    OVER_C,
+)
 from hybridsim.engine.jit import call_series, inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
@@ -55,8 +66,12 @@ from hybridsim.engine.tape import (
 EXACTLY = 3  # order of states up to which events are judged: they are divided by their order
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
-_SHORTER = 0.5  # factor on a step over which a guard's series does not reach
+_SHORTER = 0.5  # factor on a step over which a guard's series does not reach, at least
+_SLACK = (
+    1.5  # of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step
+)
 _TRIALS = 60  # halvings: down to nothing
+_LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 
 
 @inlined
@@ -83,6 +98,14 @@ def _weighted(V: Any, a: int, b: int, k: int) -> float:
     for i in range((k - 1) // 2, 0, -1):
         total += i * V[a, i] * V[b, k - i] + (k - i) * V[a, k - i] * V[b, i]
     return total
+
+
+@inlined
+def _rise(V: Any, a: int, b: int, k: int) -> float:
+    """Coefficient k of the integral of a' b; at high orders the newest product waits for nothing but its sum."""
+    if k <= EXACTLY:
+        return _slope(V, a, b, k) * (1.0 / k)
+    return _weighted(V, a, b, k) * (1.0 / k) + V[a, k] * V[b, 0]
 
 
 @inlined
@@ -122,21 +145,20 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Order k >= 1 of the operations that follow a differential equation."""
-    part = 1.0 / k
     if op == EXP:
-        V[out, k] = _slope(V, a, out, k) * part
+        V[out, k] = _rise(V, a, out, k)
     elif op == SINCOS:
-        V[out, k] = _slope(V, a, out + 1, k) * part
-        V[out + 1, k] = -(_slope(V, a, out, k) * part)
+        V[out, k] = _rise(V, a, out + 1, k)
+        V[out + 1, k] = -_rise(V, a, out, k)
     elif op == SINHCOSH:
-        V[out, k] = _slope(V, a, out + 1, k) * part
-        V[out + 1, k] = _slope(V, a, out, k) * part
+        V[out, k] = _rise(V, a, out + 1, k)
+        V[out + 1, k] = _rise(V, a, out, k)
     elif op == TANGENT:
-        V[out, k] = _slope(V, a, out + 1, k) * part
+        V[out, k] = _rise(V, a, out + 1, k)
         w = _product(V, out, out, k)
         V[out + 1, k] = w if b == 0 else -w
     elif op == INTEGRAL and c != ANGLE:
-        V[out, k] = (V[b, k] - _weighted(V, out, a, k) * part) / V[a, 0]
+        V[out, k] = (V[b, k] - _weighted(V, out, a, k) * (1.0 / k)) / V[a, 0]
     elif op == INTEGRAL:
         total = _slope(V, b, a, k) - _slope(V, a, b, k)
         for j in range(1, k):
@@ -183,6 +205,17 @@ def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
         V[out, 0] = 1.0 if truth else 0.0
 
 
+@inlined
+def _factor(flags: int, V: Any, b: int, c: int) -> float:
+    """What flags make of two constants; see `hybridsim.engine.high_orders`."""
+    f = 1.0
+    if flags & HAS_B:
+        f = 1.0 / V[b, 0] if flags & OVER_B else V[b, 0]
+    if flags & HAS_C:
+        f *= 1.0 / V[c, 0] if flags & OVER_C else V[c, 0]
+    return -f if flags & NEGATIVE else f
+
+
 @kernel
 def advance(rows: Any, V: Any, k: int) -> None:
     """Coefficient k of every operation, in order."""
@@ -222,6 +255,11 @@ def advance(rows: Any, V: Any, k: int) -> None:
             else:
                 rest = 0.5 * (V[a, k] - _inner(V, out, out, k))
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
+        elif op >= INTEGRATE:
+            if k + 1 < V.shape[1]:
+                V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
+        elif op >= FACTOR:
+            V[out, k] = V[a, k] * _factor(op - FACTOR, V, b, c)
         elif op >= ABS and op <= EQUAL:
             _logic(op, V, a, b, c, out, k)
         elif k == 0:
@@ -231,9 +269,10 @@ def advance(rows: Any, V: Any, k: int) -> None:
 
 
 @kernel
-def expand(rows: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
-    """Coefficients 0..order of all registers along the flow from x at local time s.
+def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
+    """Coefficients 0..order along the flow from x at local time s: of all registers, or of what `high` leaves.
 
+    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.high_orders`); none: they are as at the lower ones.
     places: registers of time (-1: none), of the states and of their derivatives. Constants are set beforehand.
     """
     time, states, derivatives = places
@@ -242,6 +281,9 @@ def expand(rows: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None
     for i in range(states.shape[0]):
         V[states[i], 0] = x[i]
     for k in range(order + 1):
+        if k > EXACTLY and high.shape[0] > 0:
+            advance(high, V, k)
+            continue
         advance(rows, V, k)
         if k < order:
             for i in range(states.shape[0]):
@@ -289,8 +331,21 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
 
 @inlined
 def _root(x: float, n: int) -> float:
-    """x**(1/n) for x >= 0, to some digits: cheaper than a power."""
-    return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
+    """x**(1/n) for x >= 0, to three digits: cheaper than a power.
+
+    Exponent and mantissa are taken apart in the bits of a double; between powers of two the logarithm and the
+    exponential are cubics, good to 8e-4 / n and 1e-4.
+    """
+    if not _LEAST <= x < math.inf:
+        return x
+    bits = np.float64(x).view(np.int64)
+    f = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) - 1.0
+    log = ((0.152700285 * f - 0.568704053) * f + 1.41565319) * f + 8.25462823e-4
+    log = (((bits >> 52) - 1023) + log) / n
+    whole = math.floor(log)
+    f = log - whole
+    power = ((0.07896726 * f + 0.22469316) * f + 0.69632477) * f + 0.99990029
+    return power * np.int64((np.int64(whole) + 1023) << 52).view(np.float64)
 
 
 @kernel
@@ -328,11 +383,8 @@ def reach(
             first = scale / one
         if two > 0.0 and two * last > scale:
             last = scale / two
-    h = min(h, _root(first, order - 1))
+    h = min(h, _root(first, order - 1), _root(last, order))
     measure(code, U, watched, order, h, powers, totals)
-    if last < powers[order]:
-        h = min(h, _root(last, order))
-        measure(code, U, watched, order, h, powers, totals)
     for j in range(watched.shape[0]):
         r = watched[j]
         for _ in range(_TRIALS):
@@ -340,13 +392,13 @@ def reach(
                 return math.nan
             term = max(abs(U[r, order - 1]) * powers[order - 1], abs(U[r, order]) * powers[order])
             largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
-            if term <= rtol * largest or term == 0.0:
+            if term <= _SLACK * rtol * largest or term == 0.0:
                 break
             for k in range(2, order - 1):
                 largest = max(largest, abs(U[r, k]) * powers[k])
-            if term <= rtol * largest:
+            if term <= _SLACK * rtol * largest:
                 break
-            h *= max(_SHORTER, 0.9 * _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
+            h *= max(_SHORTER, _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
             measure(code, U, watched, order, h, powers, totals)
     return h
 

@@ -123,8 +123,9 @@ def _dense(s0: float, coefficients: np.ndarray) -> Dense:
 class Taylor(Integrator):
     """Taylor series by recurrences over the operations of the model, order and step chosen by the tolerance.
 
-    The order is -ln(rtol)/2 + 1, the step the one at which the last two terms reach the tolerance: near the least
-    work for an accuracy. Guards have series of their own, and the step ends where these stop to be accurate.
+    The order is 1.4 (1 - ln(rtol)/2), of linear modes with 1.6; the step is the one at which the
+    last two terms reach the tolerance: near the least work for an accuracy. Guards have series of their own, and the
+    step ends where these stop to be accurate.
 
     When to choose it: tight tolerances, 1e-9 and below, and whenever events matter more than anything.
     """

@@ -203,7 +203,8 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
         "spring", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")], parameters={}
     )
     whole = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
-    monkeypatch.setattr(leaper, "_STEPS", 4)
+    monkeypatch.setattr(leaper, "_ROOM", 0)
+    monkeypatch.setattr(leaper, "_FEWEST", 4)
     cramped = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
     assert cramped.stats["steps"] == whole.stats["steps"] > 4
     assert cramped(200.0).tolist() == whole(200.0).tolist()
@@ -221,8 +222,9 @@ def test_a_segment_too_long_for_any_room_is_left_to_the_general_way(monkeypatch:
         schedules=[hs.Schedule("tick", period=50.0)],
     )
     whole = hs.simulate(model, (0, 200), integrator="dop853", rtol=1e-12)
-    monkeypatch.setattr(leaper, "_STEPS", 4)
-    monkeypatch.setattr(leaper, "_LARGEST", 0)
+    monkeypatch.setattr(leaper, "_ROOM", 0)
+    monkeypatch.setattr(leaper, "_FEWEST", 4)
+    monkeypatch.setattr(leaper, "_LONGEST", 0)
     made = []
     renew = leaper.Leaper._renew
 

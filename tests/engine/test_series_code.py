@@ -213,7 +213,7 @@ def test_series_at_the_ends_of_steps_and_guards_along_them(name: str, tmp_path: 
         compare(*made)
         U, C = np.empty((count, terms)), np.empty((n, first + 1))
         called(codes[1], s, 0.0, x, U, W, C)
-        expand(lean.rows, places, first, s, x, V)
+        expand(lean.rows, lean.rows[:0], places, first, s, x, V)
         compare((C, U), (V[inputs.states, : first + 1], V[watched, :terms]))
         along = np.cos(np.arange(n * (order + 1.0)) ** 2).reshape(n, order + 1)
         made = []
