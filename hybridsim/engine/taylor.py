@@ -330,14 +330,14 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
 
 
 @inlined
-def _root(x: float, n: int) -> float:
+def rough_root(x: float, n: int) -> float:
     """x**(1/n) for x >= 0, to three digits: cheaper than a power.
 
     Exponent and mantissa are taken apart in the bits of a double; between powers of two the logarithm and the
     exponential are cubics, good to 8e-4 / n and 1e-4.
     """
     if not _LEAST <= x < math.inf:
-        return x
+        return math.exp(math.log(x) / n) if 0.0 < x < _LEAST else x
     bits = np.float64(x).view(np.int64)
     f = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) - 1.0
     log = ((0.152700285 * f - 0.568704053) * f + 1.41565319) * f + 8.25462823e-4
@@ -383,7 +383,7 @@ def reach(
             first = scale / one
         if two > 0.0 and two * last > scale:
             last = scale / two
-    h = min(h, _root(first, order - 1), _root(last, order))
+    h = min(h, rough_root(first, order - 1), rough_root(last, order))
     measure(code, U, watched, order, h, powers, totals)
     for j in range(watched.shape[0]):
         r = watched[j]
@@ -398,7 +398,7 @@ def reach(
                 largest = max(largest, abs(U[r, k]) * powers[k])
             if term <= _SLACK * rtol * largest:
                 break
-            h *= max(_SHORTER, _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
+            h *= max(_SHORTER, rough_root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
             measure(code, U, watched, order, h, powers, totals)
     return h
 

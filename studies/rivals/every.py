@@ -19,7 +19,8 @@ from rivals.method import Method
 def _heyoka() -> list[Method]:
     from rivals import heyoka_taylor
 
-    return [heyoka_taylor.method(1e-12), heyoka_taylor.method(1e-10, shown=False)]
+    tight, loose = heyoka_taylor.method(1e-11, shown=False), heyoka_taylor.method(1e-10, shown=False)
+    return [heyoka_taylor.method(1e-12), tight, loose]
 
 
 def _diffrax() -> list[Method]:

@@ -13,6 +13,7 @@ import hybridsim as hs
 from hybridsim.engine.series import SeriesRun, series_order
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.system import System
+from hybridsim.engine.taylor import rough_root
 from hybridsim.engine.timepair import Instant
 from hybridsim.testing.judge import SCENES
 
@@ -109,3 +110,12 @@ def test_a_saturated_force_is_seen_again() -> None:
     sol = hs.simulate(model, (0, 3), integrator="taylor", rtol=1e-9)
     reference = hs.simulate(model, (0, 3), integrator="scipy-radau", rtol=1e-9)
     assert sol(3.0) == pytest.approx(reference(3.0), rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize("n", [3, 14, 40])
+def test_rough_roots(n: int) -> None:
+    """Of every double there is: a step of a solution that grows beyond all bounds has tiny tolerances over its terms."""
+    for exponent in range(-323, 309):
+        for x in (10.0**exponent, 1.7 * 10.0 ** min(exponent, 307)):
+            assert rough_root(x, n) == pytest.approx(float(mpmath.root(x, n)), rel=5e-4)
+    assert rough_root(0.0, n) == 0.0 and rough_root(math.inf, n) == math.inf
