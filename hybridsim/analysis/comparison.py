@@ -101,6 +101,9 @@ class Comparison:
         """The comparison as text, for people."""
         return table(self)
 
+    def __str__(self) -> str:
+        return self.table()
+
     def to_csv(self, path: str | Path) -> None:
         """Write one line a row; times in the model's unit, wall times in seconds."""
         records = self.records()

@@ -66,6 +66,11 @@ def check_arguments(args: argparse.Namespace) -> None:
     if args.npz:
         require_writable(args.npz, "--npz", (".npz",))
     if args.save:
+        if str(args.save) in ("all", "events", "last-period", "nothing"):
+            raise UsageError(
+                f"--save: {args.save} is no file, and the command line keeps all of a run",
+                remedy=f"name a file such as run.hsol; in Python hs.simulate(..., save='{args.save}') keeps less",
+            )
         require_writable(args.save, "--save", (".hsol",))
     others = {"the model's own file": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
     for option in ("plot", "csv", "npz", "save"):

@@ -321,7 +321,7 @@ def announce_compilation() -> None:
     if ENABLED and not announced.exists():
         announced.parent.mkdir(parents=True, exist_ok=True)
         announced.touch()
-        _tell(f"hybridsim: compiling the engine, once (half a minute); {_kept()} ...")
+        _tell(f"hybridsim: compiling the engine, once (half a minute for an integrator); {_kept()} ...")
 
 
 def _kept() -> str:

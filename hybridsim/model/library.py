@@ -133,7 +133,11 @@ def load_law(name: str) -> FrictionLaw:
     if not isinstance(name, str):
         raise UsageError(f"the law is {name!r}", remedy="give the name of a law")
     if name not in list_laws():
-        raise ModelError(f"there is no law '{name}'", remedy=nearest(name, list_laws(), kind="laws"))
+        known = nearest(name, list_laws(), kind="laws")
+        raise ModelError(
+            f"there is no law '{name}'",
+            remedy=f"{known} A law of your own is given as the FrictionLaw itself",
+        )
     path = models_folder() / "laws" / f"{name}.toml"
     root = open_text(read_text(path), str(path), "the law")
     root.only("schema", "look", "laws")

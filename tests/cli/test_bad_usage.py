@@ -57,6 +57,10 @@ BAD = {
     "unknown state": (["run", "dfcs", "--x0", "y=1"], ["y", "x"]),
     "state as a parameter": (["run", "dfcs", "-p", "x=1"], ["x"]),
     "picture of an unknown kind": (["run", "dfcs", "--plot", "out.doc"], ["out.doc", ".png"]),
+    "what is kept in place of a file": (
+        ["run", "dfcs", "--save", "last-period"],
+        ["--save", "last-period", "run.hsol", "save='last-period'"],
+    ),
     "picture without an ending": (["run", "dfcs", "--plot", "out"], ["out", ".png"]),
     "picture in no folder": (["run", "dfcs", "--plot", "nowhere/out.png"], ["nowhere"]),
     "points of no table": (["run", "dfcs", "--points", "9"], ["--points", "--csv"]),

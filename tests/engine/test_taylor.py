@@ -114,7 +114,7 @@ def test_a_saturated_force_is_seen_again() -> None:
 
 @pytest.mark.parametrize("n", [3, 14, 40])
 def test_rough_roots(n: int) -> None:
-    """Of every double there is: a step of a solution that grows beyond all bounds has tiny tolerances over its terms."""
+    """Of every double there is: where a solution grows beyond bounds its tolerances over its terms are tiny."""
     for exponent in range(-323, 309):
         for x in (10.0**exponent, 1.7 * 10.0 ** min(exponent, 307)):
             assert rough_root(x, n) == pytest.approx(float(mpmath.root(x, n)), rel=5e-4)
