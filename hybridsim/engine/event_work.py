@@ -14,6 +14,7 @@ MOST = 3  # components at their surfaces at once: more make too many candidates 
 FIRED, DISCRETE, DISCRETE_AT = range(3)  # of `Work.whole`
 AT, AT_ERROR = range(2)  # of `Work.real`
 SETTLE, LEAP = range(2)  # of `Work.reached`
+NOBODY = -1  # in place of the guard that fired
 
 
 class Functions(NamedTuple):

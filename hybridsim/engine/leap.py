@@ -310,7 +310,7 @@ def leap(
                     s_error = max(s_error, abs(values[i] / slope))
         state_errors(automata, s_error, y, scale, x_error, z, rates_now, y_error)
         if is_shallow(slope, bend, steps[n_steps - 1, 1]) and is_hidden(
-            tapes, inputs, lin, k, fired, slope, bend, s, s_error, p, z, work
+            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):

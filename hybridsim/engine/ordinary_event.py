@@ -23,6 +23,7 @@ from hybridsim.engine.event_work import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
+    NOBODY,
     Before,
     called_by,
     find_modes,
@@ -158,8 +159,13 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
 def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
     """Settle the event in the work space and put what follows in place of the state: 1, or 0 where it is not ordinary.
 
-    lin: tables of linear modes, empty for others. state: `hybridsim.engine.segment_end.State`.
+    Where nobody has fired, the series of the active guards are left in the work space, and that is all. lin: tables of
+    linear modes, empty for others. state: `hybridsim.engine.segment_end.State`.
     """
+    if work.whole[FIRED] == NOBODY:
+        at, k = located(state, work), find_modes(tapes.modes, state.z)
+        guard_series(tapes, inputs, lin, k, at, at.x, at.x_error, work)
+        return 1
     if not settle_ordinary(automata, tapes, inputs, lin, state, work):
         return 0
     put(work.x_after, state.x)

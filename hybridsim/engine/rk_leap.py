@@ -11,15 +11,21 @@ import math
 from typing import Any
 
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
-from hybridsim.engine.event_verdicts import guard_series
-from hybridsim.engine.event_work import Before, find_modes, put
+from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
-from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
+from hybridsim.engine.segment_end import (
+    is_crowded,
+    is_hidden,
+    is_shallow,
+    judge,
+    settle_and_move_on,
+    state_errors,
+)
 from hybridsim.engine.taylor import advance, expand
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
@@ -205,31 +211,26 @@ def land(
     return UNSURE, d
 
 
-@kernel
+@inlined
 def is_zero(
     functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    k: int,
     fired: int,
     s: float,
-    y: Any,
-    x_error: Any,
-    p: Any,
-    z: Any,
-    room: Any,
+    scale: Any,
+    state: Any,
     work: Any,
 ) -> bool:
-    """Whether a guard is zero within twice the rounding of the state and that of the instant."""
-    s_error = 8.0 * 2.0**-52 * s
-    call(functions.flow, s, y, p, z, work.slopes)
-    state_errors(automata, s_error, y, room.scale, x_error, z, work.slopes, work.y_error)
+    """Whether a guard is zero, at the state in the work space, within twice the rounding of it and of the instant."""
+    s_error, y = 8.0 * 2.0**-52 * s, work.y
+    call(functions.flow, s, y, state.p, state.z, work.slopes)
+    state_errors(automata, s_error, y, scale, state.x_error, state.z, work.slopes, work.y_error)
     for i in range(y.shape[0]):
         work.y_error[i] *= 2.0
-    event = Before(s, s_error, y, work.y_error, p, z)
-    guard_series(tapes, inputs, lin, k, event, y, work.y_error, work)
+    judge(automata, tapes, inputs, lin, s, s_error, state, work)
     return abs(work.judged[0, fired, 0]) <= work.judged[1, fired, 0]
 
 
@@ -416,9 +417,7 @@ def rk_leap(
             return AT_TARGET, n_steps, n_segments + 1
         if is_crowded(s, clock, pace):
             return STOPPED, first_step, n_segments
-        if not is_sure and not is_zero(
-            functions, automata, tapes, inputs, lin, k, fired, s, y, x_error, p, z, room, work
-        ):
+        if not is_sure and not is_zero(functions, automata, tapes, inputs, lin, fired, s, scale, state, work):
             return STOPPED, first_step, n_segments
         s_error = 2.0 * 2.0**-52 * s
         if slope != 0.0 and abs(value / slope) < math.inf:
@@ -426,7 +425,7 @@ def rk_leap(
         call(functions.flow, s, y, p, z, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, work.y_error)
         if is_shallow(slope, bend, d) and is_hidden(
-            tapes, inputs, lin, k, fired, slope, bend, s, s_error, p, z, work
+            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
         if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):

@@ -18,6 +18,7 @@ from math import comb
 
 import numpy as np
 
+from hybridsim.engine.event_work import put
 from hybridsim.engine.jit import allocating_kernel, kernel
 from hybridsim.engine.stepping import StepFailure
 
@@ -117,7 +118,9 @@ def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
     # depth-first from the left; a stack of (coefficients, bounds, left, width)
     coefficients, bounds = np.empty((128, n)), np.empty((128, n))
     place, width = np.empty(128), np.empty(128)
-    coefficients[0], bounds[0], place[0], width[0] = b, bound, 0.0, 1.0
+    place[0], width[0] = 0.0, 1.0
+    put(b, coefficients[0])
+    put(bound, bounds[0])
     top = 1
     while top > 0:
         top -= 1
@@ -126,9 +129,11 @@ def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
         if s == 0 and w > _NARROWEST and count < 1000 and not _within(c, e):
             cl, cr = _halve(c)
             el, er = _halve(e)
-            coefficients[top], bounds[top], place[top], width[top] = cr, er, x + 0.5 * w, 0.5 * w
-            coefficients[top + 1], bounds[top + 1], place[top + 1], width[top + 1] = cl, el, x, 0.5 * w
-            top += 2
+            for halves, errors, left in ((cr, er, x + 0.5 * w), (cl, el, x)):
+                put(halves, coefficients[top])
+                put(errors, bounds[top])
+                place[top], width[top] = left, 0.5 * w
+                top += 1
         elif count > 0 and rows[count - 1, 2] == s:
             rows[count - 1, 1] = x + w
         else:
@@ -191,7 +196,8 @@ def quiet(
         error, largest = _represent(samples, coefficients)
         if not error <= _ACCEPT * largest:
             continue
-        bounds[:] = max(error, floors[g])
+        for i in range(DEGREE + 1):
+            bounds[i] = max(error, floors[g])
         n = _deflated(coefficients, bounds, orders[g], sides[g])
         result[k] = _sign(coefficients[:n], bounds[:n]) == sides[g]
     return result

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.accumulation import CLOSING_IN
-from hybridsim.engine.event_verdicts import guard_series
-from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, SETTLE, Before
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, NOBODY, SETTLE
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
@@ -69,27 +68,34 @@ def is_shallow(slope: float, bend: float, length: float) -> bool:
     return bend > 0.0 and slope * slope < _SHALLOW * bend * length * (abs(slope) + bend * length)
 
 
-@kernel
+@inlined
+def judge(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, s: float, s_error: float, state: Any, work: Any
+) -> None:
+    """Series of the active guards with bounds, to `judged` of the work space, at the state y, y_error there."""
+    work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, NOBODY
+    call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work))
+
+
+@inlined
 def is_hidden(
+    automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    k: int,
     g: int,
     slope: float,
     bend: float,
     s: float,
     s_error: float,
-    p: Any,
-    z: Any,
+    state: Any,
     work: Any,
 ) -> bool:
     """Whether a guard comes back before it is beyond the rounding of all that its expression is made of.
 
     At the state in the work space, at local time s.
     """
-    at = Before(s, s_error, work.y, work.y_error, p, z)
-    guard_series(tapes, inputs, lin, k, at, work.y, work.y_error, work)
+    judge(automata, tapes, inputs, lin, s, s_error, state, work)
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 

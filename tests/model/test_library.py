@@ -67,7 +67,7 @@ def test_unknown_model_names_the_near_ones() -> None:
 
 
 def test_unknown_law() -> None:
-    with pytest.raises(hs.ModelError, match="did you mean 'stribeck'.* law of your own is given as"):
+    with pytest.raises(hs.ModelError, match=r"did you mean 'stribeck'.* law of your own is given as"):
         hs.load_law("stribek")
 
 
