@@ -8,7 +8,7 @@ from typing import Any
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call_series, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.leap import earliest_exit
 from hybridsim.engine.steps_ahead import keeps_up, sum_at
 from hybridsim.engine.taylor import advance, reach, sum_sizes, tabulate
@@ -56,7 +56,7 @@ def series_along(
     if time >= 0:
         V[time, 0], V[time, 1] = s, 1.0
     for j in range(size):
-        advance(rows, V, j)
+        call_apart(advance, (rows, V, j))
     for i in range(watched.shape[0]):
         for j in range(size):
             out[i, j] = V[watched[i], j]
@@ -75,7 +75,7 @@ def guards_at(
         W[states[i], 0] = x[i]
     if time >= 0:
         W[time, 0] = s
-    advance(rows, W, 0)
+    call_apart(advance, (rows, W, 0))
     for j in range(watched.shape[0]):
         out[j] = W[watched[j], 0]
 

@@ -15,10 +15,26 @@ from hybridsim.engine.decide import (
 )
 from hybridsim.engine.event_work import called_by, find_modes, located
 from hybridsim.engine.jets import ORDER, run_series
-from hybridsim.engine.jit import call, call_series, inlined, kernel, merged
+from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel, merged
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
 
 UNKNOWN = -2  # in place of a verdict
+
+
+@kernel
+def _interpreted_series(
+    tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
+) -> None:
+    """As `guard_series`, by the interpreter of tapes."""
+    judged, V, E = work.judged, work.V, work.E
+    constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
+    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+    run_series(constant, rows, inputs, tapes.derivatives[k], s, s_error, x, x_error, p, V, E)
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        r = tapes.guards[k, g]
+        for j in range(judged.shape[2]):
+            judged[0, g, j], judged[1, g, j] = V[r, j], E[r, j]
 
 
 @inlined
@@ -29,19 +45,11 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
     """
     if is_linear(lin):
         return
-    judged, V, E = work.judged, work.V, work.E
     if tapes.bounds[k] != 0:
-        call_series(tapes.bounds[k], at.s, at.s_error, x, x_error, at.p, judged)
+        call_series(tapes.bounds[k], at.s, at.s_error, x, x_error, at.p, work.judged)
         return
     tapes.lacked[k] += 1
-    constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
-    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
-    run_series(constant, rows, inputs, tapes.derivatives[k], at.s, at.s_error, x, x_error, at.p, V, E)
-    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        g = tapes.active[i]
-        r = tapes.guards[k, g]
-        for j in range(judged.shape[2]):
-            judged[0, g, j], judged[1, g, j] = V[r, j], E[r, j]
+    call_apart(_interpreted_series, (tapes, inputs, k, at.s, at.s_error, x, x_error, at.p, work))
 
 
 @inlined

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import inlined, kernel
+from hybridsim.engine.jit import call_apart, inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -394,5 +394,5 @@ def run_series(
         V[states[i], 0] = x[i]
         E[states[i], 0] = x_error[i]
     for r in range(constant_rows.shape[0]):
-        _advance(constant_rows[r], V, E, 0)
+        call_apart(_advance, (constant_rows[r], V, E, 0))
     run_tape(rows, order, states, derivatives, V, E)

@@ -207,6 +207,30 @@ if ENABLED:
         return signature, generate
 
     @intrinsic
+    def call_apart(typingctx: Any, kernel: Any, arguments: Any) -> Any:
+        """Call a kernel with a tuple of arguments, and keep it out of its caller.
+
+        LLVM copies even long kernels into all that call them, and compiles each copy anew.
+        """
+        called = kernel.get_call_type(typingctx, tuple(map(types.unliteral, arguments.types)), {})
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            target = context.get_function(kernel, called)
+            given = cgutils.unpack_tuple(builder, args[1], len(arguments))
+            casts = zip(given, arguments.types, called.args, strict=True)
+            before = {id(i) for block in builder.function.blocks for i in block.instructions}
+            result = target(
+                builder, [context.cast(builder, value, have, want) for value, have, want in casts]
+            )
+            for block in builder.function.blocks:
+                for instruction in block.instructions:
+                    if isinstance(instruction, ir.CallInstr) and id(instruction) not in before:
+                        instruction.attributes.add("noinline")
+            return result
+
+        return called.return_type(kernel, arguments), generate
+
+    @intrinsic
     def call(typingctx: Any, function: Any, t: Any, x: Any, p: Any, z: Any, out: Any) -> Any:
         """Call the model function at an address with contiguous arrays; return its status."""
         signature = types.int32(types.int64, types.float64, x, p, z, out)
@@ -275,6 +299,10 @@ else:
                 return 1
 
         return guarded, guarded
+
+    def call_apart(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """Call a kernel."""
+        return kernel(*arguments)
 
     def call(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> int:
         """Call the model function."""

@@ -14,7 +14,7 @@ import numpy as np
 from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_series, inlined, kernel
+from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
 from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
 from hybridsim.engine.taylor import advance, expand, reach
@@ -78,7 +78,8 @@ def load(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
         V[inputs.constants[i], 0] = inputs.values[i, 0]
     for i in range(inputs.parameters.shape[0]):
         V[inputs.parameters[i], 0] = p[inputs.sources[i]]
-    advance(tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]], V, 0)
+    rows = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
+    call_apart(advance, (rows, V, 0))
 
 
 @inlined
@@ -103,7 +104,7 @@ def series_at(
     if code != 0:
         call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
         return
-    expand(rows, high, places, order, s, x, V)
+    call_apart(expand, (rows, high, places, order, s, x, V))
     states = places[1]
     for i in range(states.shape[0]):
         for k in range(order + 1):

@@ -15,7 +15,7 @@ from hybridsim.engine.event_work import find_modes, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_series, inlined, kernel
+from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
 from hybridsim.engine.segment_end import (
@@ -101,10 +101,10 @@ def expand_ends(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: An
     for i in range(n):
         W[states[i], 0] = x[i]
     for k in range(last):
-        advance(rows, W, k)
+        call_apart(advance, (rows, W, k))
         for i in range(n):
             W[states[i], k + 1] = W[derivatives[i], k] / (k + 1)
-    advance(guard_rows, W, last)
+    call_apart(advance, (guard_rows, W, last))
     gather(states, W, out)
 
 
@@ -128,7 +128,7 @@ def series_of(
     if code != 0:
         call_series(code, s, 0.0, x, guards, W, out)
     else:
-        expand_ends(rows, guard_rows, places, s, x, W, out)
+        call_apart(expand_ends, (rows, guard_rows, places, s, x, W, out))
         gather(watched, W, guards)
     return is_finite(out)
 
@@ -310,7 +310,7 @@ def rk_leap(
         if first_code != 0:
             call_series(first_code, 0.0, 0.0, y, room.guards_left, W, room.first)
         else:
-            expand(step_rows, step_rows[:0], flow_places, leading[0] + 1, 0.0, y, W)
+            call_apart(expand, (step_rows, step_rows[:0], flow_places, leading[0] + 1, 0.0, y, W))
             gather(states, W, room.first)
             gather(watched, W, room.guards_left)
         h = first_length(leading, y, tolerances, room.first, min(bound, max_step))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call_series, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.taylor import advance, tabulate
 
 _DEFECT = 100.0  # as in the taylor integrator
@@ -49,7 +49,7 @@ def values_at(
         W[time, 0] = s
     for i in range(states.shape[0]):
         W[states[i], 0] = x[i]
-    advance(rows, W, 0)
+    call_apart(advance, (rows, W, 0))
     for i in range(states.shape[0]):
         rates[i] = W[derivatives[i], 0]
     for j in range(watched.shape[0]):

@@ -24,7 +24,7 @@ from hybridsim.engine.high_orders import (
     OVER_B,
     OVER_C,
 )
-from hybridsim.engine.jit import call_series, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -282,9 +282,9 @@ def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: A
         V[states[i], 0] = x[i]
     for k in range(order + 1):
         if k > EXACTLY and high.shape[0] > 0:
-            advance(high, V, k)
+            call_apart(advance, (high, V, k))
             continue
-        advance(rows, V, k)
+        call_apart(advance, (rows, V, k))
         if k < order:
             for i in range(states.shape[0]):
                 rate, j = V[derivatives[i], k], k + 1
