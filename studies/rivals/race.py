@@ -99,6 +99,7 @@ def take_turns(running: Sequence[Running], turns: int) -> None:
                     continue
                 gc.collect()
                 gc.disable()
+                spent = 0.0
                 for _ in range(_MOST_CALLS):
                     clock, began = time.perf_counter(), time.process_time()
                     outcome = call()
@@ -107,7 +108,8 @@ def take_turns(running: Sequence[Running], turns: int) -> None:
                     times.calls.append(times.clock[-1] if times.has_threads else taken)
                     if parts is not None:
                         times.inside.append(parts(outcome))
-                    if times.calls[-1] > _TURN / _MOST_CALLS and sum(times.calls[-_MOST_CALLS:]) > _TURN:
+                    spent += times.calls[-1]
+                    if spent > _TURN:
                         break
     finally:
         gc.enable()
