@@ -82,6 +82,11 @@ class _Rewriting:
         ends = [ready.get(rate, _EARLY) for rate in rates]
         # of the states some come before others
         self._ready = self._ready_after({x: end - max(ends) for x, end in zip(states, ends, strict=True)})
+        self._lent: set[int] = set()  # registers of sums that are a part of others
+        self._sums: dict[int, tuple[list[tuple[int, bool]], list[int]]] = {}
+        for row in reversed(rows):
+            if row[0] in (ADD, SUB) and row not in self._kept and row[4] not in self._lent:
+                self._take_apart(row)
         self.rows: list[Row] = []
         for row in rows:
             self._rewrite(row)
@@ -111,41 +116,44 @@ class _Rewriting:
                 form = replace(form, constants=(*form.constants, (b, op == DIVIDE_BY)))
             self._forms[out] = form
             self.rows.append(row if row in self._kept else form.row(FACTOR, out))
-        elif op in (ADD, SUB) and row not in self._kept:
-            self._sum(row)
-        else:
+        elif out in self._sums:
+            self._sum(out, *self._sums[out])
+        elif out not in self._lent:
             self.rows.append(row)
 
-    def _sum(self, row: Row) -> None:
+    def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
         """A sum that takes last what comes last; the sums it is made of lend their registers."""
-        inner: list[int] = []
-        terms = self._terms(row, False, inner)
-        if all(is_negative for _, is_negative in terms):
-            self.rows.append(row)
-            return
-        self.rows = [other for other in self.rows if other[4] not in inner]
         (total, is_negative), *others = sorted(terms, key=lambda term: self._ready.get(term[0], _EARLY))
-        for (register, turns), out in zip(others, (*inner, row[4]), strict=True):
+        for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:
-                self.rows.append((ADD, total, register, 0, out))
+                self.rows.append((ADD, total, register, 0, to))
             else:
                 first, second = (register, total) if is_negative else (total, register)
-                self.rows.append((SUB, first, second, 0, out))
+                self.rows.append((SUB, first, second, 0, to))
                 is_negative = False
-            total = out
+            total = to
 
-    def _terms(self, row: Row, is_negative: bool, inner: list[int]) -> list[tuple[int, bool]]:
-        """The registers of a sum, each with whether it is subtracted; the sums in it that nobody else reads."""
-        found = []
-        for r, turns in ((row[1], is_negative), (row[2], is_negative != (row[0] == SUB))):
+    def _take_apart(self, row: Row) -> None:
+        """Find the registers of a sum, each with whether it is subtracted, and the sums in it that nobody else reads.
+
+        One of negative terms alone stays as it is.
+        """
+        found: list[tuple[int, bool]] = []
+        inner: list[int] = []
+        waiting = [(row[2], row[0] == SUB), (row[1], False)]
+        while waiting:
+            r, turns = waiting.pop()
             while self._is_inner(r, (*_SAME, *_TURNED)):
                 r, turns = self._of[r][1], turns != (self._of[r][0] in _TURNED)
             if self._is_inner(r, (ADD, SUB)):
+                op, a, b, *_ = self._of[r]
                 inner.append(r)
-                found += self._terms(self._of[r], turns, inner)
+                waiting += [(b, turns != (op == SUB)), (a, turns)]
             else:
                 found.append((r, turns))
-        return found
+        if not all(is_negative for _, is_negative in found):
+            self._sums[row[4]] = found, inner
+            self._lent.update(inner)
 
     def _is_inner(self, register: int, operations: tuple[int, ...]) -> bool:
         """Whether a register is of one of these operations, and read but once."""

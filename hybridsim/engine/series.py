@@ -12,9 +12,8 @@ from hybridsim.engine.taylor import advance, expand, reach
 
 _SMALLEST_ORDER = 4
 _SMOOTH = 1.4  # times the short order
-_LINEAR = (
-    1.6  # p! rtol = 3**p is met at 16, 20, 24 for rtol = 1e-6, 1e-9, 1e-12: so many times the short order
-)
+# p! rtol = 3**p is met at 16, 20, 24 for rtol = 1e-6, 1e-9, 1e-12: so many times the short order
+_LINEAR = 1.6
 _LITTLE = 2.0**-44  # of the time so far: hardly a step
 _TIGHTEST = 1e-15  # what a series in doubles can still be asked for
 

@@ -223,6 +223,7 @@ class System:
                 "registers", lambda: Registers(data["tape"], self.layout)
             )
         self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
+        self._high: dict[bytes, list[tuple[int, ...]]] = self.code.shared("high orders", dict)
 
     @property
     def has_corners(self) -> bool:
@@ -435,10 +436,14 @@ class System:
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
         """The rows of that tape for high orders of states, active guards and monitors."""
+        key = z.tobytes()
+        if key in self._high:
+            return self._high[key]
         tape = self.lean_tape(z)
         watched = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
         rows = list(map(tuple, tape.rows.tolist()))
-        return high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
+        self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
+        return self._high[key]
 
     def series(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float

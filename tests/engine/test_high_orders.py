@@ -86,3 +86,20 @@ def test_a_sum_that_something_else_reads_stays() -> None:
     first, second, third, *_ = high_rows(rows, [X, V], [11, 12], [])
     assert (first, third) == (rows[0], rows[2])
     assert second in (rows[1], (ADD, V, 10, 0, 11))
+
+
+def test_a_sum_of_a_thousand_terms() -> None:
+    """Taken apart once, and not by recursion."""
+    count = 3000
+    rows = [(SCALE, X if i % 2 else V, B, 0, 10 + i) for i in range(count)]
+    rows.append((SUB, 10, 11, 0, 10 + count))
+    rows += [(ADD, 8 + count + i, 10 + i, 0, 9 + count + i) for i in range(2, count)]
+    found = high_rows(rows, [X, V], [V, rows[-1][4]], [])
+    assert len(found) == len(rows) + 2
+    assert len({row[4] for row in found[:-2]}) == len(rows)
+
+
+def test_a_sum_of_what_is_subtracted() -> None:
+    """-(x + v) - v."""
+    rows = [(ADD, X, V, 0, 10), (NEG, 10, 0, 0, 11), (SUB, 11, V, 0, 12)]
+    assert high_rows(rows, [X, V], [V, 12], [])[:-2] == rows
