@@ -201,7 +201,7 @@ def first_guard(
         series_along(along, rows, inputs, s + q, x, watched, room.V, room.W, U)
         left = d - q
         longest = min(left, likely_reach(U, everyone, order, rtol))
-        w = reach(0, U, none, U, everyone, order, rtol, atol, longest, room.powers, room.totals)
+        w = reach(0, U, none, U, everyone, order, rtol, atol, 1.0, longest, room.powers, room.totals)
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(

@@ -17,7 +17,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
 from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
-from hybridsim.engine.taylor import advance, expand, reach
+from hybridsim.engine.taylor import SLACK, advance, expand, reach
 from hybridsim.engine.timepair import phase_of
 
 AT_TARGET, STOPPED, FULL = 0, 1, 2
@@ -234,8 +234,8 @@ def leap(
             )
             left = bound - s
             h = reach(
-                sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, min(left, max_step),
-                powers, totals,
+                sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
+                min(left, max_step), powers, totals,
             )  # fmt: skip
             if not h > _SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments

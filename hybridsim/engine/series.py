@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.system import System
-from hybridsim.engine.taylor import advance, expand, reach
+from hybridsim.engine.taylor import SLACK, advance, expand, reach
 
 _SMALLEST_ORDER = 4
 _SMOOTH = 1.4  # times the short order
@@ -68,4 +68,4 @@ class SeriesRun:
     def _reach(self, watched: np.ndarray, longest: float) -> float:
         V, order = self.V, self.order
         room = np.empty(order + 1), np.empty(len(watched))
-        return reach(0, V, self.states, V, watched, order, self.rtol, self.atol, longest, *room)
+        return reach(0, V, self.states, V, watched, order, self.rtol, self.atol, SLACK, longest, *room)

@@ -67,9 +67,8 @@ EXACTLY = 3  # order of states up to which events are judged: they are divided b
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
 _SHORTER = 0.5  # factor on a step over which a guard's series does not reach, at least
-_SLACK = (
-    1.5  # of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step
-)
+# Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
+SLACK = 1.5
 _TRIALS = 60  # halvings: down to nothing
 _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 
@@ -330,6 +329,12 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
 
 
 @inlined
+def _root(x: float, n: int) -> float:
+    """x**(1/n) for x >= 0, to some digits: cheaper than a power."""
+    return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
+
+
+@inlined
 def rough_root(x: float, n: int) -> float:
     """x**(1/n) for x >= 0, to three digits: cheaper than a power.
 
@@ -337,7 +342,7 @@ def rough_root(x: float, n: int) -> float:
     exponential are cubics, good to 8e-4 / n and 1e-4.
     """
     if not _LEAST <= x < math.inf:
-        return math.exp(math.log(x) / n) if 0.0 < x < _LEAST else x
+        return _root(x, n)
     bits = np.float64(x).view(np.int64)
     f = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) - 1.0
     log = ((0.152700285 * f - 0.568704053) * f + 1.41565319) * f + 8.25462823e-4
@@ -358,6 +363,7 @@ def reach(
     order: int,
     rtol: float,
     atol: Any,
+    slack: float,
     longest: float,
     powers: Any,
     totals: Any,
@@ -367,8 +373,8 @@ def reach(
     powers (order + 1,) are h**k then, totals those of `sum_sizes` for the functions; code: see `measure`.
 
     states: rows of V with the series of the states, watched: rows of U with those of functions. The last two terms of
-    each state are below atol + rtol |x|; those of each function below rtol of its largest term. NaN where a
-    coefficient is no number.
+    each state are below atol + rtol |x|; those of each function below rtol of its largest term, times the slack. NaN
+    where a coefficient is no number.
     """
     h, first, last = longest, math.inf, math.inf
     for i in range(states.shape[0]):
@@ -392,13 +398,13 @@ def reach(
                 return math.nan
             term = max(abs(U[r, order - 1]) * powers[order - 1], abs(U[r, order]) * powers[order])
             largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
-            if term <= _SLACK * rtol * largest or term == 0.0:
+            if term <= slack * rtol * largest or term == 0.0:
                 break
             for k in range(2, order - 1):
                 largest = max(largest, abs(U[r, k]) * powers[k])
-            if term <= _SLACK * rtol * largest:
+            if term <= slack * rtol * largest:
                 break
-            h *= max(_SHORTER, rough_root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
+            h *= max(_SHORTER, 0.9 * _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
             measure(code, U, watched, order, h, powers, totals)
     return h
 
