@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -163,3 +163,17 @@ def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndar
     modes = ", ".join(f"{a.name} {a.modes[m]}" for a, m in zip(system.declared, z, strict=False))
     where = f", {modes}" if modes else ""
     return f"{head} {', '.join(names)} is not a number (at {state}{where})"
+
+
+def reset_in_words(system: System, key: tuple[object, ...]) -> str:
+    """Whose reset it is, by its key."""
+    model = system.model
+    if key[0] == "limit":
+        return f"the limit of {system.automata[int(str(key[1]))].name}"
+    if key[0] != "choice":
+        kind, number = str(key[0]), int(str(key[1]))
+        parts: Any = model.monitors if kind == "monitor" else model.schedules
+        return f"the reset of {kind} {parts[number].name}"
+    c, mode, j = (int(str(k)) for k in key[1:4])
+    automaton = system.automata[c]
+    return f"the reset of guard {automaton.guard_names[mode][j]} of {automaton.name}.{automaton.modes[mode]}"

@@ -26,22 +26,23 @@ def behind(
 
     With the local time from which it holds: now, where something else may come before the limit.
     """
-    found = _gathered(system, outcome, p, s, s + limit.passed)
+    found = _gathered(system, outcome, p, s, s + limit.passed, limit.components)
     return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
 
 
 def _gathered(
-    system: System, outcome: Outcome, p: np.ndarray, s: float, left: float
+    system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
     """At the limit of crossings or impacts; None if it is none of what can be held.
 
     It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
     contacts whose gaps and their rates come to zero in it. They are held from here on: on the average, bounces that
-    follow each other ever faster carry the load that a closed contact carries, and crossings to and fro slide. The
-    decision is that of any event (`hybridsim.engine.settle`).
+    follow each other ever faster carry the load that a closed contact carries, and crossings to and fro slide. So is
+    friction among those that changed, which has come to rest to rounding. The decision is that of any event
+    (`hybridsim.engine.settle`).
     """
-    near = _within_reach(system, outcome, p, left)
-    if len(near) < (1 if any(system.is_unilateral[near]) else 2):
+    near = _within_reach(system, outcome, p, left, changed)
+    if len(near) < (2 if all(system.automata[c].is_unique for c in near) else 1):
         return None
     z = outcome.z.copy()
     z[near] = [system.automata[c].hold for c in near]
@@ -164,8 +165,10 @@ def holds_several(system: System, outcome: Outcome) -> bool:
 
 
 @np.errstate(over="ignore")  # what is too large to tell is within reach
-def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) -> list[int]:
-    """The contacts and surfaces that come to zero in this time, and friction that they load or move."""
+def _within_reach(
+    system: System, outcome: Outcome, p: np.ndarray, left: float, changed: tuple[int, ...]
+) -> list[int]:
+    """The contacts and surfaces that come to zero in this time; friction that they load or move, or that changed."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found: list[int] = []
     rubbing: list[int] = []
@@ -184,4 +187,5 @@ def _within_reach(system: System, outcome: Outcome, p: np.ndarray, left: float) 
         slopes, changes, loads = system.impulses(0.0, outcome.x, p, outcome.z)
         moved = slopes @ changes[acting].T
         found += [k for k in rubbing if moved[k].any() or loads[:, k, acting].any()]
+    found += [k for k in rubbing if k not in found and system.surface_of[k] in changed]
     return [system.surface_of[k] for k in found]

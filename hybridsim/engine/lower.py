@@ -10,6 +10,7 @@ from hybridsim.engine.affine_modes import affine_modes
 from hybridsim.engine.clusters import clusters_of, normal_loads
 from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
+from hybridsim.engine.kept_rates import kept_rates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.nonlinear import nonlinear, refuse_powers
 from hybridsim.engine.program import Assign, Item, Switch, ordered
@@ -408,6 +409,11 @@ class Lowering:
         names = [f"d_{i}" for i in range(len(der))]
         for i, (name, e) in enumerate(zip(names, der, strict=True)):
             state = self.model.states[i].name
+            for c, rate in kept_rates(self, i, der, held):
+                component, kept = self.components[c], self.sp.Symbol(f"kept_{c}", real=True)
+                branches = [rate if m.name == component.surface.hold else e for m in component.modes]
+                items.append(Switch(c, tuple((Assign(kept.name, value),) for value in branches)))
+                e = kept
             overriding = [
                 c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)
             ]

@@ -39,12 +39,47 @@ def rivals(
     if not unique:
         return candidates[:0]
     fine = candidates[verdicts == FINE]
-    if len(np.unique(fine[:, unique], axis=0)) < 2:
+    if len(np.unique(fine[:, unique], axis=0)) < 2 or is_one_motion(settling, members, fine):
         return fine[:0]
-    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in fine]
+    return fine
+
+
+def is_one_motion(settling: Settling, members: list[int], candidates: np.ndarray) -> bool:
+    """Whether the states go on alike in all of these modes, as those of a body at rest between two that slip."""
+    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in candidates]
+    if not np.isfinite(motions).all():
+        return False
     sizes = np.abs(motions).max(axis=0)
-    same = all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
-    return fine[:0] if same else fine
+    return all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
+
+
+def can_hold(settling: Settling, members: list[int], z: np.ndarray) -> bool:
+    """Whether what the modes z hold has values: a speed at rest and a relay that acts on it are not held together."""
+    automata = settling.system.automata
+    if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
+        return True
+    numbers = settling.system.guards_of(z)[members]
+    return bool(np.isfinite(settling.series_of(z).guards[numbers[numbers >= 0], 0]).all())
+
+
+def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) -> int:
+    """The number of the first of these modes that stay on their sides of all surfaces to the last bit; 0 if none does.
+
+    A body at rest may slip either way to rounding; what holds it there leaves it a speed, or a rate, of some sign.
+    """
+    system, at = settling.system, settling.at
+    for number, modes in enumerate(candidates):
+        z = settling.with_modes(members, modes)
+        x = system.project(at.s, at.x, at.p, z)
+        series = settling.series_of(z, x).surfaces
+        values = np.where(series[:, 0] == 0.0, series[:, 1], series[:, 0])
+        sides = [
+            int(z[c] == system.automata[c].above) - int(z[c] == system.automata[c].below)
+            for c in system.surface_of
+        ]
+        if (np.sign(values) * sides >= 0.0).all():
+            return number
+    return 0
 
 
 def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:

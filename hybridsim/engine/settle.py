@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.at_zero import at_zero
+from hybridsim.engine.at_zero import at_zero, cross, past_zero
 from hybridsim.engine.candidates import all_verdicts, verdicts_on
 from hybridsim.engine.decide import (
     LEAVES,
@@ -21,12 +20,20 @@ from hybridsim.engine.decide import (
     judge,
     side_after,
 )
-from hybridsim.engine.diagnosis import rates_without_value
+from hybridsim.engine.diagnosis import rates_without_value, reset_in_words
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
 from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.meeting import keeps_nothing, refused, rivals, words_on_cascade
+from hybridsim.engine.meeting import (
+    can_hold,
+    is_one_motion,
+    keeps_nothing,
+    on_its_side,
+    refused,
+    rivals,
+    words_on_cascade,
+)
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.releases import Releases
 from hybridsim.engine.rest_at_stops import together, with_tied
@@ -305,25 +312,11 @@ class Settling:
                 x_error[place] = UNIT * abs(value)
             if not np.isfinite(value):
                 state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, self.at.x, strict=True))
-                return f"{self._reset_in_words(key)} sets {name} to no finite number, at {state}"
+                return f"{reset_in_words(self.system, key)} sets {name} to no finite number, at {state}"
             previous = writer.setdefault(name, (label, float(value)))
             if previous[1] != value and not (np.isnan(value) and np.isnan(previous[1])):
                 return f"two resets at one instant set {name} to {previous[1]!r} and to {float(value)!r}"
         return None
-
-    def _reset_in_words(self, key: tuple[object, ...]) -> str:
-        model = self.system.model
-        if key[0] == "limit":
-            return f"the limit of {self.system.automata[int(str(key[1]))].name}"
-        if key[0] != "choice":
-            kind, number = str(key[0]), int(str(key[1]))
-            parts: Any = model.monitors if kind == "monitor" else model.schedules
-            return f"the reset of {kind} {parts[number].name}"
-        c, mode, j = (int(str(k)) for k in key[1:4])
-        automaton = self.system.automata[c]
-        return (
-            f"the reset of guard {automaton.guard_names[mode][j]} of {automaton.name}.{automaton.modes[mode]}"
-        )
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 
@@ -332,6 +325,9 @@ class Settling:
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._decide_cluster(cluster, open_)
+                if failure and failure[0] == "inconsistent" and (first := past_zero(self, cluster) - open_):
+                    cross(self, first)
+                    failure = self._decide_cluster(cluster, open_)
                 if failure and failure[0] == "inconsistent" and (more := at_zero(self, cluster) - open_):
                     failure = self._decide_cluster(cluster, open_ | more)
                 if failure:
@@ -360,7 +356,10 @@ class Settling:
         number = int(choose(candidates, verdicts, at.z[taking_part], holds))
         if number == NONUNIQUE:
             verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
-            return self._several(taking_part, candidates[verdicts != LEAVES])
+            left = np.flatnonzero(verdicts != LEAVES)
+            if not is_one_motion(self, taking_part, candidates[left]):
+                return self._several(taking_part, candidates[left])
+            number = int(left[on_its_side(self, taking_part, candidates[left])])
         if number == NONE:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         source, x_minus = at.z.copy(), at.x.copy()
@@ -410,7 +409,8 @@ class Settling:
         """Whether the guards of some components admit the modes z just after the event."""
         components = list(components)
         decreed = self._decreed(z, self._continuous(z, components))
-        return self._judge(z, self.at.x, decreed, components)
+        found = self._judge(z, self.at.x, decreed, components)
+        return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
 
     def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
         """Whether every change so far leaves all unknowns as they were."""

@@ -71,3 +71,14 @@ def test_a_relay_that_a_stick_holds_still_leaves_with_it(rtol: float) -> None:
     sol = hs.simulate(model, (0.0, END), params=draw.params, x0=draw.start, integrator="dop853", rtol=rtol)
     assert sol.status == "finished"
     assert judged(s, draw, sol)[0] == "agrees"
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+@pytest.mark.parametrize(("number", "draw_number"), [(67, 32), (75, 40), (144, 34)])
+def test_a_slide_whose_speed_dies_out_goes_on(number: int, draw_number: int, integrator: str) -> None:
+    """Friction sees a speed that falls below rounding and never turns around."""
+    s = structure(number, SEED)
+    draw = s.draw(np.random.default_rng([SEED, number, draw_number]))
+    sol = run(hs.Model.from_toml(s.toml), draw, integrator)
+    assert sol.status == "finished"
+    assert judged(s, draw, sol)[0] == "agrees"

@@ -130,3 +130,74 @@ def test_a_twisting_controller_comes_to_rest_and_stays_there(integrator: str) ->
     t = np.linspace(6, 20, 101)
     assert (disturbed(t) == 0.0).all()
     assert disturbed.output("control", t) == pytest.approx(p["d"] * np.sin(p["omega"] * t), abs=1e-14)
+
+
+REST = """
+[states]
+x = { start = 0, der = "v" }
+v = { start = 0, der = "-2*u - f" }
+
+[surfaces]
+u = "x + v"
+
+[contacts.f]
+velocity = "v"
+normal = 1
+law = { name = "coulomb", mu = 0.3 }
+"""
+
+
+@pytest.mark.parametrize(
+    "integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853", "cvode-adams"]
+)
+def test_a_body_at_rest_on_a_surface_and_in_friction_stays(integrator: str) -> None:
+    """The contact and the relay act on one speed: what each gives cannot be told, and is not asked for."""
+    sol = hs.simulate(hs.Model.from_toml(REST), (0, 5), integrator=integrator)
+    assert sol.status == "finished"
+    assert not sol.events
+    assert sol(5.0) == pytest.approx([0.0, 0.0], abs=0.0)
+
+
+def servo(load: float) -> hs.Model:
+    """A servo with dry friction on the line of its sliding mode, under a load of 3 rad/s."""
+    v = f"(-1.5*u - 0.01*v - f + {load}*sin(3*t))/0.02"
+    return hs.Model(
+        "servo",
+        states=[hs.State("x", 0.0, "v", nominal=1), hs.State("v", 0.0, v, nominal=10)],
+        surfaces=[hs.SwitchingSurface("u", "6*(x - 1) + v")],
+        contacts=[hs.Contact("f", "v", normal=1, law="coulomb", arguments={"mu": 0.2})],
+    )
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p", "scipy-dop853"])
+def test_a_servo_with_friction_comes_to_its_target(integrator: str, rtol: float) -> None:
+    """The load is less than what the relay and friction can bear together; 1 - x falls by exp(-6) per unit of time."""
+    for load in (0.3, 1.0):
+        sol = hs.simulate(servo(load), (0, 12), integrator=integrator, rtol=rtol)
+        assert sol.status == "finished"
+        assert [event.target for event in sol.events if event.component == "u"] == ["sliding"]
+        assert sol(12.0) == pytest.approx([1.0, 0.0], abs=10 * rtol + 1e-14)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853"])
+def test_a_load_that_a_relay_and_friction_cannot_bear_moves_the_servo(integrator: str) -> None:
+    """1.5 and 0.2 against 1.75: it is carried off in both directions in turn, every time as far."""
+    sol = hs.simulate(servo(1.75), (0, 12), integrator=integrator, rtol=1e-10)
+    reference = hs.simulate(servo(1.75), (0, 12), integrator="exact")
+    assert sol.status == reference.status == "finished"
+    assert [(e.component, e.target) for e in sol.events] == [
+        (e.component, e.target) for e in reference.events
+    ]
+    times = np.linspace(0.0, 12.0, 301)
+    assert sol(times) == pytest.approx(reference(times), abs=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5"])
+def test_a_body_that_creeps_to_rest_sticks_in_the_end(integrator: str) -> None:
+    """At ki = 200 the carriage of `pid-servo` comes to its target exponentially and does not hunt."""
+    sol = hs.simulate("pid-servo", (0, 40), params={"ki": 200}, integrator=integrator)
+    assert sol.status == "finished"
+    assert sol.events[-1].target == "stick"
+    # the integral bears the kinetic friction: e = 0, ki*integral = mu_k*m*g
+    assert sol(40.0) == pytest.approx([0.0, 0.0, 0.12 * 9.81 / 200], abs=1e-9)

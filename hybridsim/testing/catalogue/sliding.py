@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hybridsim.testing.checks import at_times, equals, says
 from hybridsim.testing.facts import CASES, TRUTHS
@@ -23,13 +24,14 @@ def scenes() -> tuple[Scene, ...]:
         _circle(),
         _along_the_circle(),
         _decay(),
+        _rubbing_servo(),
         _two_relays(),
         _chatter(),
         *_refused(),
     )
 
 
-def stays(component: str, *terms: str) -> Check:
+def stays(component: str, *terms: str, to_one: bool = False) -> Check:
     """While it slides, a sum of outputs that is 1 or 0 there is so to rounding."""
 
     def check(solution: Any) -> list[str]:
@@ -40,7 +42,7 @@ def stays(component: str, *terms: str) -> Check:
                 value = sum(
                     x[name] if power == "1" else x[name] ** 2 for name, power in map(str.split, terms)
                 )
-                target = 1.0 if any(term.endswith("2") for term in terms) else 0.0
+                target = 1.0 if to_one or any(term.endswith("2") for term in terms) else 0.0
                 if np.abs(value - target).max() > 1e-14:
                     return [
                         f"while it slides, {component} is off its surface by {np.abs(value - target).max():.2g}"
@@ -170,6 +172,28 @@ def _decay() -> Scene:
         (0.0, 5.0),
         Truth(((onto, "u:sliding"),), tuple(states), checks=(("", stays("u", "x 1", "v 1")),)),
         NEEDS,
+        tol_t=1e-9,
+    )
+
+
+def _rubbing_servo() -> Scene:
+    """v' = 1.7 + sin(3t)/2 until x - 1 + v = 0, then both decay with exp(-t): v is never zero, friction slips on."""
+
+    def speed(t: float) -> float:
+        return 1.7 * t + (1.0 - math.cos(3.0 * t)) / 6.0
+
+    def place(t: float) -> float:
+        return 0.85 * t**2 + (t - math.sin(3.0 * t) / 3.0) / 6.0
+
+    onto = brentq(lambda t: place(t) - 1.0 + speed(t), 0.0, 1.0, xtol=1e-15)
+    left = [(t, speed(onto) * math.exp(onto - t)) for t in (1.0, 5.0, 20.0, 60.0)]
+    states = ((0.3, (place(0.3), speed(0.3))), *((t, (1.0 - v, v)) for t, v in left))
+    return Scene(
+        "rubbing-servo",
+        "rubbing-servo",
+        (0.0, 60.0),
+        Truth(((onto, "u:sliding"),), states, checks=(("", stays("u", "x 1", "v 1", to_one=True)),)),
+        NEEDS | {"contacts"},
         tol_t=1e-9,
     )
 

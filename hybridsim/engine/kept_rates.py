@@ -1,0 +1,35 @@
+"""Rates that a relay gives while it slides along its surface: from the surface, not from the forces that keep it.
+
+While s(x) = 0 is kept, the one rate that the relay acts on follows from the others, f_k = -(ds/dt + sum of g_i f_i over
+i != k)/g_k with g the slopes of s. Added up from forces it would be as wrong as these are rounded: a speed that dies
+out along x + v = 0 would be noise of either sign in the end, and friction would see it turn around without end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hybridsim.engine.held_states import HeldStates
+    from hybridsim.engine.lower import Lowering
+
+
+def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
+    """The relays that give the rate of a state while they slide, each with the rate.
+
+    Of those whose state is evaluated from their surface, another than this one; which act on this rate alone of all
+    that the rate of the surface has; and whose slope along this state no state changes.
+    """
+    sp, x = lowering.sp, lowering.states[i]
+    for c, unknown in lowering.unknown.items():
+        is_pinned = held.pins.get((c, 0), i) != i
+        if not (is_pinned and lowering.components[c].surface.unique) or c in lowering.partners:
+            continue
+        s = held.surfaces[c, 0]
+        slopes = {k: sp.diff(s, y) for k, y in enumerate(lowering.states) if y in s.free_symbols}
+        moved = [k for k in slopes if unknown in lowering.open_rates[k].free_symbols]
+        if moved == [i] and not slopes[i].free_symbols & set(lowering.states):
+            rest = sp.diff(s, lowering.s) + sp.diff(s, lowering.t)
+            rest += sp.Add(*(slope * der[k] for k, slope in slopes.items() if k != i))
+            yield c, -rest / sp.diff(s, x)
