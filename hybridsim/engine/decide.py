@@ -7,6 +7,7 @@ and the Python driver share these functions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
@@ -24,9 +25,12 @@ def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
     """Sign of a guard just after the instant, and the order that decides it.
 
     The first coefficient that is beyond its bound decides; those before `decreed` are zero whatever rounding
-    made of them. (0, number of coefficients) where none is beyond its bound.
+    made of them. (0, number of coefficients) where none is beyond its bound, or one before it is no number: the
+    logarithm of a negative number has a slope.
     """
     for k in range(decreed, series.shape[0]):
+        if math.isnan(series[k]):
+            break
         if series[k] > bounds[k]:
             return 1, k
         if series[k] < -bounds[k]:

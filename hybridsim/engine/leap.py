@@ -16,7 +16,15 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
-from hybridsim.engine.steps_ahead import flow_holds, keeps_up, look_ahead, parts_of, values_at
+from hybridsim.engine.steps_ahead import (
+    BETWEEN,
+    flow_holds,
+    keeps_up,
+    look_ahead,
+    parts_of,
+    seems_still,
+    values_at,
+)
 from hybridsim.engine.taylor import SLACK, advance, expand, reach
 from hybridsim.engine.timepair import phase_of
 
@@ -245,23 +253,28 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             trials = 0
+            first_look = (
+                0 if seems_still(tapes.computed[k], coefficients, order, powers, rtol, atol) else len(BETWEEN)
+            )
             while True:
-                look_ahead(
-                    ahead_code,
-                    rows,
-                    flow_places,
-                    order,
-                    s,
-                    d,
-                    watched,
-                    coefficients,
-                    guard_series,
-                    constants,
-                    ahead,
-                )
-                if flow_holds(ahead, order, n, d, y, rtol, atol) and keeps_up(
-                    guard_series, numbers, order, ahead, rtol, values, sums
-                ):
+                look, holds_so_far = first_look, True
+                while holds_so_far and look <= len(BETWEEN):
+                    e = d if look == len(BETWEEN) else BETWEEN[look] * d
+                    look_ahead(
+                        ahead_code,
+                        rows,
+                        flow_places,
+                        order,
+                        s,
+                        e,
+                        watched,
+                        coefficients,
+                        guard_series,
+                        constants,
+                        ahead,
+                    )
+                    holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
+                if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
                     break
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
                 if trials > _TRIALS:

@@ -54,6 +54,7 @@ class Tapes(NamedTuple):
     """One row or one slice for each vector of modes: modes, lean rows, those of high orders, constant rows, active
     guards, registers.
 
+    computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state.
     bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
     was missed.
     """
@@ -68,6 +69,7 @@ class Tapes(NamedTuple):
     active_start: np.ndarray
     active: np.ndarray
     derivatives: np.ndarray
+    computed: np.ndarray
     guards: np.ndarray
     bounds: np.ndarray
     lacked: np.ndarray
@@ -218,6 +220,7 @@ class TapeShelf:
                 *_rows([tape.constant_rows for tape in lean]),
                 *_flat(active),
                 np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
+                np.array([np.isin(t.derivatives, t.rows[:, 4]) for t in lean]).reshape(len(met), system.n),
                 np.array([tape.guards for tape in lean], dtype=np.int64).reshape(
                     len(met), system.guard_count
                 ),

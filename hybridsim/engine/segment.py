@@ -321,7 +321,9 @@ class SegmentRun:
             side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
             locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
             locator.monitor_floors[k] = series.monitor_bounds[k, 0] if order > 0 else 0.0
-            if side == 0:
+            if math.isnan(series.monitors[k, 0]):
+                locator.monitor_sides[k] = 0
+            elif side == 0:
                 locator.monitor_sides[k] = before[k]
             elif before[k] != 0 and side != before[k] and self._wanted(k, side):
                 if self.monitors[k].action == "record":

@@ -13,6 +13,8 @@ from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.taylor import advance, tabulate
 
 _DEFECT = 100.0  # as in the taylor integrator
+# Shares of a step, by the golden ratio: what a state that seems to stand still is looked at before its end.
+BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
 
 
 def room_ahead(order: int, n: int, guards: int) -> int:
@@ -106,6 +108,22 @@ def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, a
         if not abs(d * (slope - rate)) <= _DEFECT * scale:
             return False
     return True
+
+
+@inlined
+def seems_still(computed: Any, series: Any, order: int, powers: Any, rtol: float, atol: Any) -> bool:
+    """Whether by its series a state hardly moves, whose rate may be different later.
+
+    computed (n,): see `hybridsim.engine.mode_tables`. Of a rate such as sin(t)**20 all terms vanish where it begins:
+    they tell nothing of the step, at whose end it may vanish again.
+    """
+    for i in range(series.shape[0]):
+        scale, k = atol[i] + rtol * abs(series[i, 0]), 1
+        while computed[i] and k <= order and abs(series[i, k]) * powers[k] <= scale:
+            k += 1
+        if k > order:
+            return True
+    return False
 
 
 @kernel

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.steps_ahead import BETWEEN
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
@@ -61,7 +62,10 @@ class TaylorStepper:
             last = h >= left - smallest  # what would be left is too short for a step of its own
             h = left if last else h
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
-            if math.isnan(h) or self._holds(coefficients, self.x, x1, self.s, direction * h):
+            if math.isnan(h) or (
+                self._holds_between(coefficients, direction * h)
+                and self._holds(coefficients, self.x, x1, self.s, direction * h)
+            ):
                 break
             self.flow.counters.rejected += 1
             h *= _SHORTER
@@ -88,6 +92,19 @@ class TaylorStepper:
             return self._holds(coefficients, x0, dense(np.array([s]))[0], s0, s - s0)
 
         return Step(s0, self.s, x0, x1, dense, holds=holds)
+
+    def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
+        """The same as `_holds` on the way, where a state seems to stand still and its rate may be different later."""
+        moves = np.abs(coefficients[:, 1:]) @ np.abs(h) ** np.arange(1, coefficients.shape[1])
+        still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
+        if not (still & np.isin(self.series.lean.derivatives, self.series.lean.rows[:, 4])).any():
+            return True
+        places = h * np.array(BETWEEN)
+        states = np.empty((len(places), len(self.x)))
+        polynomials(coefficients, places, states)
+        return all(
+            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(places, states, strict=True)
+        )
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
         """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -34,3 +36,21 @@ def test_a_condition_on_parameters_is_no_corner() -> None:
         "switch", states=[hs.State("x", 1, der="-x if k > 1 else x*min(k, 2)")], parameters={"k": 2}
     )
     assert hs.simulate(model, (0, 1), integrator="taylor")(1.0)[0] == pytest.approx(0.36787944117144233)
+
+
+@pytest.mark.parametrize("has_monitor", [False, True])  # the compiled loop, and the general one
+@pytest.mark.parametrize(("n", "rtol"), [(8, 1e-4), (14, 1e-6), (20, 1e-9), (24, 1e-11), (30, 1e-12)])
+def test_a_rate_that_begins_flat_is_not_taken_for_rest(n: int, rtol: float, has_monitor: bool) -> None:
+    """All terms of sin(pi t)**n vanish at t = 0, and the rate at t = 10; each turn is worth binom(n, n/2)/2**n."""
+    model = hs.Model(
+        "pulses",
+        states=[
+            hs.State("x", 0.0, f"sin(pi*t)**{n}"),
+            hs.State("y", 0.0, f"sin(q)**{n}"),
+            hs.State("q", 0.0, "pi"),
+        ],
+        monitors=[hs.Monitor("far", "x - 100")] if has_monitor else [],
+    )
+    sol = hs.simulate(model, (0, 10), integrator="taylor", rtol=rtol)
+    turns = 10 * math.comb(n, n // 2) / 2**n
+    assert sol(10.0)[:2] == pytest.approx([turns, turns], rel=300 * rtol)

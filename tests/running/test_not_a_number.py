@@ -195,3 +195,20 @@ def test_a_rate_where_two_surfaces_meet(rate: str) -> None:
     )
     sol = hs.simulate(pair, (0.0, 1.0), integrator="dop853")
     assert sol.status == "step-failure" and "is not a number" in sol.message
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "scipy-dop853", "cvode-adams"])
+@pytest.mark.parametrize("level", [0.7, 0.0, -3.0])
+def test_a_monitor_crosses_nothing_where_it_has_no_value(integrator: str, level: float) -> None:
+    """The logarithm of a negative number is none, though its slope is one: x + 2 = exp(level) twice a turn."""
+    model = hs.Model(
+        "swing",
+        states=[hs.State("x", 0.5, "v"), hs.State("v", 0.0, "-4*(x + 0.75)*(1 + 0.1*sin(x))")],
+        monitors=[
+            hs.Monitor("level", f"log(2 + x) - ({level})"),
+            hs.Monitor("place", f"2 + x - exp({level})"),
+        ],
+    )
+    sol = hs.simulate(model, (0, 6), integrator=integrator)
+    assert len(sol.event_times("place")) == 4
+    assert sol.event_times("level") == pytest.approx(sol.event_times("place"), abs=1e-8)
