@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.bounds_code import Given
+from hybridsim.engine.lean_tape import PAIRED
 from hybridsim.engine.series_code import ModeTape
-from hybridsim.engine.tape import LESS
+from hybridsim.engine.tape import LESS, SELECT
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -43,6 +44,20 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
     for op, a, b, _, out in constant_rows(system, z):
         if op == LESS and a in zeros and b in pins:
             yield out
+
+
+def computed_rates(system: System, z: np.ndarray) -> list[bool]:
+    """Whether the rate of a state is worked out as time goes on: it is no constant, no other state, and not held."""
+    tape, sure = system.lean_tape(z), frozenset(_holding(system, z))
+    rows = _rows(tape.rows)
+    chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
+    results = {out + k for op, _, _, _, out in rows for k in range(2 if op in PAIRED else 1)}
+    found = []
+    for register in tape.derivatives.tolist():
+        while register in chosen:
+            register = chosen[register]
+        found.append(register in results)
+    return found
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

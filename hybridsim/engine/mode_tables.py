@@ -13,7 +13,16 @@ import numpy as np
 
 from hybridsim.engine.bounds_code import bounds_text, can_bound
 from hybridsim.engine.jit import ENABLED, compile_series, is_kept
-from hybridsim.engine.mode_code import KNOWN, NEVER, WORTH, constant_rows, given, kept, mode_tape
+from hybridsim.engine.mode_code import (
+    KNOWN,
+    NEVER,
+    WORTH,
+    computed_rates,
+    constant_rows,
+    given,
+    kept,
+    mode_tape,
+)
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series_code import TooLong
 from hybridsim.engine.system import System
@@ -220,7 +229,9 @@ class TapeShelf:
                 *_rows([tape.constant_rows for tape in lean]),
                 *_flat(active),
                 np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
-                np.array([np.isin(t.derivatives, t.rows[:, 4]) for t in lean]).reshape(len(met), system.n),
+                np.array([computed_rates(system, z) for z in met], dtype=np.bool_).reshape(
+                    len(met), system.n
+                ),
                 np.array([tape.guards for tape in lean], dtype=np.int64).reshape(
                     len(met), system.guard_count
                 ),
