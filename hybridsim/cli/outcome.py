@@ -113,9 +113,12 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)
-    complain(solution.message if begins else f"{solution.status}: {solution.message}")
-    if args.save and solution.status in ("limit", "interrupted"):
-        complain(f"hybridsim resume {args.save} goes on")
+    said = solution.message if begins else f"{solution.status}: {solution.message}"
+    if solution.status in ("limit", "interrupted"):
+        said = said.removesuffix(", and sol.resume() goes on").removesuffix("; what was computed is kept")
+        goes_on = f"'hybridsim resume {args.save}' goes on"
+        said += f"; {goes_on if args.save else 'with --save FILE.hsol, hybridsim resume could go on'}"
+    complain(said)
     return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
 
 

@@ -62,9 +62,9 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     t_end = values.end_time(model, args.t_end)
 
     import hybridsim
-    from hybridsim.model.hygiene import jumps_of
+    from hybridsim.model.hygiene import forces_of, jumps_of
 
-    cautions = [caution.sentence for caution in jumps_of(model)]
+    cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model))]
     for caution in cautions:  # now, and not after a run that may crawl
         complain(f"warning: {caution}")
     with Progress(session) as progress, session.stopping_gently():

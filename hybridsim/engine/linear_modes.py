@@ -135,7 +135,8 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
             z[c] = m
     for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
         names = " and ".join(system.automata[c].name for c in cluster)
-        z = vectors[f"where {names} hold together "] = vectors[""].copy()
+        hold = "hold together" if len(cluster) > 1 else "holds"
+        z = vectors[f"where {names} {hold} "] = vectors[""].copy()
         z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
     for place, z in reversed(vectors.items()):
         try:

@@ -151,7 +151,30 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
 
 
 def words_on_cascade(settling: Settling) -> str:
-    """What to do about two modes of an automaton that push against each other across one surface; empty for others."""
+    """What to do about transitions that follow each other without end, where that can be told; else empty."""
+    return _words_on_opposed_modes(settling) or _words_on_negative_guard(settling)
+
+
+def _words_on_negative_guard(settling: Settling) -> str:
+    """Of a guard that is below zero after its own transition."""
+    if not settling.changes:
+        return ""
+    change, system = settling.changes[-1], settling.system
+    automaton, mode = system.automata[change.component], int(settling.at.z[change.component])
+    if change.guard not in automaton.guard_names[mode]:
+        return ""
+    number = automaton.guards[mode][automaton.guard_names[mode].index(change.guard)]
+    value = float(settling.series_of(np.maximum(settling.at.z, 0)).guards[number, 0])
+    if not value < 0.0:
+        return ""
+    return (
+        f". Guard {change.guard} is {value:.6g} in {automaton.modes[mode]} before and after: a guard is positive while "
+        "its mode lasts; turn its sign around, or let its transition change what it depends on"
+    )
+
+
+def _words_on_opposed_modes(settling: Settling) -> str:
+    """Of two modes of an automaton that push against each other across one surface."""
     model, last = settling.system.model, settling.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine import jit
-from hybridsim.engine.python_forms import Forms, Scalar, number, parts_of, rates, value
+from hybridsim.engine.python_forms import Forms, Parts, Scalar, number, parts_of, rates, value
 from hybridsim.errors import ModelError
 from hybridsim.expr import function_name
 
@@ -29,6 +30,7 @@ class PythonCode:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.parts = parts = parts_of(model)
+        _refuse_other_arguments(parts)
         self.forms = Forms(parts)
         self.resets, self.conditions = _resets(model), _conditions(model)
         self.data = _data(model, self.resets)
@@ -152,6 +154,24 @@ class PythonCode:
         for name, function in self.resets[int(z[-1])][1].items():
             out[names.index(name)] = self.forms.number(function, s, x, p)
         return 0
+
+
+def _refuse_other_arguments(parts: Parts) -> None:
+    """Refuse a function that does not take time, states and parameters."""
+    scalars = (*parts.guards, *parts.monitors, *parts.outputs)
+    functions = [function for _, function in parts.flows] + [scalar.function for scalar in scalars]
+    for function in filter(callable, functions):
+        try:
+            inspect.signature(function).bind(0.0, None, None)
+        except ValueError:  # what was written in C may have no signature: the first call tells
+            continue
+        except TypeError:
+            name = function_name(function)
+            raise ModelError(
+                f"the function {name} takes {inspect.signature(function)}, and is called with (t, x, p)",
+                remedy="let it take three arguments: the time, the states in order, and the parameters by name "
+                "(p.NAME), whether it uses them or not",
+            ) from None
 
 
 def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:

@@ -56,13 +56,13 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
         *_of_pulses(model),
         *jumps_of(model),
         *_of_powers(model),
-        *_of_forces(model),
+        *forces_of(model),
     )
 
 
-def _of_forces(model: Model) -> Iterator[Caution]:
-    for contact, message, remedy in wrong_signs(model):
-        yield Caution(message, contact.place, remedy)
+def forces_of(model: Model) -> tuple[Caution, ...]:
+    """Loads and friction forces of the wrong sign."""
+    return tuple(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_signs(model))
 
 
 def _of_powers(model: Model) -> Iterator[Caution]:

@@ -397,3 +397,10 @@ def test_a_comparison_of_a_model_of_functions() -> None:
     assert done.errors is not None and done.errors.state < 1e-7
     assert "works on a tape" in refused.message
     assert "made of Python functions" in comparison.table() == str(comparison)
+
+
+def test_a_function_of_other_arguments_is_told_what_it_is_called_with() -> None:
+    """A flow as SciPy has it, of time and state alone."""
+    model = hs.Model("turn", states={"x": 1.0, "v": 0.0}, flow=lambda t, x: (x[1], -x[0]))
+    with pytest.raises(hs.ModelError, match=r"takes \(t, x\), and is called with \(t, x, p\)"):
+        hs.simulate(model, (0, 1))

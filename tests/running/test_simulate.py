@@ -130,3 +130,15 @@ def test_a_jump_of_the_load_frees_a_body_at_rest(integrator: str) -> None:
     ]
     assert (sol(np.linspace(0, 1, 20)) == 0.0).all()
     assert sol(2.0) == pytest.approx([-1.0, -2.0], abs=1e-7)
+
+
+def test_a_guard_that_is_negative_from_the_start_is_named_with_its_value() -> None:
+    floor = hs.Guard("floor", "-h", [hs.Choice("flight", reset={"w": "-w"})])
+    model = hs.Model(
+        "ball",
+        states=[hs.State("h", 1.5, "w"), hs.State("w", 0.0, "-9.81")],
+        components=[hs.Component("mode", [hs.Mode("flight", floor)], initial="flight")],
+    )
+    sol = hs.simulate(model, (0, 1))
+    assert sol.status == "cascade"
+    assert "Guard floor is -1.5 in flight before and after" in sol.message and "turn its sign" in sol.message
