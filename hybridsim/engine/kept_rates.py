@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.errors import ModelError
+
 if TYPE_CHECKING:
     from hybridsim.engine.held_states import HeldStates
     from hybridsim.engine.lower import Lowering
@@ -33,3 +35,18 @@ def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> 
             rest = sp.diff(s, lowering.s) + sp.diff(s, lowering.t)
             rest += sp.Add(*(slope * der[k] for k, slope in slopes.items() if k != i))
             yield c, -rest / sp.diff(s, x)
+
+
+def refuse_changed_rates(lowering: Lowering, surfaces: dict[int, Any]) -> None:
+    """Refuse modes that change a rate by which a surface moves: what holds it is solved for from the declared one."""
+    for c, s in surfaces.items():
+        for x, state in zip(lowering.states, lowering.model.states, strict=True):
+            changing = [d for d in lowering.components if any(state.name in m.der for m in d.modes)]
+            if changing and x in s.free_symbols:
+                raise ModelError(
+                    f"modes of {changing[0].name} change the derivative of {state.name}, and so the rate of the "
+                    f"{lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name}",
+                    place=changing[0].place,
+                    remedy=f'let the modes set a variable, set = {{ w = "..." }}, and use it in the derivative of '
+                    f"{state.name}",
+                )

@@ -10,7 +10,7 @@ from hybridsim.engine.affine_modes import affine_modes
 from hybridsim.engine.clusters import clusters_of, normal_loads
 from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
-from hybridsim.engine.kept_rates import kept_rates
+from hybridsim.engine.kept_rates import kept_rates, refuse_changed_rates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.nonlinear import nonlinear, refuse_powers
 from hybridsim.engine.program import Assign, Item, Switch, ordered
@@ -280,6 +280,7 @@ class Lowering:
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
         self.held_rates, self.unknown = surfaces, unknown
+        refuse_changed_rates(self, surfaces)
         all_unknown = set(unknown.values())
         blends = self._blends()
         rate: dict[int, Any] = {}

@@ -339,3 +339,34 @@ def test_backward_out_of_sliding_has_no_unique_past() -> None:
     solution = hs.simulate(model(FORCED), (0.5, 0.0), integrator="dop853")
     assert solution.status == "backward-nonunique"
     assert "u: above" in solution.message
+
+
+@pytest.mark.parametrize("change", ['x = "v + 0.5"', 'v = "-2*u + 0.5*sin(t)"'])
+def test_a_mode_that_changes_the_rate_of_a_surface_is_refused(change: str) -> None:
+    """What the relay gives while it slides would be that of the other rate: v = -x and x' = v would not both hold."""
+    text = f"""
+[states]
+x = {{ start = 1, der = "v" }}
+v = {{ start = 0, der = "-2*u" }}
+
+[surfaces]
+u = "x + v"
+
+[components.c.modes.a]
+initial = true
+guards.due = {{ expr = "2 - t", then = "b" }}
+[components.c.modes.b]
+der = {{ {change} }}
+"""
+    with pytest.raises(
+        hs.ModelError, match=r"change the derivative of \w, and so the rate of the switching function"
+    ):
+        run(text, 6.0, integrator="exact")
+    through_a_variable = text.replace('"-2*u"', '"-2*u + w"').replace(
+        "initial = true", 'initial = true\nset = { w = "0" }'
+    )
+    through_a_variable = through_a_variable.replace(f"der = {{ {change} }}", 'set = { w = "0.5*sin(t)" }')
+    solution = run(through_a_variable, 6.0, integrator="exact")
+    onto = solution.events[0].t
+    x = solution(onto)[0] * math.exp(onto - 6.0)
+    assert solution(6.0) == pytest.approx((x, -x), abs=1e-12)

@@ -186,14 +186,15 @@ def _rubbing_servo() -> Scene:
         return 0.85 * t**2 + (t - math.sin(3.0 * t) / 3.0) / 6.0
 
     onto = brentq(lambda t: place(t) - 1.0 + speed(t), 0.0, 1.0, xtol=1e-15)
-    left = [(t, speed(onto) * math.exp(onto - t)) for t in (1.0, 5.0, 20.0, 60.0)]
+    left = [(t, speed(onto) * math.exp(onto - t)) for t in (1.0, 5.0, 20.0, 40.0)]
     states = ((0.3, (place(0.3), speed(0.3))), *((t, (1.0 - v, v)) for t, v in left))
     return Scene(
         "rubbing-servo",
         "rubbing-servo",
-        (0.0, 60.0),
+        (0.0, 40.0),
         Truth(((onto, "u:sliding"),), states, checks=(("", stays("u", "x 1", "v 1", to_one=True)),)),
         NEEDS | {"contacts"},
+        unit=math.tau / 3.0,  # the period of the load
         tol_t=1e-9,
     )
 
