@@ -21,8 +21,10 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     zero = np.zeros(system.n)
     series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
     located = series.guards[list(arrival.fired)].tolist() + series.monitors[list(arrival.stopping)].tolist()
+    # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
+    least = UNIT * float(segment.tolerances.atol.min(initial=math.inf))
     for value, slope, *_ in located:
-        if slope != 0.0 and math.isfinite(value / slope):
+        if abs(value) > least and slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
     slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     x_error = segment.rounding() + s_error * slopes
