@@ -202,7 +202,7 @@ TAIL = """
 
 The deepest pair that is flagged and not found has a depth of {exact:.1e} of the size (`exact`) and {taylor:.1e}
 (`taylor`). The error bounds that the compiled searches work with are (16 + 2 J) 2^-53 of the size for J modal
-coordinates, 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k| of the guard's series on the step, at most 4
+coordinates, 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k| of the guard's series on the step, at most 6
 rtol = {bound:.0e} of its largest value. So no pair whose dip exceeds ten times the bound is missed. Of the others
 each is found or flagged, but for those that the table counts as lost, below the rounding of the guard's own terms.
 
@@ -219,7 +219,7 @@ def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
     text += table(tallies, "pairs", [("found",), ("flagged",), ("silent", "torn")])
     text += MISSES + table(tallies, "misses", [("passed",), ("flagged",), ("crossed", "torn")])
     deepest = {name: a.deepest_flagged for name, a in tallies.items()}
-    return text + TAIL.format(**deepest, bound=4 * RTOL, minutes=minutes)
+    return text + TAIL.format(**deepest, bound=6 * RTOL, minutes=minutes)
 
 
 def table(tallies: dict[str, Tally], what: str, columns: list[tuple[str, ...]]) -> str:
