@@ -24,7 +24,7 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
     least = UNIT * float(segment.tolerances.atol.min(initial=math.inf))
     for value, slope, *_ in located:
-        if abs(value) > least and slope != 0.0 and math.isfinite(value / slope):
+        if max(abs(value), abs(slope)) > least and slope != 0.0 and math.isfinite(value / slope):
             s_error = max(s_error, abs(value / slope))
     slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     x_error = segment.rounding() + s_error * slopes

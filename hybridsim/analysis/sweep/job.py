@@ -145,7 +145,7 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
 
 def _said(error: Exception) -> str:
     """An error in one line, its kind before it."""
-    text = "; ".join(" ".join(line.split()) for line in str(error).splitlines() if line.strip())
+    text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
