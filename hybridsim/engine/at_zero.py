@@ -35,6 +35,8 @@ def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     found = set()
     for c, value in zip(system.surface_of, series.surfaces[:, 0], strict=True):
         automaton, mode = system.automata[c], at.z[c]
+        if automaton.is_unilateral:
+            continue  # there is no other side of a gap
         if value < 0.0 if mode == automaton.above else value > 0.0 and mode == automaton.below:
             found.add(c)
     return found & set(cluster)

@@ -17,6 +17,5 @@ def python_tree(text: str, mode: str = "exec") -> Any:
     SystemError where two of them are at it (CPython issue 106905). Filters of warnings belong to all threads, too.
     """
     with _lock, warnings.catch_warnings():
-        # Python warns of odd spellings such as `1if x else 2`; that is no news to the user of a model
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("ignore")  # odd spellings such as `1if x else 2` are no news to a model's user
         return ast.parse(text, mode=mode)
