@@ -34,14 +34,18 @@ def to_bernstein(a: Any, b: Any) -> None:
 
 
 @kernel
-def first_exit(a: Any, error: float, order: int, b: Any, stack: Any, code: int) -> tuple[int, float]:
+def first_exit(
+    a: Any, error: float, floor: float, order: int, b: Any, stack: Any, code: int
+) -> tuple[int, float]:
     """Where p(theta) = sum_k a_k theta**k first goes negative on (0, 1].
 
     The first `order` coefficients are zero by decree and the next is positive; error bounds the distance of p from the
-    function that it stands for. (NEVER, 1) where p stays above the bound; (FOUND, theta); (OPEN, theta) where it comes
-    within the bound without a certain change of sign up to the next certain one, or at the end. b (m,), stack (64, m +
-    2): room for m coefficients, and for pieces with their left ends and widths. code: address of a function that does
-    `to_bernstein` for that many coefficients (`hybridsim.engine.bernstein_code`), 0 for none.
+    function that it stands for, and floor by how much it is not zero where it begins. All of p is shifted by so much,
+    and q = p/theta**order, whose zeros are searched, by floor/theta**order. (NEVER, 1) where p stays above the bounds;
+    (FOUND, theta); (OPEN, theta) where it comes within them without a certain change of sign up to the next certain
+    one, or at the end. b (m,), stack (64, m + 2): room for m coefficients, and for pieces with their left ends and
+    widths. code: address of a function that does `to_bernstein` for that many coefficients
+    (`hybridsim.engine.bernstein_code`), 0 for none.
     """
     m = a.shape[0] - order
     for i in range(m):
@@ -49,10 +53,10 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any, code: int) 
     rest = 0.0
     for i in range(1, m):
         rest += abs(b[i])
-    if b[0] - rest > error:
+    if b[0] - rest > error + 2.0**order * floor:
         return NEVER, 1.0
     if order > 0:
-        b[0] = max(b[0], 2.0 * error)  # positive by decree, whatever rounding made of it
+        b[0] = max(b[0], 2.0 * (error + floor))  # positive by decree, whatever rounding made of it
     if code != 0:
         call_series(code, 0.0, 0.0, b, b, b, stack)
     else:
@@ -62,7 +66,13 @@ def first_exit(a: Any, error: float, order: int, b: Any, stack: Any, code: int) 
     while top > 0:
         top -= 1
         left, width = stack[top, m], stack[top, m + 1]
-        kind = signs_of(stack[top, :m], error)
+        shift = floor
+        if left > 0.0:
+            for _ in range(order):
+                shift /= left
+        kind = signs_of(stack[top, :m], error + shift)
+        if kind == POSITIVE and left == 0.0 and order > 0 and width > 2.0**-_DEEPEST and dips(stack[top, :m]):
+            kind = MIXED  # nearer to its begin than its end it is known less well
         if kind == POSITIVE:
             if touched >= 0.0:
                 return OPEN, touched
@@ -116,6 +126,17 @@ def signs_of(b: Any, error: float) -> int:
     for i in range(above, m):
         changes += (b[i] < 0.0) != (b[i - 1] < 0.0)
     return ONCE if changes == 1 else MIXED
+
+
+@kernel
+def dips(b: Any) -> bool:
+    """Whether Bernstein coefficients fall below half the first one and rise again."""
+    lowest = b[0]
+    for i in range(1, b.shape[0]):
+        if b[i] > lowest and lowest < 0.5 * b[0]:
+            return True
+        lowest = min(lowest, b[i])
+    return False
 
 
 @kernel

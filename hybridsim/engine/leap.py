@@ -144,15 +144,15 @@ def earliest_exit(
         if sides[g] <= 0:
             return OPEN, g, 0.0
         last = abs(U[r, order]) * powers[order] + abs(U[r, order - 1]) * powers[order - 1]
-        error = 2.0 * last + 8.0 * UNIT * total + floors[g]
-        if not error < math.inf:  # nothing is below what is not a number, and halving would not end
+        error, floor = 2.0 * last + 8.0 * UNIT * total, floors[g]
+        if not error + floor < math.inf:  # nothing is below what is not a number, and halving would not end
             return OPEN, g, 0.0
-        if orders[g] == 0 and first - (total - abs(first)) > error + 64.0 * UNIT * total:
+        if orders[g] == 0 and first - (total - abs(first)) > error + floor + 64.0 * UNIT * total:
             continue  # the first term outweighs all others
         for j in range(order + 1):
             a[j] = U[r, j] * powers[j]
         code = bernstein[orders[g]] if orders[g] < bernstein.shape[0] else 0
-        outcome, theta = first_exit(a[: order + 1], error, orders[g], b, stack, code)
+        outcome, theta = first_exit(a[: order + 1], error, floor, orders[g], b, stack, code)
         if outcome == OPEN:
             return OPEN, g, theta * h
         if outcome == FOUND and (found < 0 or theta < best):

@@ -134,7 +134,7 @@ def _exit_of(
     error = 2.0 * (abs(room.poly[terms - 1]) + abs(room.poly[terms - 2])) + 8.0 * _UNIT * total + slack
     form = BERNSTEIN + top - (terms - order)
     code = state.kernels[form] if form < state.kernels.shape[0] else 0
-    outcome, theta = first_exit(room.poly[:terms], error, order, room.bern, room.stack, code)
+    outcome, theta = first_exit(room.poly[:terms], error, 0.0, order, room.bern, room.stack, code)
     if outcome == OPEN and is_short and end > error:
         outcome = NEVER
     return outcome, theta

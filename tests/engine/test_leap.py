@@ -23,9 +23,9 @@ PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in ("twisting", "long-swing")]
 
 
-def exit_of(a: list[float], error: float = 1e-14, order: int = 0) -> tuple[int, float]:
+def exit_of(a: list[float], error: float = 1e-14, order: int = 0, floor: float = 0.0) -> tuple[int, float]:
     values = np.array(a)
-    outcome, theta = first_exit(values, error, order, np.empty(len(a)), np.empty((64, len(a) + 2)), 0)
+    outcome, theta = first_exit(values, error, floor, order, np.empty(len(a)), np.empty((64, len(a) + 2)), 0)
     return int(outcome), float(theta)
 
 
@@ -82,6 +82,24 @@ def test_a_zero_by_decree_is_not_found_again() -> None:
     assert exit_of(a, order=2) == (FOUND, pytest.approx(0.4, rel=1e-14))
     assert exit_of([1e-17, -2e-17, 1.0, 0.5, 0.0], order=2)[0] == NEVER
     assert exit_of([-1e-17, 1.0, -1.0 + 1e-3, 0.0], order=1)[0] == NEVER
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("at", [0.5, 0.1, 0.01])
+def test_what_is_zero_by_decree_shifts_all_that_follows(order: int, at: float) -> None:
+    """p = theta**order ((theta - at)**2 + depth), and a residual at its begin that may take all of it below zero.
+
+    A residual of 1e-12 is one of 1e-12/theta**order beside the square: a dip that it may hide is open, others pass.
+    """
+    for depth in (4.0 * at**-order, 0.25 * at**-order):
+        depth *= 1e-12
+        q = [at * at + depth, -2.0 * at, 1.0]
+        outcome, theta = exit_of([0.0] * order + q + [0.0] * 3, 1e-15, order, floor=1e-12)
+        if depth > 2e-12 * at**-order:
+            assert outcome == NEVER
+        else:
+            assert outcome == OPEN
+            assert theta == pytest.approx(at, abs=2.0 * math.sqrt(1e-12 * at**-order))
 
 
 def test_a_touch_is_said() -> None:

@@ -78,3 +78,30 @@ def test_a_pair_next_to_rounding_does_not_make_what_follows_uncertain() -> None:
     times = [1.7315413038711938, 1.7315488389838305, 1.9712739456944517, 2.09995826610857]
     assert [e.t for e in sol.events] == pytest.approx(times, abs=3e-8)
     assert math.isclose(sol.events[2].t, times[2], rel_tol=1e-12)
+
+
+@pytest.mark.parametrize("depth", [1e-19, -1e-19])
+@pytest.mark.parametrize(
+    "integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853", "scipy-radau", "scipy-lsoda"]
+)
+def test_a_pair_after_a_zero_found_to_the_tolerance(integrator: str, depth: float) -> None:
+    """The residual at the zero before, over the time since, is what is known of the guard: the pair is not passed over.
+
+    It was located to the tolerance, where the guard was not yet zero; with that residual left out the pair was lost.
+    """
+    model = product_model("polynomial", 1, "t")
+    values = {"r0": 0.6261976351, "r1": 0.6822508290, "r2": 1.02, "p0": 0.7131875854, "d0": depth}
+    sol = hs.simulate(
+        model,
+        (0.0, 1.0),
+        params={**values, "a": -1.0, "f": 2.0},
+        x0=[0.5, 0.0],
+        z0={"c": "up"},
+        integrator=integrator,
+        rtol=1e-9,
+    )
+    assert sol.success
+    near = [e for e in sol.events if abs(e.t - values["p0"]) < 1e-3]
+    assert [e.kind for e in near] in (["near-grazing"], ["transition"] * 2)
+    rest = [e.t for e in sol.events if e not in near]
+    assert rest == pytest.approx([values["r0"], values["r1"]], abs=1e-6)

@@ -232,7 +232,7 @@ def searched(tally: Searches, rng: np.random.Generator) -> None:
     size = float(np.abs(a).sum())
     error = 8.0 * UNIT * size * float(10.0 ** rng.choice([0, 0, 3, 6]))
     a[:d] = error * rng.uniform(-1, 1, d)  # zero by decree, whatever rounding made of it
-    outcome, theta = first_exit(a, error, d, np.empty(len(a)), np.empty((64, len(a) + 2)), 0)
+    outcome, theta = first_exit(a, error, 0.0, d, np.empty(len(a)), np.empty((64, len(a) + 2)), 0)
     tally.counts[d, "restarts"] += 1
     if not a[d] > 2.0 * error:  # the side after the restart is itself within the bound
         tally.counts[d, "start within the bound"] += 1
