@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hybridsim.model import Model
+    from hybridsim.model.component import Component
 
 # Okabe and Ito's palette, told apart with every kind of colour vision; yellow, too pale for a line, is out.
 INK = "#222222"
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F4F24")
 
 
-def mode_colours(model: Model) -> dict[str, str]:
+def mode_colours(components: Collection[Component]) -> dict[str, str]:
     """A colour for each mode by name: ink where a surface holds (stick), the palette in order for others."""
-    components = model.all_components()
     held = {component.surface.hold for component in components if component.surface}
     names = dict.fromkeys(mode.name for component in components for mode in component.modes)
     free = [name for name in names if name not in held]

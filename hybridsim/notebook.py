@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any, Protocol
 
 from hybridsim.colours import INK, mode_colours
 
 if TYPE_CHECKING:
-    from hybridsim.model import Model
+    from hybridsim.model.component import Component
 
 # Bounds that keep the text small whatever the run: rectangles of all strips together, strips, rows of the table.
 _RECTANGLES, _STRIPS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
@@ -31,7 +31,7 @@ class Interval(Protocol):
 
 
 def run_html(
-    model: Model,
+    components: Collection[Component],
     head: Mapping[str, str],
     success: bool,
     span: tuple[float, float] | None,
@@ -57,7 +57,7 @@ def run_html(
     ]
     parts += [f"<div>{_faint(escape(name))} {escape(value)}</div>" for name, value in rest]
     if span is not None and modes and span[0] != span[1]:
-        parts += _strips(mode_colours(model), modes, *sorted(span))
+        parts += _strips(mode_colours(components), modes, *sorted(span))
     if events:
         parts += _event_table(events)
     parts += [f'<div style="color:{_BAD}">⚠ {escape(text)}</div>' for text in warnings[:_WARNINGS]]

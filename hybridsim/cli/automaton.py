@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER
+from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE
 from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def _primitive(primitive: Primitive) -> str:
     became = {
         COMPONENT: "two modes that agree where they change"
         + (f", those of {remark}" if remark != text else ""),
+        SURFACE: f"it jumps, and switches with {remark}",
         MODE: remark,
         KEPT: f"integrated as it stands, {remark}; exact and taylor refuse it",
         POWER: f"a fractional power, {remark}",

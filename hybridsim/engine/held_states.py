@@ -158,11 +158,19 @@ class HeldStates:
         return tied or self._exclude(one[0], other[0])
 
     def _exclude(self, c: int, d: int) -> bool:
-        """Whether two gaps are never zero at once: one grows as the other shrinks, by as much."""
-        if not all(self.lowering.components[i].surface.is_unilateral for i in (c, d)):
+        """Whether two gaps, or two other surfaces, are never zero at once: parallel, and always as far apart."""
+        is_gap, is_other = (self.lowering.components[i].surface.is_unilateral for i in (c, d))
+        if c == d or is_gap != is_other:
             return False
-        total = self.lowering.sp.simplify(self.surfaces[c, 0] + self.surfaces[d, 0])
-        return c != d and not total.free_symbols & {*self.states, self.lowering.s, self.lowering.t}
+        sp, one, other = self.lowering.sp, self.surfaces[c, 0], self.surfaces[d, 0]
+        ratio = sp.Integer(-1)  # of gaps: one grows as the other shrinks, by as much
+        if not is_gap:
+            if self._uses((c, 0)) != self._uses((d, 0)):
+                return False
+            x = self.states[self._uses((c, 0))[0]]
+            ratio = sp.diff(one, x) / sp.diff(other, x)
+        apart = sp.simplify(one - ratio * other)
+        return bool(apart != 0) and (apart.free_symbols | ratio.free_symbols) <= self.lowering.parameters
 
     def _acyclic(self, pins: dict[Held, int]) -> bool:
         remaining = dict(pins)

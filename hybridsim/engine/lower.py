@@ -358,6 +358,7 @@ class Lowering:
             value = -rate[c] / effect[c, c]
             if value.count_ops() < 200:
                 value = sp.expand(sp.cancel(sp.together(value)))
+            value = value.xreplace({sp.zoo: sp.nan})  # where a sign in the effect is zero: it cannot be held
             return [branches(c, unknown[c].name, value)]
         # joint solve: rows of components that do not hold read "unknown = its declared value", less what that has from
         # normal forces among the unknowns; it is 0 in the mode of one that never holds, which is not entered

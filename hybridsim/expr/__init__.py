@@ -2,7 +2,7 @@
 
 from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function
-from hybridsim.expr.parse import Expression, parse, require_names, substitute
+from hybridsim.expr.parse import Expression, of_tree, parse, require_names, substitute
 
 __all__ = [
     "Expression",
@@ -10,6 +10,7 @@ __all__ = [
     "evaluate",
     "function_name",
     "of_function",
+    "of_tree",
     "parse",
     "require_names",
     "resolve",

@@ -181,6 +181,12 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
     return Expression(text, names, expr.place, tree)
 
 
+def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
+    """A tree of checked parts as an expression; names may be the program's own, which begin with two underscores."""
+    words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return Expression(write(tree), frozenset(words - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
+
+
 def _check_text(text: str, where: Place) -> None:
     """What can be refused before Python's parser is asked: emptiness, length, characters."""
     if not text:

@@ -143,6 +143,25 @@ def _call(name: str, args: list[ast.expr], node: ast.expr) -> Polynomial:
     return _named(f"{name}({', '.join(map(text_of, parts))})")
 
 
+def tree_of(p: Polynomial) -> ast.expr:
+    """A tree of a polynomial over names."""
+    total: ast.expr | None = None
+    for monomial, coefficient in sorted(p.items()):
+        term = number_tree(coefficient)
+        for name, power in monomial:
+            factor = ast.BinOp(ast.Name(name, ast.Load()), ast.Pow(), ast.Constant(power))
+            term = ast.BinOp(term, ast.Mult(), factor)
+        total = term if total is None else ast.BinOp(total, ast.Add(), term)
+    return ast.Constant(0) if total is None else total
+
+
+def number_tree(value: Fraction) -> ast.expr:
+    """A fraction as a quotient of integers."""
+    number: ast.expr = ast.Constant(abs(value.numerator))
+    number = number if value >= 0 else ast.UnaryOp(ast.USub(), number)
+    return number if value.denominator == 1 else ast.BinOp(number, ast.Div(), ast.Constant(value.denominator))
+
+
 def text_of(p: Polynomial) -> str:
     """A text that is the same for equal polynomials."""
     return " + ".join(f"{c}*" + "*".join(f"{f}^{n}" for f, n in m) for m, c in sorted(p.items())) or "0"

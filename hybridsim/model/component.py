@@ -256,5 +256,6 @@ class Component(Declared):
 class Corner(Component):
     """A component that the program makes of a corner such as ``abs(v)``; its two modes, ``+`` and ``-``, agree at zero.
 
-    It is decided as any other. A run keeps it apart from what the model declares (`hybridsim.model.smoothing`).
+    Or of a jump in time alone, such as ``sign(t - 1)``. It is decided as any other. A run keeps it apart from what the
+    model declares (`hybridsim.model.smoothing`).
     """

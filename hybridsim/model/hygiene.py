@@ -12,7 +12,7 @@ from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.force_signs import wrong_signs
 from hybridsim.model.meanings import Meanings
-from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
+from hybridsim.model.nonsmooth import JUMPS, KEPT, SURFACE, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
 from hybridsim.model.smoothing import smoothing_of
@@ -216,9 +216,11 @@ def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -
 
 def _of_pulses(model: Model) -> Iterator[Caution]:
     lookup = _Reading(model).lookup
+    primitives = smoothing_of(model).primitives if uses_primitives(model) else ()
+    met = {one.text for one in primitives if one.became == SURFACE}
     found: set[str] = set()
     for what, expr in _followed(model):
-        pulse = pulse_in(expr.tree, lookup)
+        pulse = pulse_in(expr.tree, lookup, met)
         if pulse is None or (text := ast.unparse(pulse)) in found:
             continue
         found.add(text)
@@ -254,12 +256,15 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
         return
     meanings, states = Meanings(model), {state.name for state in model.states}
     for one in smoothing_of(model).primitives:
-        is_jump = one.became == KEPT and one.remark == JUMPS
+        is_watched = all(
+            where.startswith("monitor ") for where in one.where
+        )  # which is looked at, not integrated
+        is_jump = one.became == KEPT and one.remark.startswith(JUMPS) and not is_watched
         if is_jump and names_of(meanings.written_out(parse(one.text).tree)) & states:
             yield Caution(
                 f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a "
                 "motion that both sides drive back into the jump crawls",
                 one.place,
-                'declare the surface, [surfaces.NAME] expr = "what changes its sign", and write NAME for its sign; a '
-                "dry friction as a contact, [contacts.NAME], and NAME for its force.",
+                "write a sum of signs times what does not jump, or declare the surface with the fields on its sides "
+                '([surfaces.NAME] expr = "what changes its sign"), a dry friction as a contact ([contacts.NAME]).',
             )

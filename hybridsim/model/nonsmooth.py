@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 # what became of a primitive
-COMPONENT, MODE, KEPT, POWER = "component", "mode", "kept", "power"
-JUMPS = "it jumps, as far as its form shows"  # the reason to keep a primitive whose sides differ
+COMPONENT, SURFACE, MODE, KEPT, POWER = "component", "surface", "mode", "kept", "power"
+JUMPS = "it jumps, as far as its form shows"  # how the reason begins to keep a primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
 _ZERO = ast.Constant(0)
@@ -39,8 +39,9 @@ class Primitive:
     ----------
     text : as written, or as a law reads in its contact.
     where : the rates, guards, definitions and variables that use it.
-    became : "component" (it switches like a component of two modes), "mode" (the modes of a component imply its side),
-        "kept" (integrated as it stands), "power" (a fractional power, which has no series at zero).
+    became : "component" (it switches like a component of two modes), "surface" (it jumps, and is the sign of a
+        switching surface or, in time, of a component), "mode" (the modes of a component imply its side), "kept"
+        (integrated as it stands), "power" (a fractional power, which has no series at zero).
     remark : the component, or the reason.
     """
 
@@ -54,6 +55,11 @@ class Primitive:
 def uses_primitives(model: Model) -> bool:
     """Whether anything that is integrated or watched may have a corner or a jump, by a look at the words."""
     return any(_WORD.search(expr.text) for expr in _expressions(model))
+
+
+def uses_sign(model: Model) -> bool:
+    """Whether anything that is integrated or watched has a sign in it."""
+    return any("sign" in expr.text for expr in _expressions(model))
 
 
 def has_word(expr: Expression) -> bool:
@@ -150,4 +156,6 @@ def sides_of(node: ast.expr) -> Sides | None:
 def _minus(a: ast.expr, b: ast.expr) -> ast.expr:
     if isinstance(b, ast.Constant) and b.value == 0:
         return a
+    if isinstance(b, ast.UnaryOp) and isinstance(b.op, ast.USub):
+        return ast.BinOp(a, ast.Add(), b.operand)
     return ast.BinOp(a, ast.Sub(), b)

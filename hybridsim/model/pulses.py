@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Set
 
 from hybridsim.expr.grammar import TIME
+from hybridsim.expr.write import write
 from hybridsim.model.one_sided import Lookup
 
 # Degree in t of what is no polynomial in it.
 _CURVED = 9
 
 
-def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
-    """The first part that is a pulse or a step in t, or None.
+def pulse_in(node: ast.expr, lookup: Lookup, met: Set[str]) -> ast.expr | None:
+    """The first part that is a pulse or a step in t, or None. met: texts of steps that a run meets.
 
     These are: exp of a bend in t, division by one, its negative powers, tanh, atan and sign of t, a condition on t.
     Polynomials in t and periodic functions of linear angles are none.
     """
     match node:
         case ast.Name(id=name) if (tree := lookup(name)) is not None:
-            return pulse_in(tree, lookup)
+            return pulse_in(tree, lookup, met)
+        case ast.IfExp() | ast.Call() if write(node) in met:
+            pass
         case ast.IfExp(test=test) if _uses_time(test, lookup):
             return node
         case ast.Call(func=ast.Name(id="exp"), args=[argument]) if degree_in_time(argument, lookup) > 1:
@@ -35,7 +39,7 @@ def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
         ):
             return node
     for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.expr) and (found := pulse_in(part, lookup)) is not None:
+        if isinstance(part, ast.expr) and (found := pulse_in(part, lookup, met)) is not None:
             return found
     return None
 

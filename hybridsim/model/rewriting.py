@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import Place
-from hybridsim.expr.rebuild import rebuilt
+from hybridsim.expr import parse
+from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
-from hybridsim.model.continuity import is_continuous
+from hybridsim.model.continuity import has_root_beside_sign, is_continuous, sides_of_product
+from hybridsim.model.jumps import SIGN, Borders, Jump, product_of_signs
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.nonsmooth import (
     COMPONENT,
@@ -18,29 +21,37 @@ from hybridsim.model.nonsmooth import (
     KEPT,
     MODE,
     POWER,
+    SURFACE,
     Primitive,
     Sides,
     is_clear_of_zero,
     is_whole,
     limited,
     sides_of,
+    uses_sign,
 )
 from hybridsim.model.one_sided import names_of, never_negative, number_of
+from hybridsim.model.switching import blend
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
+WATCHED = "a guard, a monitor or another corner hangs on it"
 VARIABLE = "__corner_"  # names of a model do not begin with two underscores
 
 
 @dataclass(frozen=True)
 class Here:
-    """Where a tree stands: in words, the signs that its mode implies, why nothing is to be replaced (or empty)."""
+    """Where a tree stands: in words, the signs that its mode implies, why nothing is to be replaced (or empty).
+
+    jumps: why what jumps is left as it stands; empty in a rate, along whose jumps a motion may slide.
+    """
 
     where: str
     place: Place | None
     signs: Mapping[Family, int] = field(default_factory=dict)
     untouched: str = ""
+    jumps: str = WATCHED
 
 
 @dataclass
@@ -50,23 +61,33 @@ class Found:
     name: str
     argument: ast.expr
     sign: int
-    values: dict[str, tuple[ast.expr, ast.expr]] = field(default_factory=dict)
+    values: dict[str, tuple[ast.expr, ...]] = field(default_factory=dict)
 
 
 class Rewriting:
-    """One pass over the expressions of one model; what it found is in `corners`, `implied` and `primitives`.
+    """One pass over the expressions of one model; what it found is in `corners`, `jumps`, `implied` and `primitives`.
 
     Parameters
     ----------
-    refusal : why no corner is to become a component, if so.
+    refusal : why no corner or jump is to become a component, if so.
+    refused : why those at some borders are not to.
+    shared : borders at which there are jumps and corners.
     """
 
-    def __init__(self, model: Model, refusal: str = "") -> None:
-        self.model, self.refusal = model, refusal
+    def __init__(
+        self,
+        model: Model,
+        refusal: str = "",
+        refused: Mapping[Family, str] = MappingProxyType({}),
+        shared: Set[Family] = frozenset(),
+    ) -> None:
+        self.model, self.refusal, self.refused, self.shared = model, refusal, refused, shared
         self.meanings = Meanings(model)
+        self.borders, self._has_sign = Borders(model, self.meanings), uses_sign(model)
         self.components = model.all_components()
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}
+        self.jumps: dict[Family, Jump] = {}
         self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
         self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
         self.count = 0
@@ -84,7 +105,7 @@ class Rewriting:
         """
         if not self.meanings.moves(node):
             return node
-        key = (id(node), id(here.signs), here.where, here.untouched)
+        key = (id(node), id(here.signs), here.where, here.untouched, here.jumps)
         if key not in self._walked:
             self._walked[key] = node, here, self._walk(node, here)  # kept alive, as their numbers are the key
         return self._walked[key][-1]
@@ -104,6 +125,11 @@ class Rewriting:
                 here = self._note_power(node, base, here, exponent)
             case ast.BoolOp() | ast.Compare():
                 return node
+            case ast.BinOp(op=ast.Mult() | ast.Div()) if self._has_sign:
+                if has_root_beside_sign(self.meanings, node):
+                    here = replace(here, jumps=here.jumps or "the root beside it is zero there")
+                elif product := sides_of_product(self.meanings, node):
+                    return self._side(node, product, here)
         parts = sides_of(node)
         if parts is not None and self.meanings.moves(parts[0]):
             return self._side(node, parts, here)
@@ -158,15 +184,77 @@ class Rewriting:
                 node, f"it depends on {', '.join(sorted(forced))}, which a mode solves for", here
             )
         if not self._agrees(node, parts):
-            return self._kept(node, JUMPS, here)
+            return self._jump(node, parts, family, sign, here)
         if self.refusal:
             return self._kept(node, self.refusal, here)
+        here = replace(here, jumps=WATCHED)
+        pair = (self.walk(above, here), self.walk(below, here))
+        if family in self.shared:
+            jump = self._jump_at(family, argument, sign)
+            self.note(node, MODE, f"its side follows from the modes of {jump.name}", here)
+            row = (*(pair if sign == jump.sign else pair[::-1]), self.walk(at_zero, here))
+            return self._variable(jump.values, row)
         found = self.corners.get(family)
         if found is None:
             found = self.corners[family] = Found(self._title(node), self.walk(argument, here), sign)
         self.note(node, COMPONENT, found.name, here)
-        pair = (self.walk(above, here), self.walk(below, here))
-        return self._variable(found.values, pair if sign == found.sign else pair[::-1])  # type: ignore[arg-type]  # a slice of two is two
+        return self._variable(found.values, pair if sign == found.sign else pair[::-1])
+
+    def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
+        """What a primitive becomes whose sides differ."""
+        argument, above, below, _ = parts
+        reason = here.jumps or self.refusal or self.refused.get(family, "") or self._border(family, argument)
+        if reason:
+            return self._kept(node, f"{JUMPS}: {reason}", here)
+        jump = self._jump_at(family, argument, sign)
+        self.note(node, SURFACE, jump.name, here)
+        if isinstance(node, ast.Call):
+            return jump.signed(sign)
+        for nested, other, way in ((above, below, 1), (below, above, -1)):
+            if stairs := self._stairs(jump, argument, nested, other, way, here):
+                return stairs
+        inside = replace(here, jumps="it stands in a branch of another jump")
+        pair = (self.walk(above, inside), self.walk(below, inside))
+        pair = pair if sign == jump.sign else pair[::-1]
+        name = self._variable(jump.values, (*pair, blend(*pair, jump.unknown)))
+        jump.blended.add(name.id)
+        return name
+
+    def _stairs(
+        self, jump: Jump, argument: ast.expr, nested: ast.expr, other: ast.expr, way: int, here: Here
+    ) -> ast.expr | None:
+        """A jump between constants, one of which jumps at a parallel border: as a sum of both signs.
+
+        way: 1 or -1, on which side of the first border the second is.
+        """
+        inner = sides_of(nested)
+        if inner is None or any(map(self.meanings.moves, (*inner[1:], other))):
+            return None
+        product = product_of_signs(self.meanings, argument, inner[0])
+        family, sign = self.meanings.family(inner[0])
+        if product is None or jump.is_timed or self.refused.get(family) or self._border(family, inner[0]):
+            return None
+        second = self._jump_at(family, inner[0], sign)
+        self.note(nested, SURFACE, second.name, here)
+        first = self.meanings.family(argument)[1]
+        signs = [one.signed(s) for one, s in ((jump, first), (second, sign))]
+        parts = {"a": inner[1], "b": inner[2], "o": other, "u": signs[0], "w": signs[1]}
+        text = f"(o + (a + b)/2)/2 + {way}*(u*((a + b)/2 - o)/2 + (a - b)/4*uw) + (a - b)/4*w"
+        return with_names(parse(text).tree, {**parts, "uw": with_names(product, parts)})
+
+    def _border(self, family: Family, argument: ast.expr) -> str:
+        """Why a border is none of a surface; empty if it is."""
+        if family in self.jumps:
+            return ""
+        return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
+
+    def _jump_at(self, family: Family, argument: ast.expr, sign: int) -> Jump:
+        if family not in self.jumps:
+            self.count += 1
+            name = self._title(ast.Call(ast.Name("sign", ast.Load()), [argument], []))
+            timed = self.borders.is_timed(argument)
+            self.jumps[family] = Jump(name, f"{SIGN}{self.count}", argument, sign, timed)
+        return self.jumps[family]
 
     def _agrees(self, node: ast.expr, parts: Sides) -> bool:
         argument, above, below, _ = parts
@@ -181,7 +269,7 @@ class Rewriting:
                 return c
         return None
 
-    def _variable(self, values: dict[str, tuple[ast.expr, ...]], row: tuple[ast.expr, ...]) -> ast.expr:
+    def _variable(self, values: dict[str, tuple[ast.expr, ...]], row: tuple[ast.expr, ...]) -> ast.Name:
         texts = [write(tree) for tree in row]
         for name, other in values.items():
             if [write(tree) for tree in other] == texts:
@@ -202,6 +290,7 @@ class Rewriting:
 
     def _title(self, node: ast.expr) -> str:
         taken = {component.name for component in self.components} | {c.name for c in self.corners.values()}
+        taken |= {jump.name for jump in self.jumps.values()}
         title = write(node)
         while title in taken:
             title += "'"

@@ -1,9 +1,10 @@
-"""A model with the corners of its flows, guards and laws as components, so that every mode is smooth.
+"""A model with the corners and jumps of its flows, guards and laws as components, so that every mode is smooth.
 
 `abs`, `min`, `max` and conditionals whose branches agree where they change are corners. Where the mode of a component
 implies the side that holds (v >= 0 in slip+), that side is put in. Any other corner gets a component of two modes which
 changes its mode where the argument passes through zero; both modes have one value there. A jump (`sign`, a conditional
-whose branches differ) is left as it stands, unless modes imply its side.
+whose branches differ) in a rate is a switching surface (`hybridsim.model.jumps`); elsewhere, and where it enters no
+rate linearly, it is left as it stands.
 """
 
 from __future__ import annotations
@@ -13,15 +14,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hybridsim.errors import Place
-from hybridsim.expr import Expression, parse
-from hybridsim.expr.write import write
+from hybridsim.expr import Expression, of_tree, parse
 from hybridsim.model.component import Component, Corner, Guard, Mode
 from hybridsim.model.frozen_map import FrozenMap
+from hybridsim.model.jumps import multiplied
 from hybridsim.model.meanings import Family
 from hybridsim.model.nonsmooth import MODE, Primitive, sides_of, uses_primitives
-from hybridsim.model.one_sided import names_of
-from hybridsim.model.rewriting import Found, Here, Rewriting
+from hybridsim.model.rewriting import WATCHED, Found, Here, Rewriting
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -56,36 +55,39 @@ def smoothing_of(model: Model) -> Smoothed:
     """The same with an account of every primitive that is not smooth, fractional powers included."""
     if model.flow is not None:
         return Smoothed(model, ())
-    smoothing = _Smoothing(model)
-    result, count = smoothing.run(), len(smoothing.work.corners)
+    work = Rewriting(model)
+    result, crooked = _Smoothing(model, work).run()
+    while crooked or not work.shared >= work.corners.keys() & work.jumps.keys():
+        refused = {**work.refused, **dict.fromkeys(crooked, "it does not enter the rates linearly")}
+        shared = (work.shared | (work.corners.keys() & work.jumps.keys())) - refused.keys()
+        work = Rewriting(model, "", refused, shared)
+        result, crooked = _Smoothing(model, work).run()
+    count = len(work.corners) + len(work.jumps)
     if count > MOST:
-        smoothing = _Smoothing(model, f"the model has {count} corners, more than {MOST}")
-        result = smoothing.run()
-    return Smoothed(result, smoothing.work.primitives())
+        work = Rewriting(model, f"the model has {count} corners and jumps, more than {MOST}")
+        result, _ = _Smoothing(model, work).run()
+    return Smoothed(result, work.primitives())
 
 
 class _Smoothing:
-    """One pass over one model.
+    """One pass over one model."""
 
-    Parameters
-    ----------
-    refusal : why no corner is to become a component, if so.
-    """
-
-    def __init__(self, model: Model, refusal: str = "") -> None:
-        self.model = model
-        self.work = Rewriting(model, refusal)
+    def __init__(self, model: Model, work: Rewriting) -> None:
+        self.model, self.work = model, work
         self.meanings, self.components, self.signs = self.work.meanings, self.work.components, self.work.signs
 
     # -- the model ------------------------------------------------------------------------------------------
 
-    def run(self) -> Model:
-        """Rewrite all that is integrated or watched; the model itself where nothing came of it."""
+    def run(self) -> tuple[Model, list[Family]]:
+        """Rewrite all that is integrated or watched; the model itself where nothing came of it.
+
+        And the borders of jumps that do not enter linearly.
+        """
         model = self.model
         surfaces = [c.surface.function.tree for c in self.components if c.surface]
         velocities = self.meanings.reached(surfaces)
         states = tuple(
-            replace(state, der=self._rewritten(state.der, Here(f"state {state.name}", state.place)))
+            replace(state, der=self._rewritten(state.der, Here(f"state {state.name}", state.place, jumps="")))
             for state in model.states
         )
         components = [self._component(c) for c in range(len(self.components))]
@@ -93,40 +95,64 @@ class _Smoothing:
             replace(monitor, expr=self._watched(monitor.expr, Here(f"monitor {monitor.name}", monitor.place)))
             for monitor in model.monitors
         )
-        wanted = self.meanings.reached(self._integrated())
+        wanted = self.meanings.reached((*self._integrated(), *self._watched_trees()))
+        rates = self.meanings.reached(self._integrated())
         definitions = []
         for name, expr in model.definitions:
             reason = "it is part of a relative velocity" if name in velocities else ""
-            here = Here(f"definition {name}", expr.place, untouched=reason)
+            here = Here(
+                f"definition {name}", expr.place, untouched=reason, jumps="" if name in rates else WATCHED
+            )
             definitions.append((name, self._rewritten(expr, here) if name in wanted else expr))
         if not self.work.count and not self.work.corners:
-            return model
+            return model, []
         made = [self._with_implied(c, component) for c, component in enumerate(components)]
-        return replace(
+        jumps = [jump.component() for jump in self.work.jumps.values()]
+        result = replace(
             model,
             states=states,
             definitions=tuple(definitions),
-            components=(*made, *map(self._corner_component, self.work.corners.values())),
+            components=(*made, *jumps, *map(self._corner_component, self.work.corners.values())),
             contacts=(),
             surfaces=(),
             impacts=(),
             monitors=monitors,
         )
+        return result, self._crooked(result)
 
     def _integrated(self) -> Iterator[ast.expr]:
+        """Rates, and what modes set."""
         yield from (state.der.tree for state in self.model.states)
-        yield from (monitor.expr.tree for monitor in self.model.monitors)
         for component in self.components:
             for mode in component.modes:
-                exprs = (*mode.der.values(), *mode.set.values(), *(guard.expr for guard in mode.guards))
-                yield from (expr.tree for expr in exprs)
+                yield from (expr.tree for expr in (*mode.der.values(), *mode.set.values()))
+
+    def _watched_trees(self) -> Iterator[ast.expr]:
+        yield from (monitor.expr.tree for monitor in self.model.monitors)
+        for component in self.components:
+            yield from (guard.expr.tree for mode in component.modes for guard in mode.guards)
+
+    def _crooked(self, result: Model) -> list[Family]:
+        """The borders of jumps that do not enter the rates linearly."""
+        jumps = {family: jump for family, jump in self.work.jumps.items() if not jump.is_timed}
+        carried = {name: {name} for name in self.meanings.forced}
+        for jump in jumps.values():
+            carried |= {name: {jump.unknown} for name in (jump.unknown, *jump.blended)}
+        trees = [(name, expr.tree) for name, expr in result.definitions]
+        trees += [("", state.der.tree) for state in result.states]
+        for component in result.components:
+            for mode in component.modes:
+                trees += [("", expr.tree) for expr in mode.der.values()]
+                trees += [(name, expr.tree) for name, expr in mode.set.items()]
+        found = multiplied(trees, carried) if jumps else set()
+        return [family for family, jump in jumps.items() if jump.unknown in found]
 
     def _component(self, c: int) -> Component:
         component = self.components[c]
         modes = []
         for mode, signs in zip(component.modes, self.signs[c], strict=True):
             where, place = f"mode {mode.name} of {component.name}", mode.place or component.place
-            here = Here(where, place, signs)
+            here = Here(where, place, signs, jumps=WATCHED if component.surface else "")
             guards = tuple(self._guards(component, mode, signs))
             der = {name: self._rewritten(expr, here) for name, expr in mode.der.items()}
             values = {name: self._rewritten(expr, here) for name, expr in mode.set.items()}
@@ -178,7 +204,7 @@ class _Smoothing:
             return component
         modes = []
         for m, mode in enumerate(component.modes):
-            values = {name: self._expression(rows[m]) for name, rows in self.work.implied[c].items()}
+            values = {name: of_tree(rows[m]) for name, rows in self.work.implied[c].items()}
             modes.append(replace(mode, set=FrozenMap({**mode.set, **values})))
         return replace(component, modes=tuple(modes))
 
@@ -186,15 +212,12 @@ class _Smoothing:
         modes = []
         for m, (name, other) in enumerate((("+", "-"), ("-", "+"))):
             side = found.argument if m == 0 else ast.UnaryOp(ast.USub(), found.argument)
-            values = {variable: self._expression(pair[m]) for variable, pair in found.values.items()}
+            values = {variable: of_tree(pair[m]) for variable, pair in found.values.items()}
             # a name stands for a Choice, as in any declaration
-            guard = Guard("side", self._expression(side), then=(other,))  # type: ignore[arg-type]  # made a choice
+            guard = Guard("side", of_tree(side), then=(other,))  # type: ignore[arg-type]  # made a choice
             modes.append(Mode(name, (guard,), set=values))
         return Corner(found.name, tuple(modes), initial="+")
 
     def _rewritten(self, expr: Expression, here: Here) -> Expression:
         tree = self.work.walk(expr.tree, here)
-        return expr if tree is expr.tree else self._expression(tree, expr.place)
-
-    def _expression(self, tree: ast.expr, place: Place | None = None) -> Expression:
-        return Expression(write(tree), frozenset(names_of(tree)), place, tree)
+        return expr if tree is expr.tree else of_tree(tree, expr.place)

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hybridsim.expr import Expression, parse, substitute
+from hybridsim.expr import Expression, of_tree, parse, substitute
+from hybridsim.expr.rebuild import with_names
 from hybridsim.model.component import Component, Guard, Mode, Surface
 from hybridsim.model.declared import Declared
 from hybridsim.model.frozen_map import FrozenMap
 
 ABOVE, BELOW, SLIDING = "above", "below", "sliding"
+_BLEND = parse("(above + below)/2 + u*(above - below)/2").tree
 ATTRACTION = "__attraction_"  # before the unknown: how strongly it pulls towards its surface; no model's name begins so
 
 
@@ -91,8 +93,10 @@ class SwitchingSurface(Declared):
     def _component(self) -> Component:
         sides = {BELOW: "-1", ABOVE: "1"}
         one = {side: FrozenMap({self.name: parse(value)}) for side, value in sides.items()}
-        upper, lower = Guard("upper", parse(f"1 - {self.name}")), Guard("lower", parse(f"1 + {self.name}"))
-        attracts = Guard("attracts", _reserved(ATTRACTION + self.name))
+        unknown, pull = (ast.Name(name, ast.Load()) for name in (self.name, ATTRACTION + self.name))
+        upper = Guard("upper", of_tree(ast.BinOp(ast.Constant(1), ast.Sub(), unknown)))
+        lower = Guard("lower", of_tree(ast.BinOp(ast.Constant(1), ast.Add(), unknown)))
+        attracts = Guard("attracts", of_tree(pull))
         minus = substitute(parse("-h", self.expr.place), {"h": self.expr})
         modes = (
             Mode(ABOVE, (Guard("side", self.expr),), set={**one[ABOVE], **self.above}),
@@ -105,14 +109,12 @@ class SwitchingSurface(Declared):
 
     def blends(self) -> dict[str, Expression]:
         """Its further variables as they are in sliding; with u = +1 and -1 these are their values on the sides."""
-        form = parse("(above + below)/2 + u*(above - below)/2", self.place)
-        unknown = parse(self.name)
         return {
-            name: substitute(form, {"above": value, "below": self.below[name], "u": unknown})
+            name: of_tree(blend(value.tree, self.below[name].tree, self.name), self.place)
             for name, value in self.above.items()
         }
 
 
-def _reserved(name: str) -> Expression:
-    """A name that no declaration can have, as an expression."""
-    return Expression(name, frozenset({name}), None, ast.Name(name, ast.Load()))
+def blend(above: ast.expr, below: ast.expr, unknown: str) -> ast.expr:
+    """What is above where the unknown is 1, below where it is -1, and in proportion between."""
+    return with_names(_BLEND, {"above": above, "below": below, "u": ast.Name(unknown, ast.Load())})

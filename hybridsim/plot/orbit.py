@@ -38,8 +38,8 @@ def draw_orbit(
     pieces = pieces_of(solution, (across, up), window)
     if axes is None:
         axes = style.figure(6.2, 4.6).subplots()
-    colours = style.mode_colours(solution.model)
-    surfaces = {c.name: c.surface.hold for c in solution.model.all_components() if c.surface}
+    colours = style.mode_colours(solution.components)
+    surfaces = {c.name: c.surface.hold for c in solution.components if c.surface}
     held_modes = set(surfaces.values())
     spans = [extent(pieces, name) for name in (across, up)]
     least = np.array([_VISIBLE * ((high - low) or 1.0) for low, high in spans])

@@ -137,7 +137,7 @@ def _mark(axis: Axes, events: Sequence[Event]) -> None:
 
 def _strip(axis: Axes, solution: Solution, window: Window) -> None:
     """One row a component, each mode in its colour; the legend names the modes that occur."""
-    colours = style.mode_colours(solution.model)
+    colours = style.mode_colours(solution.components)
     components = list(solution.modes)
     seen: dict[str, None] = {}
     for row, component in enumerate(components):

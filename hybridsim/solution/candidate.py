@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import numpy as np
 
 from hybridsim.engine.decide import FINE, LEAVES, side_after
 from hybridsim.expr.parse import substitute
+from hybridsim.model.jumps import SIGN
 from hybridsim.model.rewriting import VARIABLE
 from hybridsim.model.switching import ATTRACTION
 from hybridsim.model.units import rate_of, time_unit, unit_of
@@ -111,7 +113,7 @@ def views(
         yield GuardView(
             f"{automaton.name} {automaton.modes[mode]}",
             automaton.guard_names[mode][j],
-            _in_words(declared.text),
+            _in_words(declared.text, automaton.name),
             tuple(float(v) * f for v, f in zip(values, factorials, strict=True)),
             tuple(float(b) * f for b, f in zip(bounds, factorials, strict=True)),
             int(decreed[g]),
@@ -124,17 +126,17 @@ def views(
 def _as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
     """An expression with what stands for its corners on the sides of the modes z."""
     modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
-    while corners := {name for name in expression.names if name.startswith(VARIABLE)}:
-        values = {name: mode.set[name] for mode in modes for name in corners & mode.set.keys()}
+    values = {n: e for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
+    while expression.names & values.keys():
         expression = substitute(expression, values)
     return expression
 
 
-def _in_words(text: str) -> str:
-    """The expression of a guard; that of a surface's attraction is one of the program's own."""
-    if not text.startswith(ATTRACTION):
-        return text
-    return f"pull of {text.removeprefix(ATTRACTION)}, half the sum of how fast its two sides drive towards it"
+def _in_words(text: str, component: str) -> str:
+    """The expression of a guard; a surface's attraction and the name of a sign are the program's own."""
+    if text.startswith(ATTRACTION):
+        return f"pull of {component}, half the sum of how fast its two sides drive towards it"
+    return re.sub(rf"{SIGN}\d+", component, text)
 
 
 def candidate(system: System, decision: Decision, look: Look) -> Candidate:

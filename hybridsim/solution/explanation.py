@@ -178,7 +178,7 @@ def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
 
 def _is_declared(solution: Solution, event: Event) -> bool:
     """Whether the mode that an event left declares the guard that it names."""
-    component = next(c for c in solution.model.all_components() if c.name == event.component)
+    component = next(c for c in solution.components if c.name == event.component)
     return any(guard.name == event.guard for guard in component.mode(event.source).guards)
 
 
@@ -191,7 +191,7 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
     shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
     every = "each" if turn == 1 else f"every {turn} of them"
     series = f", {every} shorter by the factor {factor:.6g}" if turn else ""
-    component = next(c for c in solution.model.all_components() if c.name == event.component)
+    component = next(c for c in solution.components if c.name == event.component)
     end = ", as its limit is declared" if component.limit else ""
     return (
         f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
@@ -227,7 +227,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
     """The ordered choice of the guard that fired, and the place in it of what was taken; empty where it has none."""
-    component = next((c for c in solution.model.all_components() if c.name == event.component), None)
+    component = next((c for c in solution.components if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
     if component is None or mode is None or guard is None or not guard.then:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.chain import SegmentChain
     from hybridsim.engine.pieces import Segment
     from hybridsim.engine.trajectory import Trajectory
+    from hybridsim.model.component import Component
     from hybridsim.solution.explanation import Explanation
     from hybridsim.solution.run import Run
 
@@ -308,6 +309,11 @@ class Solution(InTables):
             )
         found = [b.times[b.chosen(component, kind)] for b in self._trajectory.occurrences.blocks]
         return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """Those of which `modes` tells: the model's, and those that jumps in its rates are."""
+        return tuple(self._system.model.all_components()[: len(self._system.declared)])
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:

@@ -52,4 +52,4 @@ def in_html(solution: Solution) -> str:
     span = (solution.t_start, solution.t_end) if solution._segments else None
     known = solution._save != "nothing"
     modes, events = (solution.modes, solution.events) if known else ({}, ())
-    return run_html(model, head, solution.success, span, modes, events, solution.warnings)
+    return run_html(solution.components, head, solution.success, span, modes, events, solution.warnings)

@@ -57,8 +57,8 @@ def test_a_hundred_periods_of_dry_friction_to_rounding(F0: float, ratio: float) 
         ("sin(t**2) - x", "a sine or an exponential of what is not linear in time alone"),
         ("-tanh(v)", "a tangent of what moves"),
         ("sinh(x)", "a hyperbolic function of what moves"),
-        ("-sign(x)", "a corner, a jump or another function of what moves"),
-        ("-x if x > 0 else -v", "a corner, a jump or another function of what moves"),
+        ("-exp(sign(x))", "a corner, a jump or another function of what moves"),
+        ("-x if x > 0 and v > 0 else -v", "a corner, a jump or another function of what moves"),
         ("t**9 - x", "a product of more than 8 functions of time"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.model.component import Corner
-from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, Primitive
+from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, Primitive
 from hybridsim.model.smoothing import MOST, smoothed, smoothing_of
 
 
@@ -45,7 +45,7 @@ def test_one_argument_is_one_component() -> None:
 
 def test_nested_primitives_are_a_component_each() -> None:
     outer, inner = (corner.modes[0].guards[0].expr for corner in corners(moving("min(max(x, -1), 1)"))[::-1])
-    assert inner.text == "x - (-1)"
+    assert inner.text == "x + 1"
     assert outer.names < {name for one in corners(moving("min(max(x, -1), 1)")) for name in one.variables}
 
 
@@ -60,10 +60,12 @@ def test_definitions_are_seen_through() -> None:
         ("0 if x < g else k*(x - g)", COMPONENT),
         ("sin(x - g) if x - g >= 0 else (x - g)**3", COMPONENT),
         ("-1 if x < -1 else 1 if x > 1 else x", COMPONENT),
-        ("1 if x > 0 else 0", KEPT),
-        ("k if x > g else -k", KEPT),
+        ("1 if x > 0 else 0", SURFACE),
+        ("k if x > g else -k", SURFACE),
+        ("1 if t > g else 0", SURFACE),
         ("x if x > 0 and v > 0 else 0", KEPT),
-        ("sign(x)", KEPT),
+        ("sign(x)", SURFACE),
+        ("sign(v)*v**2", COMPONENT),
         ("sqrt(x) if x > 0 else 0", KEPT),
     ],
 )

@@ -51,6 +51,10 @@ class FakeSolution:
     )
 
     @property
+    def components(self) -> tuple:
+        return self.model.all_components()
+
+    @property
     def t_start(self) -> float:
         return float(self.t[0])
 

@@ -56,7 +56,9 @@ def rubbing() -> hs.Solution:
 
 def test_a_strip_is_the_modes(rubbing: hs.Solution) -> None:
     page = Page(rubbing._repr_html_())
-    colours = {name: "currentColor" if c == INK else c for name, c in mode_colours(rubbing.model).items()}
+    colours = {
+        name: "currentColor" if c == INK else c for name, c in mode_colours(rubbing.components).items()
+    }
     rectangles = page.all("rect")
     assert len(rectangles) == len(rubbing.modes["f"]) == len(page.all("title"))
     for (attributes, title), interval in zip(rectangles, rubbing.modes["f"], strict=True):
@@ -131,10 +133,9 @@ class Happening:
     kind: str = "transition"
 
 
-def switch(*modes: str) -> hs.Model:
+def switch(*modes: str) -> tuple[hs.Component, ...]:
     declared = [hs.Mode(name, set={"u": k}) for k, name in enumerate(modes)]
-    component = hs.Component("c", declared, initial=modes[0])
-    return hs.Model("m", states=(hs.State("x", 0, "u"),), components=(component,))
+    return (hs.Component("c", declared, initial=modes[0]),)
 
 
 def test_all_text_is_escaped() -> None:

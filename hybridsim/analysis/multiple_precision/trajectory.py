@@ -76,6 +76,11 @@ def multiple_precision_trajectory(
             f"the multiple-precision run goes forward, and t_span is {t_span}", remedy="let t1 be after t0"
         )
     model = smoothed(model.validate())
+    if names := ", ".join(c.name for c in model.components if c.surface and c.surface.unique):
+        raise UsageError(
+            f"model {model.name} jumps in a rate ({names}): the multiple-precision run does not slide",
+            remedy="compare with another integrator at a tight tolerance, or with a closed form",
+        )
     corners = {component.name for component in model.components if isinstance(component, Corner)}
     run = Run(model, t_span, Precision.of(digits), progress)
     run.follow()

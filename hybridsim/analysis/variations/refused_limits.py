@@ -14,7 +14,7 @@ _ROUNDINGS = 4096.0
 
 def refuse_limits(solution: Solution) -> None:
     """Refuse a run with a series that ended short of rounding, or in a reset that depends on anything."""
-    components = {component.name: component for component in solution.model.all_components()}
+    components = {component.name: component for component in solution.components}
     before = solution.t_start
     for event in solution.events:
         if event.kind != "transition":

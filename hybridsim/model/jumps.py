@@ -1,0 +1,203 @@
+"""Jumps in a flow as components: surfaces that a motion crosses or slides along, instants where time alone switches.
+
+What `sign(v)`, or a conditional whose branches differ, is in a rate, a switching surface is in a model, and the motion
+on it is that of A. F. Filippov (see `SwitchingSurface`).
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING
+from zlib import crc32
+
+from hybridsim.expr import of_tree, parse
+from hybridsim.expr.grammar import TIME
+from hybridsim.expr.polynomial import Polynomial, polynomial, tree_of
+from hybridsim.expr.rebuild import with_names
+from hybridsim.model.component import Choice, Component, Corner, Guard, Mode
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.nonsmooth import sides_of
+from hybridsim.model.one_sided import names_of
+from hybridsim.model.switching import ABOVE, BELOW, SwitchingSurface
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
+
+SIGN = "__sign_"  # begins the name of a sign; names of a model do not begin with two underscores
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+@dataclass
+class Jump:
+    """A jump on its way: the name of its component, the variable that is the sign, what changes its sign.
+
+    values: variables with theirs above, below and on the border. blended: those of them that jump, and are between
+    their sides there. is_timed: time alone moves the border.
+    """
+
+    name: str
+    unknown: str
+    argument: ast.expr
+    sign: int
+    is_timed: bool
+    values: dict[str, tuple[ast.expr, ...]] = field(default_factory=dict)
+    blended: set[str] = field(default_factory=set)
+
+    def signed(self, sign: int) -> ast.expr:
+        """Its sign, or minus that, for an argument that is or is not of the sign of its own."""
+        unknown = ast.Name(self.unknown, ast.Load())
+        return unknown if sign == self.sign else ast.UnaryOp(ast.USub(), unknown)
+
+    def component(self) -> Component:
+        """Its automaton: the three modes of a surface, or two that follow each other in time, which runs keep quiet."""
+        argument = of_tree(self.argument)
+        if self.is_timed:
+            minus = of_tree(ast.UnaryOp(ast.USub(), self.argument))
+            first = Mode(ABOVE, (Guard("side", argument, (Choice(BELOW),)),), set={self.unknown: parse(1)})
+            then = Mode(BELOW, (Guard("side", minus, (Choice(ABOVE),)),), set={self.unknown: parse(-1)})
+            made: Component = Corner(self.name, (first, then), initial=ABOVE)
+        else:
+            made = SwitchingSurface(self.unknown, argument).component()
+        modes = []
+        for m, mode in enumerate(made.modes):
+            values = {name: of_tree(row[m]) for name, row in self.values.items()}
+            modes.append(replace(mode, set={**mode.set, **values}))
+        return replace(made, name=self.name, modes=tuple(modes))
+
+
+class Borders:
+    """Where a model may jump in a way that a component can stand for."""
+
+    def __init__(self, model: Model, meanings: Meanings) -> None:
+        self._meanings = meanings
+        components = model.all_components()
+        self._switched = {name for component in components for name in component.variables}
+        rates = {name for component in components for mode in component.modes for name in mode.der}
+        still = {state.name for state in model.states if not polynomial(state.der.tree)} - rates
+        self._moving = {state.name for state in model.states} - still
+        self._held = {*still, *(d.name for d in model.discrete), *(signal.name for signal in model.inputs)}
+        self._surfaces = [
+            c.surface.function.tree for c in components if c.surface and not c.surface.is_unilateral
+        ]
+        gaps = [c.surface.function.tree for c in components if c.surface and c.surface.is_unilateral]
+        positions = {name for gap in gaps for name in names_of(meanings.written_out(gap))} & self._moving
+        speeds = [names_of(meanings.written_out(s.der.tree)) for s in model.states if s.name in positions]
+        self._of_gaps = positions.union(*speeds) & self._moving
+
+    def refusal(self, argument: ast.expr) -> str:
+        """Why what jumps at the zeros of an argument is left as it stands; empty if it is not."""
+        tree = self._meanings.written_out(argument)
+        names = names_of(tree)
+        if names & self._switched:
+            return f"its border depends on {min(names & self._switched)}, which a mode sets"
+        if any(sides_of(part) or isinstance(part, ast.IfExp) for part in ast.walk(tree)):  # type: ignore[arg-type]  # others have no sides
+            return "its border is not smooth"
+        if names & self._of_gaps:
+            return f"an impact holds {min(names & self._of_gaps)}, too"
+        if names & self._moving or (TIME in names and not names & self._held):
+            return ""
+        return "its border may stay at zero, as neither time nor a state with a rate moves it"
+
+    def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
+        """Why a border cannot be held beside those of a model's surfaces and of other jumps; empty if it can."""
+        if self.is_timed(argument):
+            return ""
+        others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
+        rows = [self._slopes(other) for other in (*others, argument)]
+        for other, row in zip(others, rows[:-1], strict=True):
+            if row is not None and rows[-1] is not None and _rank([row, rows[-1]]) < 2:
+                return "" if apart_by(self._meanings, other, argument)[1] else "it may meet a border along it"
+        known = [row for row in rows if row is not None]
+        distinct = [row for k, row in enumerate(known) if all(_rank([row, other]) > 1 for other in known[:k])]
+        return (
+            "its border is crossed by others of which two hold all three"
+            if _rank(distinct) < len(distinct)
+            else ""
+        )
+
+    def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
+        """How a border depends on the states, for some values of all else; None where that is not linear."""
+        slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
+        for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
+            moved = [factor for factor in monomial if not self._moving.isdisjoint(_WORD.findall(factor[0]))]
+            size = coefficient
+            for name, power in monomial:
+                size *= 1 if (name, power) in moved else (1 + Fraction(crc32(name.encode()), 2**32)) ** power
+            if len(moved) > 1 or any(name not in slopes or power > 1 for name, power in moved):
+                return None
+            for name, _ in moved:
+                slopes[name] += size
+        return list(slopes.values())
+
+    def is_timed(self, argument: ast.expr) -> bool:
+        """Whether time alone moves a border."""
+        return not names_of(self._meanings.written_out(argument)) & self._moving
+
+
+def _rank(rows: list[list[Fraction]]) -> int:
+    """How many rows are independent, by elimination."""
+    left, rank = [row for row in rows if any(row)], 0
+    while left:
+        first, *others = left
+        column = next(k for k, value in enumerate(first) if value)
+        reduced = [
+            [b - a * row[column] / first[column] for a, b in zip(first, row, strict=True)] for row in others
+        ]
+        left, rank = [row for row in reduced if any(row)], rank + 1
+    return rank
+
+
+def apart_by(meanings: Meanings, first: ast.expr, second: ast.expr) -> tuple[Fraction, Polynomial]:
+    """k and the constant c, not zero, of which second = k (first - c); (0, {}) where there are none."""
+    p, q = (polynomial(meanings.written_out(argument)) for argument in (first, second))
+    common = [m for m in p if m in q and any(name in meanings.moving for name, _ in m)]
+    if common:
+        ratio = q[common[0]] / p[common[0]]
+        apart = {m: p.get(m, Fraction(0)) - q.get(m, Fraction(0)) / ratio for m in {**p, **q}}
+        apart = {m: c for m, c in apart.items() if c}
+        if all(name.isidentifier() and name not in meanings.moving for m in apart for name, _ in m):
+            return ratio, apart
+    return Fraction(0), {}
+
+
+def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
+    """sign(first)*sign(second) over u = sign(first) and w = sign(second); None where the two are not parallel.
+
+    Where second = k (first - c), the product is s - s e u + e w with s = sign(k) and e = sign(c).
+    """
+    ratio, apart = apart_by(meanings, first, second)
+    if not ratio:
+        return None
+    s = ast.Constant(1) if ratio > 0 else ast.UnaryOp(ast.USub(), ast.Constant(1))
+    e = ast.Call(ast.Name("sign", ast.Load()), [tree_of(apart)], [])
+    return with_names(parse("s - s*e*u + e*w").tree, {"s": s, "e": e})
+
+
+def multiplied(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
+    """Which signs do not enter linearly: they are multiplied with each other, or with a force, or stand in a function.
+
+    trees: values of names, and rates, which have none. carried: signs and forces, by themselves, and what jumps with
+    them.
+    """
+    carried, size, trees = dict(carried), -1, list(trees)
+    while size < len(carried):
+        size = len(carried)
+        for name, tree in trees:
+            if name and name not in carried and (inside := names_of(tree) & carried.keys()):
+                carried[name] = set().union(*(carried[one] for one in inside))
+    found: set[str] = set()
+    for _, tree in trees:
+        if not names_of(tree) & carried.keys():
+            continue
+        for monomial in polynomial(tree):
+            factors = [factor for factor, power in monomial for _ in range(power)]
+            single = [factor for factor in factors if factor in carried]
+            words = {word for factor in factors if factor not in carried for word in _WORD.findall(factor)}
+            inside = words & carried.keys()
+            if inside or len(single) > 1:
+                found.update(*(carried[name] for name in {*single, *inside}))
+    return found
