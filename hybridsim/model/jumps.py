@@ -77,6 +77,7 @@ class Borders:
         components = model.all_components()
         self._switched = {name for component in components for name in component.variables}
         rates = {name for component in components for mode in component.modes for name in mode.der}
+        self._changed = rates
         still = {state.name for state in model.states if not polynomial(state.der.tree)} - rates
         self._moving = {state.name for state in model.states} - still
         self._held = {*still, *(d.name for d in model.discrete), *(signal.name for signal in model.inputs)}
@@ -96,6 +97,8 @@ class Borders:
             return f"its border depends on {min(names & self._switched)}, which a mode sets"
         if any(sides_of(part) or isinstance(part, ast.IfExp) for part in ast.walk(tree)):  # type: ignore[arg-type]  # others have no sides
             return "its border is not smooth"
+        if names & self._changed:
+            return f"a mode changes the rate of {min(names & self._changed)}"
         if names & self._of_gaps:
             return f"an impact holds {min(names & self._of_gaps)}, too"
         if names & self._moving or (TIME in names and not names & self._held):

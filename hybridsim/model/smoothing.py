@@ -96,7 +96,8 @@ class _Smoothing:
             for monitor in model.monitors
         )
         wanted = self.meanings.reached((*self._integrated(), *self._watched_trees()))
-        rates = self.meanings.reached(self._integrated())
+        rates = self.meanings.reached(state.der.tree for state in model.states)
+        rates -= self.meanings.reached(self._of_modes())
         definitions = []
         for name, expr in model.definitions:
             reason = "it is part of a relative velocity" if name in velocities else ""
@@ -123,6 +124,9 @@ class _Smoothing:
     def _integrated(self) -> Iterator[ast.expr]:
         """Rates, and what modes set."""
         yield from (state.der.tree for state in self.model.states)
+        yield from self._of_modes()
+
+    def _of_modes(self) -> Iterator[ast.expr]:
         for component in self.components:
             for mode in component.modes:
                 yield from (expr.tree for expr in (*mode.der.values(), *mode.set.values()))
@@ -152,7 +156,7 @@ class _Smoothing:
         modes = []
         for mode, signs in zip(component.modes, self.signs[c], strict=True):
             where, place = f"mode {mode.name} of {component.name}", mode.place or component.place
-            here = Here(where, place, signs, jumps=WATCHED if component.surface else "")
+            here = Here(where, place, signs, jumps="it stands in a mode of a component")
             guards = tuple(self._guards(component, mode, signs))
             der = {name: self._rewritten(expr, here) for name, expr in mode.der.items()}
             values = {name: self._rewritten(expr, here) for name, expr in mode.set.items()}

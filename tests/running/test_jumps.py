@@ -178,6 +178,24 @@ def test_a_sign_times_one_that_is_kept(q: float) -> None:
     assert sol(1.0)[:2] == pytest.approx(plain(1.0), abs=1e-8)
 
 
+@pytest.mark.parametrize("form", ["set", "der", "definition", "other"])
+def test_a_jump_in_a_mode_is_kept(form: str) -> None:
+    """What a component sets or changes cannot be solved for: the model runs as it is written, up to the jump."""
+    forms = {"set": {"u": "sign(v)"}, "definition": {"u": "s"}}
+    rest = {"der": {"v": "-x - sign(v)"}, "other": {"v": "-x - 1"}}
+    mode = hs.Mode("a", set=forms.get(form, {"u": 1}), der=rest.get(form, {}))
+    rate = "-x - sign(v)" if form == "other" else "-x - u"
+    built = model(
+        ("x", 1.0, "v"),
+        ("v", 1.0, rate),
+        components=[hs.Component("c", [mode])],
+        definitions={"s": "sign(v)"},
+    )
+    sol = hs.simulate(built, (0.0, 0.3), integrator="dop853")
+    assert sol.success and sol(0.3)[0] == pytest.approx(2 * math.cos(0.3) + math.sin(0.3) - 1, abs=1e-5)
+    assert not any(name.startswith("sign") for name in sol.modes)
+
+
 def test_a_monitor_of_a_sign_is_no_jump_of_a_flow() -> None:
     built = model(("x", 1.0, "v"), ("v", 0.0, "-x"), monitors=[hs.Monitor("m", "sign(v) - 0.5")])
     assert hs.simulate(built, (0.0, 7.0)).warnings == ()
