@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from hybridsim import arguments
 from hybridsim.engine.driving import refuse_driving
 from hybridsim.engine.jit import announce_compilation
 from hybridsim.engine.python_code import PythonCode
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.recent import known_system, system_of
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -24,10 +25,22 @@ from hybridsim.errors import UsageError
 from hybridsim.integrators.automatic import choose
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.fixed_step_length import refuse_endless
-from hybridsim.integrators.registry import list_integrators, make_integrator
+from hybridsim.integrators.registry import integrator_class, list_integrators, make_integrator
 from hybridsim.model import Model
 from hybridsim.model.velocity_powers import velocity_powers
 from hybridsim.solution.run import Run
+
+_MOST = 16  # runs that a system remembers: a loop asks for one or a few, and what is kept of each is small
+_PLAIN = frozenset({int, float, np.float64, str, type(None)})  # what is equal to another means the same
+
+
+def _question(t_span: Any, words: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """What is asked, by which a run is known again; None where anything but plain numbers and words is among it.
+
+    To check and to bind the arguments takes as long as a tenth of a short run, and loops ask the same again and again.
+    """
+    question = (*t_span, *words) if type(t_span) is tuple else (t_span,)
+    return question if _PLAIN.issuperset(map(type, question)) else None
 
 
 def prepared(
@@ -48,6 +61,15 @@ def prepared(
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
     """The run of these arguments, and the seconds that compiling took; keywords: what an option may be meant to be."""
+    question = None
+    if x0 is z0 is limits is None:
+        words = (integrator, rtol, atol, max_step, first_step, save)
+        question = _question(t_span, (*words, *chain(*options.items())) if options else words)
+        known = known_system(model)
+        run = None if known is None else known.runs.get(question)
+        if run is not None and type(run.method) is integrator_class(run.method.name):  # as registered now
+            span = run.task.t0, run.task.t1
+            return run.on_grid(arguments.time_grid(t_eval, span, run.task.keep, save)), 0.0
     x0_states, model = arguments.start_values(model, x0)
     span = arguments.time_span(t_span)
     announce_compilation()
@@ -81,7 +103,12 @@ def prepared(
     discrete = system.discrete_start
     task = Task(*span, start, modes, tolerances, discrete, keep, arguments.run_limits(limits))
     refuse_driving(system, span[0], start, discrete, modes)
-    return Run(model, system, method, task, grid, save, reason), compile_time
+    run = Run(model, system, method, task, None, save, reason)
+    if question is not None and not isinstance(system.code, PythonCode):  # which may change its answers
+        if len(system.runs) >= _MOST:
+            system.runs.clear()
+        system.runs[question] = run
+    return run.on_grid(grid), compile_time
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:

@@ -35,6 +35,7 @@ _FAR_DOWN = 1e-6
 _ULPS = 16.0
 # A series with so few ulps of the time to go has come to its end: states that rounding moves decide what follows.
 _END = 1024.0
+_NO_INTERVALS = np.empty(0)
 
 
 @kernel
@@ -82,6 +83,15 @@ def may_end(
     return ended
 
 
+@kernel
+def all_equal(numbers: Any) -> bool:
+    """Whether one or more numbers are all the same."""
+    for number in numbers:
+        if number != numbers[0]:
+            return False
+    return True
+
+
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
     """Events of a turn, and the factor by which the last `count` intervals and a turn's shrink; (0, 1) if they do not.
 
@@ -117,7 +127,18 @@ class Accumulation:
         self.resolution = resolution
         self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
         self.paces: dict[int, Pace] = {}
-        self._under_way: set[int] = set()
+        self._shrinking: set[int] = set()
+        self._unjudged: set[int] = (
+            set()
+        )  # components of which it is not known yet whether they are among these
+
+    @property
+    def _under_way(self) -> set[int]:
+        """The components whose last intervals shrink by one factor."""
+        for c in self._unjudged:
+            self._judge(c)
+        self._unjudged.clear()
+        return self._shrinking
 
     def is_under_way(self, now: float) -> bool:
         """Whether the last intervals of a component shrink by one factor."""
@@ -142,22 +163,24 @@ class Accumulation:
     def go_on(self, paces: dict[int, Pace]) -> None:
         """Take up what was known."""
         self.paces = dict(paces)
-        self._under_way = {c for c, pace in paces.items() if _next_turn(pace)[0]}
+        self._shrinking, self._unjudged = set(), set(paces)
 
     def forget(self, components: tuple[int, ...]) -> None:
         """Begin anew with these: what came before has been dealt with."""
         for c in components:
             self.paces.pop(c, None)
-            self._under_way.discard(c)
+            self._shrinking.discard(c)
+            self._unjudged.discard(c)
 
     def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
         """Note events (E, 2) in a row, each of one component (E,); the limit as soon as there is one, else None."""
         count = len(instants)
-        if count <= _KEPT + 1:
+        is_short = count <= _KEPT + 1  # a series under way there has forecasts, which are made one by one
+        if count < 2 or (is_short and self.paces):
             return self._one_by_one(instants, owners)
-        counts = np.bincount(owners)
         chosen: list[Any] = [slice(None)]
-        if counts[owners[0]] < count:
+        if not all_equal(owners):
+            counts = np.bincount(owners)
             among = np.flatnonzero(counts)
             if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
                 among = np.flatnonzero(counts > _TERMS)
@@ -167,19 +190,20 @@ class Accumulation:
         for k in chosen:
             component = int(owners[k][0])
             may_have_ended, pace = self._paced(instants[k], component)
-            if may_have_ended:  # worth a closer look
+            if may_have_ended or (is_short and _next_turn(pace)[0]):  # worth a closer look
                 kept = np.sort(np.concatenate([np.arange(count)[k] for k in chosen]))
                 return self._one_by_one(instants[kept], owners[kept])
             paces.append((component, pace))
-        for component, pace in paces:
-            self._note(component, pace)
+        self.paces.update(paces)
+        self._unjudged.update([component for component, _ in paces])
         return None
 
     def _paced(self, instants: np.ndarray, component: int) -> tuple[bool, Pace]:
         """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
         pace = self.paces.get(component, BEGINNING)
         first, rest = (pace.last, instants) if pace.last else (Instant(*instants[0].tolist()), instants[1:])
-        known, last = np.array(pace.intervals), np.empty(min(_KEPT, len(pace.intervals) + len(rest)))
+        known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
+        last = np.empty(min(_KEPT, len(pace.intervals) + len(rest)))
         work, least = np.empty((2, _MOST)), (self.shortest, self.resolution)
         ended = may_end(known, first.high, first.low, rest, *least, work, last)
         return ended, Pace(Instant(*instants[-1].tolist()), tuple(last.tolist()), pace.longest)
@@ -217,10 +241,14 @@ class Accumulation:
 
     def _note(self, component: int, pace: Pace) -> None:
         self.paces[component] = pace
-        if _next_turn(pace)[0]:
-            self._under_way.add(component)
+        self._unjudged.discard(component)
+        self._judge(component)
+
+    def _judge(self, component: int) -> None:
+        if _next_turn(self.paces[component])[0]:
+            self._shrinking.add(component)
         else:
-            self._under_way.discard(component)
+            self._shrinking.discard(component)
 
     def _ahead(self, pace: Pace) -> tuple[float, float]:
         """The limit of a series under way by its last intervals, and how far ahead of its last event it is."""

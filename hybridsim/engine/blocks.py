@@ -79,8 +79,8 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
     def times(self) -> np.ndarray:
         """Their times, rounded to doubles."""
 
-    def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component, and of one kind if that is given."""
+    def times_of(self, component: str, kind: str | None) -> np.ndarray:
+        """Times of those of a component, and of one kind if that is given."""
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""
@@ -170,9 +170,10 @@ class OccurrenceList(list[Occurrence]):
         """Times rounded to doubles."""
         return np.array([float(o.instant) for o in self])
 
-    def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component and kind."""
-        return np.array([o.component == component and kind in (None, o.kind) for o in self], dtype=np.bool_)
+    def times_of(self, component: str, kind: str | None) -> np.ndarray:
+        """Times of those of a component and kind."""
+        found = [o.instant for o in self if o.component == component and kind in (None, o.kind)]
+        return np.array([float(instant) for instant in found])
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""

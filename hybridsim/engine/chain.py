@@ -54,7 +54,8 @@ class Chain(Sequence[Item]):
         """A whole block."""
         if (self.window is not None or self._least) and len(block):
             self.blocks.append(block)
-            self._forget()
+            if len(self.blocks) > 1:
+                self._forget()
 
     def _forget(self) -> None:
         """Let go of the blocks that lie further back than the window."""
@@ -70,6 +71,7 @@ class Chain(Sequence[Item]):
 
     def keep_only(self, item: Item) -> None:
         """This item in place of all."""
+        self.forgotten += len(self.blocks)
         last = self._loose()
         last.append(item)
         self.blocks = [last]
@@ -153,6 +155,17 @@ class SegmentChain(Chain[Segment]):
         """Modes (N, C)."""
         none = np.empty((0, self._shape[1]), dtype=np.int64)
         return np.concatenate([none, *(block.modes for block in self.blocks)])
+
+    @property
+    def is_end_alone(self) -> bool:
+        """Whether nothing is wanted but where the run ends."""
+        return self.window == 0.0
+
+    def keep_end(self) -> None:
+        """Where the last segment ends in place of all, unless that is all there is."""
+        last = self.blocks[-1]
+        if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
+            self.keep_only(last.at_end())
 
     def cut(self, instant: Instant) -> None:
         """Let go of all that lies before an instant; the segment that holds it begins there from now on."""

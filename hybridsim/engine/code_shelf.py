@@ -63,7 +63,7 @@ class CodeShelf(ABC):
 
     def look(self, tapes: Tapes, codes: Any) -> None:
         """Get code ready for the modes that have taken many steps without it."""
-        if not ENABLED or codes.lacked.max(initial=0) < KNOWN:
+        if not ENABLED or max(codes.lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(codes.lacked >= KNOWN).tolist():
             place = kept(self.system, self.kind, tapes.modes[k])

@@ -86,12 +86,14 @@ class Crossings(Sequence[Occurrence]):
         times = self._instants[:, 0] + self._instants[:, 1]
         return times[self._first :] if self._is_plain else times[self._places[0]]
 
-    def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component; all are transitions, or changes of a corner's side."""
-        names = [a.name for a in self._system.automata]
-        if component not in names or kind not in (None, self._system.automata[names.index(component)].kind):
-            return np.zeros(len(self), dtype=np.bool_)
-        return self._places[1] == names.index(component)
+    def times_of(self, component: str, kind: str | None) -> np.ndarray:
+        """Times of those of a component; all are transitions, or changes of a corner's side."""
+        automata = self._system.automata
+        for c, automaton in enumerate(automata):
+            if automaton.name == component and kind in (None, automaton.kind):
+                times = self.times
+                return times if len(automata) == 1 else times[self._places[1] == c]
+        return np.empty(0)
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""

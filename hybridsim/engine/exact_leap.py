@@ -45,17 +45,16 @@ _DONE = -1.0  # in place of a guard's size: its first zero is known
 class Room(NamedTuple):
     """What a leap is to do, and scratch arrays.
 
-    rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), instants: target (2,)
-    and clock (2,), which is moved on; how many segments were committed (1,), from how many points guards were followed
-    (1,). Modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state; hints (K, G):
-    how long a segment lasted that a guard ended.
+    rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
+    target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
+    followed (1,). Modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state;
+    hints (K, G): when a guard was zero last.
     """
 
     rates: np.ndarray
     places: np.ndarray
     longest: np.ndarray
-    target: np.ndarray
-    clock: np.ndarray
+    times: np.ndarray
     committed: np.ndarray
     points: np.ndarray
     c: np.ndarray
@@ -86,9 +85,9 @@ class Record(NamedTuple):
 def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
     """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
 
-    Waves have their zeros in closed form. Of the others the guard that falls fastest goes first: the rest need to be
-    followed no farther than it lasts. All are followed up to one horizon, and then to one four times as far: most stay
-    positive for long.
+    Waves have their zeros in closed form. Of the others the one that was zero soonest when these modes were met last
+    goes first, or else the one that falls fastest: the rest need to be followed no farther than it lasts. All are
+    followed up to one horizon, and then to one four times as far: most stay positive for long.
     """
     c, starts, hints, sides, orders = room.c, room.starts, room.hints, state.sides, state.orders
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
@@ -104,8 +103,13 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: 
                     known, until = g, at
                 continue
         start[TERMS], start[TERMS + 1] = guard_terms(lin, k, g, c, start)
-        if start[1] < 0.0 and start[0] < soonest * -start[1]:
-            lead, soonest = i, start[0] / -start[1]
+        guess = math.inf
+        if hints[k, g] > 0.0:
+            guess = hints[k, g]
+        elif start[1] < 0.0:
+            guess = start[0] / -start[1]
+        if guess < soonest:
+            lead, soonest = i, guess
         if last - first > 1:
             horizon = min(horizon, lin.farthest[k, g])
     if not horizon > 0.0:
@@ -122,9 +126,8 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: 
                 return _OPEN, at
             if outcome == FOUND:
                 fired, s = g, at
+                hints[k, g] = at
         if fired >= 0 or horizon >= bound:
-            if fired >= 0:
-                hints[k, fired] = s
             return fired, s
         horizon *= 4.0
 
@@ -137,8 +140,7 @@ def room_for(system: Any, tables: Any) -> Room:
             rates=np.zeros(layout.phases),
             places=np.array([layout.origin_at, layout.phases_at], dtype=np.int64),
             longest=np.zeros(1),
-            target=np.zeros(2),
-            clock=np.zeros(2),
+            times=np.zeros(4),
             committed=np.zeros(1, dtype=np.int64),
             points=np.zeros(1, dtype=np.int64),
             c=np.zeros(widest, dtype=complex),
@@ -162,7 +164,7 @@ def exact_leap(
     work as for `leap`; lin: tables of linear modes. record: what the segments and events are written to.
     """
     place, rates = (room.places[0], room.places[1]), room.rates
-    longest, target, clock, functions = room.longest[0], room.target, room.clock, called_by(work)
+    longest, target, clock, functions = room.longest[0], room.times[:2], room.times[2:], called_by(work)
     committed = room.committed
     committed[0] = room.points[0] = 0
     x, x_error, z, p = state.x, state.x_error, state.z, state.p

@@ -17,6 +17,7 @@ from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import Sheet
+from hybridsim.engine.pieces import end_point
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -35,6 +36,14 @@ class ExactLeaper:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # the farthest that a segment might have gone so far
         self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.tables: LinearTables | None = None  # those that the sheet is for
+        self.sheet: Sheet
+
+    def anew(self) -> ExactLeaper:
+        """The same for another run."""
+        other: ExactLeaper = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
 
     @property
     def place(self) -> np.ndarray:
@@ -49,36 +58,39 @@ class ExactLeaper:
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
-        self.shelf.surround(outcome.z)
-        tapes, inputs = self.shelf.tapes, self.system.registers.inputs
+        system, shelf = self.system, self.shelf
+        shelf.surround(outcome.z)
+        tapes, inputs = shelf.tapes, system.registers.inputs
         self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(self.system, tapes.modes, p, self.horizon)
+        found = tables_of(system, tapes.modes, p, self.horizon)
         if found is None:
-            return Landing(origin, outcome, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+            return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         tables, spare = found
-        sheet = self._sheet(tables)
-        memory = sheet.blank()
-        rows = sheet.packed(memory)
+        if tables is not self.tables:
+            self.tables, self.sheet = tables, self._sheet(tables)
+        memory = self.sheet.blank()
+        rows = self.sheet.packed(memory)
         try:
             desk = spare.pop()
         except IndexError:
-            work = work_space(self.system, len(tables.kinds), len(tables.factor_start) - 1)
-            desk = Desk.of(outcome, p, work, room_for(self.system, tables))
+            work = work_space(system, len(tables.kinds), len(tables.factor_start) - 1)
+            desk = Desk.of(outcome, p, work, room_for(system, tables))
             reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
         desk.take_up(outcome, p)
         room = desk.room
-        room.rates[:], room.longest[0] = self.system.rates, self.longest
-        room.clock[:], room.target[:] = origin, target
+        room.rates[:], room.longest[0] = system.rates, self.longest
+        room.times[:] = *target, *origin
         began = perf_counter()
         code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
         record.counters.kernel_time += perf_counter() - began
-        after, clock, count = desk.outcome(), room.clock.copy(), int(room.committed[0])
+        z, after = desk.leave()
+        clock, count = room.times[2:].tolist(), int(room.committed[0])
         spare.append(desk)
-        instants, owners = self._commit(tables, sheet.rows(memory), count, after.z, clock, record)
-        self.shelf.surround(after.z)
-        goes_on = code == FULL or (count > 0 and len(self.shelf.tapes.modes) != len(tapes.modes))
+        instants, owners = self._commit(tables, self.sheet.rows(memory), count, z, clock, record)
+        shelf.surround(z)
+        goes_on = code == FULL or (count > 0 and len(shelf.tapes.modes) != len(tapes.modes))
         end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
-        return Landing(Instant(*clock.tolist()), after, end, instants, owners)
+        return Landing(Instant(*clock), after, end, instants, owners)
 
     def _sheet(self, tables: LinearTables) -> Sheet:
         """What the kernel writes to; the trajectory keeps it, events longer than segments."""
@@ -109,7 +121,7 @@ class ExactLeaper:
         rows: Record,
         count: int,
         z_after: np.ndarray,
-        clock: np.ndarray,
+        clock: list[float],
         record: Trajectory,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Leave so many segments to the trajectory; the instants (E, 2) of their events, and whose they are."""
@@ -118,19 +130,23 @@ class ExactLeaper:
             return np.empty((0, 2)), _NONE
         system, counters, begun = self.system, record.counters, slice(0, count)
         origins[count], modes[count] = clock, z_after
-        record.segments.add(
-            ClosedFormBlock(
-                system,
-                tables,
-                numbers[begun],
-                ends[begun],
-                coordinates[begun],
-                origins[begun],
-                modes[begun],
-                vectors[begun],
-                jumps[begun],
+        if record.segments.is_end_alone:
+            last = count - 1
+            record.segments.keep_only(end_point(Instant(*clock), modes[last], vectors[last], jumps[last, 1]))
+        else:
+            record.segments.add(
+                ClosedFormBlock(
+                    system,
+                    tables,
+                    numbers[begun],
+                    ends[begun],
+                    coordinates[begun],
+                    origins[begun],
+                    modes[begun],
+                    vectors[begun],
+                    jumps[begun],
+                )
             )
-        )
         counters.steps += count
         counters.restarts += count
         events = count if fired[count - 1] >= 0 else count - 1

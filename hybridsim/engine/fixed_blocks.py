@@ -157,12 +157,12 @@ class StepOccurrences(Sequence[Occurrence]):
         """Times rounded to doubles."""
         return np.array([float(self._origin.plus(s)) for s in self._s.tolist()])
 
-    def chosen(self, component: str, kind: str | None) -> np.ndarray:
-        """Mask of those of a component; all are transitions."""
+    def times_of(self, component: str, kind: str | None) -> np.ndarray:
+        """Times of those of a component; all are transitions."""
         names = [a.name for a in self._system.automata]
         if component not in names or kind not in (None, "transition"):
-            return np.zeros(len(self), dtype=np.bool_)
-        return self._components == names.index(component)
+            return np.empty(0)
+        return self.times[self._components == names.index(component)]
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind: all are transitions."""

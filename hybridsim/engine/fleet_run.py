@@ -71,7 +71,7 @@ def run_fleet(
     record: room for twice as many segments as a leap has, late: its second half.
     """
     origin_at, phases_at, pin_at = places
-    at, clock, target = runs.at, room.clock, room.target
+    at, clock, target = runs.at, room.times[2:], room.times[:2]
     segments = 0
     while at[NEXT] < runs.ends.shape[0] and segments < _AT_ONCE:
         i = at[NEXT]

@@ -132,15 +132,19 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, backward: Any)
         )
         power *= d * d * d * d
         total += abs(u) + abs(v) + abs(w) + abs(z)
-        for j in range(TERMS):
+        for j in range(i, TERMS):  # the ones before have no part of these
             backward[j] += (
                 _BERNSTEIN[i, j] * u
                 + _BERNSTEIN[i + 1, j] * v
                 + _BERNSTEIN[i + 2, j] * w
                 + _BERNSTEIN[i + 3, j] * z
             )
-    for _ in range(TERMS - first):
-        rest *= d
+    count, square = TERMS - first, d
+    while count > 0:  # rest d**count, by squares
+        if count % 2 == 1:
+            rest *= square
+        square *= square
+        count //= 2
     lowest = rest + 2.0 * TERMS * UNIT * total
     for j in range(TERMS):
         if not backward[j] > lowest:

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import ALIGNED, LARGEST, Sheet, packed
+from hybridsim.engine.pieces import end_point
 from hybridsim.engine.segment_end import reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
@@ -92,6 +93,10 @@ class Leaper(ABC):
     kind : names the scratch arrays, which are handed on from run to run; each leap takes a pair of its own.
     """
 
+    is_looked_at: ClassVar[bool] = (
+        False  # whether steps are looked at after a leap, even if they are not kept
+    )
+
     def __init__(self, system: System, columns: int, kind: str) -> None:
         self.system, self.columns, layout = system, columns, system.layout
         self.shelf, self.automata = shelf_of(system), automata_of(system)
@@ -106,6 +111,12 @@ class Leaper(ABC):
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         self.steps = max((_ROOM - beside) // (system.n * columns + 2), _FEWEST)  # that there is room for
         self._renew()
+
+    def anew(self) -> Leaps:
+        """The same for another run."""
+        other: Leaps = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
 
     @abstractmethod
     def _room(self) -> Any:
@@ -135,7 +146,7 @@ class Leaper(ABC):
         """Fresh arrays to write to; blocks that were committed go on using the former ones."""
         self.used = (0, 0)  # rows of steps, rows of segments
         self.sheet = self._sheet()
-        self.memory = self.sheet.blank()
+        self.memory: tuple[np.ndarray, ...] | None = None  # what the sheet describes, once it is needed
 
     def _sheet(self) -> Sheet:
         """What the kernel writes to; the trajectory keeps it, events longer than steps."""
@@ -188,7 +199,8 @@ class Leaper(ABC):
             )
         desk.take_up(outcome, p)
         as_packed, z, work, room = desk.as_packed, desk.state.z, desk.work, desk.room
-        instants, owners = [np.empty((0, 2))], [_NONE]
+        instants: list[np.ndarray] = []
+        owners: list[np.ndarray] = []
         while True:
             rows, began = self._rows(), perf_counter()
             code, steps, count = self._go(to, clock, as_packed, work, room, rows)
@@ -209,14 +221,19 @@ class Leaper(ABC):
             self.shelf.surround(z)
             if is_full or len(self.shelf.tapes.modes) == known:
                 break
-        after = desk.outcome()
+        _, after = desk.leave()
         self.spare.append(desk)
         end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
-        return Landing(Instant(*clock.tolist()), after, end, np.concatenate(instants), np.concatenate(owners))
+        if len(instants) == 1:
+            return Landing(Instant(*clock.tolist()), after, end, instants[0], owners[0])
+        all_instants = np.concatenate([np.empty((0, 2)), *instants])
+        return Landing(Instant(*clock.tolist()), after, end, all_instants, np.concatenate([_NONE, *owners]))
 
     def _rows(self) -> Any:
         """The rows that the next call writes to."""
         steps, first = self.used
+        if self.memory is None:
+            self.memory = self.sheet.blank()
         return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
     def _commit(
@@ -228,21 +245,26 @@ class Leaper(ABC):
         """
         first_step, first = self.used
         last_step, last = self.used = (first_step + steps, first + count + 1)
+        assert self.memory is not None
         lengths, series, ends, origins, modes, vectors, fired, jumps = self.sheet.rows(self.memory)
         ends[first], origins[last - 1], modes[last - 1] = 0, clock, z
-        begun = slice(first, last - 1)
+        begun, k = slice(first, last - 1), last - 2
         system, counters = self.system, record.counters
-        record.segments.add(
-            self._block(
-                ends[first:last],
-                lengths[first_step:last_step],
-                series[first_step:last_step],
-                origins[begun],
-                modes[begun],
-                vectors[begun],
-                jumps[begun],
+        if record.segments.is_end_alone and not self.is_looked_at:
+            end = Instant(*origins[last - 1].tolist())
+            record.segments.keep_only(end_point(end, modes[k], vectors[k], jumps[k, 0]))
+        else:
+            record.segments.add(
+                self._block(
+                    ends[first:last],
+                    lengths[first_step:last_step],
+                    series[first_step:last_step],
+                    origins[begun],
+                    modes[begun],
+                    vectors[begun],
+                    jumps[begun],
+                )
             )
-        )
         counters.steps += steps
         counters.restarts += count
         events = count if fired[last - 2] >= 0 else count - 1

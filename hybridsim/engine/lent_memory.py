@@ -7,7 +7,7 @@ costs as much as a sixth of a run of thousands of steps.
 from __future__ import annotations
 
 import ctypes
-import weakref
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +22,9 @@ class Lender:
     """
 
     def __init__(self, size: int) -> None:
-        self.size, self._kind = size, ctypes.c_char * size
+        self.size = size
         self._free: list[bytearray] = []
+        self._kind = _lent(size, self._free)
 
     def block(self) -> np.ndarray:
         """A block, with whatever was written there before."""
@@ -32,9 +33,18 @@ class Lender:
         except IndexError:
             memory = bytearray(self.size)
         lent = self._kind.from_buffer(memory)
-        weakref.finalize(lent, self._take_back, memory).atexit = False
+        lent.memory = memory
         return np.frombuffer(memoryview(lent), dtype=np.uint8)
 
-    def _take_back(self, memory: bytearray) -> None:
-        if len(self._free) < _KEPT:
-            self._free.append(memory)
+
+def _lent(size: int, free: list[bytearray]) -> Any:
+    """A type of buffers over so many bytes, which give their memory back when they go."""
+
+    class Lent(ctypes.c_char * size):  # type: ignore[misc]  # made when it is needed
+        memory: bytearray
+
+        def __del__(self) -> None:
+            if len(free) < _KEPT:
+                free.append(self.memory)
+
+    return Lent

@@ -331,9 +331,10 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
     if side <= 0 or order >= TERMS - 3 or not start[order] > 0.0:
         return OPEN, 0.0
     farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
-    if bound <= farthest and stays_positive(start, order, grown * rest, bound, lower):
+    is_due = 0.0 < hint <= min(bound, farthest)
+    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, lower):
         return NEVER, bound
-    if 0.0 < hint <= farthest:
+    if is_due:
         moved(lin, k, c, hint, v)
         size_there, rest_there = guard_terms(lin, k, g, v, terms)
         error = margin * size_there + floor

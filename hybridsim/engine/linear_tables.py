@@ -164,6 +164,17 @@ def tables_of(
     segment may be at most. The scratch arrays serve all tables of one form. None where there are no tables.
     """
     horizon = horizon_class(horizon)
+    last = system.tables.get(horizon)
+    if last is not None and last[0] is modes:  # the values of a system's parameters do not change
+        return last[1]
+    found = _tables_of(system, modes, p, horizon)
+    system.tables[horizon] = (modes, found)
+    return found
+
+
+def _tables_of(
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float
+) -> tuple[LinearTables, deque[Any]] | None:
     kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
     found = kept.get(key)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -15,26 +14,21 @@ from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import behind, closed_now, holds_several
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
-from hybridsim.engine.limits import Gauge, LimitReached
+from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
 from hybridsim.engine.located import coincident, situation, with_monitors
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
+from hybridsim.engine.plan import plan_of
 from hybridsim.engine.segment import Arrival, SegmentRun
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.sightings import seen_on_the_way
-from hybridsim.engine.start import settled_start
+from hybridsim.engine.standing import Standing
 from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
-
-# Local time rounds angles that grow in time, by 1e-13 after this many turns: a stretch without events begins anew then.
-_TURNS = 100
-_STATE = (
-    "x", "p", "z", "sides", "orders", "monitor_sides", "monitor_orders", "x_error", "guard_floors", "monitor_floors",
-)  # fmt: skip  # of an outcome: what a run needs to go on
 
 
 class ModeLoop:
@@ -46,37 +40,43 @@ class ModeLoop:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
         self.record = task.record or Trajectory(system, task.keep)
-        self.gauge = Gauge(task.limits, self.record.counters)
-        self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.gauge = None if task.limits is UNLIMITED else Gauge(task.limits, self.record.counters)
+        self.plan = plan = plan_of(system, method, task)
+        self.origin, self.end, self.renewal = plan.origin, plan.end, plan.renewal
         self.timetable = Timetable(system, self.end)
         # monitors whose resets an event set off, and their direction
         self.crossed_by_reset: dict[int, int] = {}
         self.adopted: Instant | None = None  # the last instant at which an event was settled
-        fastest = float(max(map(abs, system.rates), default=0.0))
-        self.renewal = _TURNS * 2.0 * math.pi / fastest if fastest else math.inf
-        self.outcome: Outcome  # what holds at the origin, and the run-time vector there
-        self.p: np.ndarray
+        self.standing: Standing  # what holds at the origin
         self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # by component
         self.notices = Notices(system, method, task, self.record)
-        self.leaper = self._leaper()
+        self.leaper = plan.leaper()
         self._told = progress
+
+    @property
+    def outcome(self) -> Outcome:
+        """What holds at the origin."""
+        return self.standing.outcome
+
+    @property
+    def p(self) -> np.ndarray:
+        """The run-time vector there."""
+        return self.standing.p
+
+    def _stand(self, instant: Instant, make: Callable[[], Outcome]) -> None:
+        """Take what is made for what holds at an instant."""
+        self.standing = Standing(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
         """So far the run has come; raises LimitReached."""
         self._tell(instant)
-        self.gauge.check()
+        if self.gauge is not None:
+            self.gauge.check()
 
     def _tell(self, instant: Instant) -> None:
         if self._told is not None:
             self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
-
-    def _leaper(self) -> Leaps | None:
-        """The compiled loop, where method and model allow it."""
-        model = self.system.model
-        if not self.method.leaps or not self.forward or self.system.n == 0 or model.monitors or model.inputs:
-            return None
-        return self.method.leaper(self.system, self.task.tolerances, self.renewal)
 
     def run(self) -> Trajectory:
         """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
@@ -98,15 +98,16 @@ class ModeLoop:
         return self.record
 
     def _run(self) -> None:
-        task, system = self.task, self.system
+        task = self.task
         checkpoint = self.record.checkpoint
         if checkpoint is not None:
             stop, step_size = False, self._go_on_from(checkpoint)
         else:
-            p = system.vector(self.origin, task.discrete, self.forward)
             due = self.timetable.due_at_start(self.origin) if self.forward else ()
             self.timetable.kept(self.origin)
-            stop = self._adopt(self.origin, settled_start(system, task, p, due), task.x0, due, ())
+            self.standing, self.adopted, stop = self.plan.start(due), self.origin, False
+            if not self.plan.begins_silently:
+                stop = self._adopt(self.origin, self.outcome, task.x0, due, ())
             step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             self._mark(step_size)
@@ -143,14 +144,13 @@ class ModeLoop:
         """Note a state from which the run could go on, where an event has just been settled."""
         if self.adopted != self.origin:
             return
-        outcome, continuous, origin = self.outcome, self.outcome.continuous, self.origin
+        standing, origin = self.standing, self.origin
         settled, paces = self.timetable.settled, dict(self.accumulation.paces)
         place = None if self.leaper is None else self.leaper.place
 
         def checkpoint(segments: int, occurrences: int) -> Checkpoint:
-            arrays = {name: getattr(outcome, name) for name in _STATE}
             size = math.nan if step_size is None else step_size
-            arrays |= {"continuous": np.array(continuous), "step_size": np.array(size)}
+            arrays = standing.outcome.arrays() | {"step_size": np.array(size)}
             if place is not None:
                 arrays["place"] = place
             return Checkpoint(origin, arrays, settled, paces, segments, occurrences)
@@ -164,9 +164,7 @@ class ModeLoop:
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)
         self.accumulation.go_on(checkpoint.paces)
-        state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
-        self.outcome = Outcome(**state, continuous=bool(arrays["continuous"]))
-        self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
+        self._stand(self.origin, lambda: Outcome.of_arrays(arrays))
         if self.leaper is not None and "place" in arrays:
             self.leaper.place = arrays["place"]
         step_size = float(arrays["step_size"])
@@ -175,14 +173,13 @@ class ModeLoop:
     def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
         """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
         while True:
-            landing = leaper.leap(self.origin, self.outcome, self.p, target, self.record)
-            self.origin, self.outcome = landing.origin, landing.outcome
+            landing = leaper.leap(self.origin, *self.standing.read(), target, self.record)
+            self.origin = landing.origin
+            self._stand(self.origin, landing.outcome)
             self.notices.look()
             arrived = landing.end == ARRIVED
             if len(landing.instants):
                 self.adopted = Instant(*landing.instants[-1].tolist())
-            if not arrived or self.adopted == self.origin:
-                self.p = self.system.vector(self.origin, self.system.discrete(self.outcome.p), self.forward)
             limit = self.accumulation.limit_of_all(landing.instants, landing.owners)
             if limit is None and len(landing.owners) and not self.system.has_surface[landing.owners[-1]]:
                 limit = limit_of_hidden(
@@ -414,8 +411,7 @@ class ModeLoop:
         """Make the state after an event the start of the next segment and record the event; True to stop."""
         system, record = self.system, self.record
         self.origin = self.adopted = instant
-        self.outcome = outcome
-        self.p = system.vector(instant, system.discrete(outcome.p), self.forward)
+        self._stand(instant, lambda: outcome)
         for warning in outcome.warnings:
             record.warn(warning)
         for change in outcome.changes:

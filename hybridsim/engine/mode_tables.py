@@ -169,7 +169,7 @@ class TapeShelf:
     def look(self) -> None:
         """Get code ready for the short series that were missed often."""
         tapes = self.tapes
-        if not ENABLED or tapes.lacked.max(initial=0) < KNOWN:
+        if not ENABLED or max(tapes.lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(tapes.lacked >= KNOWN).tolist():
             place = kept(self.system, "bounds", tapes.modes[k])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,13 @@ class Notices:
     def __init__(self, system: System, method: Method, task: Task, record: Trajectory) -> None:
         self.system, self.method, self.tolerances, self.record = system, method, task.tolerances, record
         self._events = self._steps = 0  # at the last look
-        self._range = np.array([task.x0, task.x0])
+        self._start = task.x0
         self._done: set[str] = set()
+
+    @cached_property
+    def _range(self) -> np.ndarray:
+        """Least and largest states (2, n) so far."""
+        return np.array([self._start, self._start])
 
     def accumulated(self, names: list[str]) -> None:
         """Events that follow each other ever faster were replaced by their limit."""
@@ -87,7 +93,7 @@ class Notices:
         if not is_still or len(instants) < _EVENTS or "chattering" in self._done:
             return
         times = (instants - instants[0]).sum(axis=1)
-        turns = max(map(abs, self.system.rates), default=0.0) * abs(times[-1]) / (2.0 * math.pi)
+        turns = self.system.fastest * abs(times[-1]) / (2.0 * math.pi)
         quarter = _EVENTS // 4
         first, end = abs(times[quarter]), abs(times[-1] - times[-1 - quarter])
         if turns < 1.0 and end >= _FASTER * first:

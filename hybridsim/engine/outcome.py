@@ -7,6 +7,10 @@ from typing import Any
 
 import numpy as np
 
+_STATE = (
+    "x", "p", "z", "sides", "orders", "monitor_sides", "monitor_orders", "x_error", "guard_floors", "monitor_floors",
+)  # fmt: skip
+
 
 @dataclass
 class Situation:
@@ -52,7 +56,22 @@ class Outcome:
     message: str = ""
     warnings: list[str] = field(default_factory=list)
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What a run needs to go on from here, by names."""
+        state = {name: getattr(self, name) for name in _STATE}
+        return state | {"continuous": np.array(self.continuous)}
+
+    @classmethod
+    def of_arrays(cls, arrays: dict[str, np.ndarray]) -> Outcome:
+        """The outcome of these arrays, with arrays of its own."""
+        state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
+        return cls(**state, continuous=bool(arrays["continuous"]))
+
     def copy(self) -> Outcome:
         """The same with arrays of its own."""
-        values: list[Any] = [v.copy() if isinstance(v, np.ndarray) else v for v in vars(self).values()]
-        return Outcome(*values)
+        return Outcome(
+            self.x.copy(), self.p.copy(), self.z.copy(), self.sides.copy(), self.orders.copy(),
+            self.monitor_sides.copy(), self.monitor_orders.copy(), self.x_error.copy(),
+            self.guard_floors.copy(), self.monitor_floors.copy(),
+            self.changes, self.continuous, self.status, self.message, self.warnings,
+        )  # fmt: skip

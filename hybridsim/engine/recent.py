@@ -16,6 +16,12 @@ _kept: dict[int, System] = {}
 _lock = Lock()
 
 
+def known_system(model: Model) -> System | None:
+    """The system of a model that was run lately."""
+    # a system holds its model, so nothing else has that number while it is kept
+    return _kept.get(id(model))
+
+
 def system_of(model: Model) -> System:
     """The system of a valid model, the same for the same object: models are frozen and systems keep nothing of a run.
 
@@ -24,8 +30,7 @@ def system_of(model: Model) -> System:
     ModelError
         With all faults of the model.
     """
-    # a system holds its model, so nothing else has that number while it is kept
-    system = _kept.get(id(model))
+    system = known_system(model)
     if system is not None:
         return system
     system = System(model.validate())

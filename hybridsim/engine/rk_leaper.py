@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -81,6 +81,8 @@ _leap = Door(rk_leap)
 
 class RungeKuttaLeaper(Leaper):
     """Leaps of an explicit Runge-Kutta method."""
+
+    is_looked_at: ClassVar[bool] = True  # for stiffness
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float, tableau: Tableau) -> None:
         rtol = tolerances.rtol

@@ -106,7 +106,8 @@ class SeriesBlock(Sequence[Segment]):
     def until(self) -> Instant:
         """End of the last segment."""
         high, low = self.origins[-1].tolist()
-        return Instant(high, low).plus(float(self.steps[self.ends[-1] - 1].sum()))
+        s, h = self.steps[self.ends[-1] - 1].tolist()
+        return Instant(high, low).plus(s + h)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """States (k, n) in the segments of these numbers, at local times (k,)."""

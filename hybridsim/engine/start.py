@@ -7,16 +7,18 @@ import numpy as np
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task
 
 _MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
 
 
-def settled_start(system: System, task: Task, p: np.ndarray, due: tuple[int, ...]) -> Outcome:
-    """What holds just after t0, the schedules due then applied; p is the run-time vector at t0."""
-    key = (task.t0, task.forward, task.x0.tobytes(), task.z0.tobytes(), task.discrete.tobytes())
+def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
+    """What holds just after the start of the run, the schedules due then applied."""
+    key = task.beginning
     known = system.starts.get(key)
     if known is None:
+        p = system.vector(origin, task.discrete, task.forward)
         at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
         resets = [("schedule", k) for k in due]
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
@@ -25,4 +27,4 @@ def settled_start(system: System, task: Task, p: np.ndarray, due: tuple[int, ...
         if len(system.starts) >= _MOST:
             system.starts.clear()
         system.starts[key] = known
-    return known.copy()
+    return known

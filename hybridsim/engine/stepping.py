@@ -189,11 +189,11 @@ class Landing(NamedTuple):
 
     ARRIVED at its target; PAUSED for want of room, to be taken up where it ended; BEFORE_SOMETHING that is not
     ordinary. instants (E, 2) are those of the events on the way, owners (E,) the components whose
-    guards they are.
+    guards they are. outcome: makes what holds there, which a run that ends there does not ask for.
     """
 
     origin: Instant
-    outcome: Outcome
+    outcome: Callable[[], Outcome]
     end: int
     instants: np.ndarray
     owners: np.ndarray
@@ -207,6 +207,9 @@ class Leaps(Protocol):
     """
 
     place: np.ndarray
+
+    def anew(self) -> Leaps:
+        """The same for another run, which remembers nothing yet; this one has never leapt."""
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory

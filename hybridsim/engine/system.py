@@ -19,7 +19,7 @@ from hybridsim.engine.modules import compiled
 from hybridsim.engine.registers import Registers
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
-from hybridsim.engine.timepair import Instant, phase
+from hybridsim.engine.timepair import Instant, phase_of
 from hybridsim.model.component import Corner
 from hybridsim.model.smoothing import smoothed
 from hybridsim.model.toml_automata import SINGLE
@@ -214,8 +214,12 @@ class System:
         self._base[: self.layout.parameters] = list(self.values.values())
         self._base[self.layout.pin_at] = 1.0
         self.rates = self.rates_at(self._base)
+        self.fastest = float(max(map(abs, self.rates), default=0.0))
+        self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
         self.signals = tuple(Signal(i, self.values) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
+        self.tables: dict[float, Any] = {}  # what `hybridsim.engine.linear_tables` has made last
+        self.runs: dict[Any, Any] = {}  # what `hybridsim.preparation` remembers
         self.opposed: set[tuple[Any, ...]] = set()  # starts that `hybridsim.engine.driving` has let pass
         self.has_tape: bool = data["tape"] is not None  # it is made from expressions
         if self.has_tape:
@@ -234,6 +238,13 @@ class System:
     def is_linear(self) -> bool:
         """Whether the flow of every mode is linear in the states."""
         return all(all(modes) for modes in self.linear.values())
+
+    @cached_property
+    def heard(self) -> tuple[str, ...]:
+        """Names of all that events can be of: components, monitors, schedules, inputs."""
+        model = self.model
+        named = (self.automata, model.monitors, model.schedules, model.inputs)
+        return tuple(part.name for parts in named for part in parts)
 
     @property
     def can_hold(self) -> bool:
@@ -271,8 +282,8 @@ class System:
         at = self.layout
         p[at.discrete_slice] = discrete
         p[at.origin_at] = float(origin)
-        for k, rate in enumerate(self.rates):
-            p[at.phases_at + k] = phase(origin, float(rate), 0.0)
+        for place, rate in self._turning:
+            p[place] = phase_of(origin.high, origin.low, rate, 0.0)
         for k, signal in enumerate(self.signals):
             place = at.signals_at + SIGNAL_SLOTS * k
             p[place : place + SIGNAL_SLOTS] = signal.piece(origin, forward)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -73,7 +73,7 @@ class Trajectory:
         if keep == ALL or not self.segments:
             return
         if keep.segments is None:
-            self.segments.keep_only(self.segments.blocks[-1].at_end())
+            self.segments.keep_end()
         if keep.events != math.inf and self._may_bounce:
             self.hidden = list(self.occurrences.blocks)
         if keep.events is None:
@@ -157,7 +157,17 @@ class Task:
     limits: Limits = UNLIMITED
     record: Trajectory | None = None  # what to go on with, from its checkpoint
 
-    @property
+    @cached_property
     def forward(self) -> bool:
         """Whether time runs forward."""
         return self.t1 >= self.t0
+
+    @cached_property
+    def plans(self) -> dict[str, Any]:
+        """What `hybridsim.engine.plan` keeps here."""
+        return {}
+
+    @cached_property
+    def beginning(self) -> tuple[Any, ...]:
+        """What the start depends on: equal where runs of one system begin alike."""
+        return self.t0, self.forward, self.x0.tobytes(), self.z0.tobytes(), self.discrete.tobytes()

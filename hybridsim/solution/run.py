@@ -39,6 +39,12 @@ class Run:
     save: str | float = "all"
     reason: str = ""
 
+    def on_grid(self, grid: np.ndarray | None) -> Run:
+        """The same with its solution given at other times."""
+        if grid is self.grid:
+            return self
+        return Run(self.model, self.system, self.method, self.task, grid, self.save, self.reason)
+
     def carried_out(
         self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
     ) -> Solution:

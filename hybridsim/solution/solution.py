@@ -299,15 +299,13 @@ class Solution(InTables):
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
         self._require_events()
-        model = self.model
-        known = [a.name for a in self._system.automata] + [m.name for m in model.monitors]
-        known += [s.name for s in model.schedules] + [i.name for i in model.inputs]
-        if component not in known:
+        if component not in self._system.heard:
+            known = list(self._system.heard)
             raise UsageError(
                 f"the model has no component, monitor or schedule {component!r}",
                 remedy=nearest(component, known, kind="names"),
             )
-        found = [b.times[b.chosen(component, kind)] for b in self._trajectory.occurrences.blocks]
+        found = [b.times_of(component, kind) for b in self._trajectory.occurrences.blocks]
         return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
 
     @property

@@ -200,8 +200,8 @@ def test_events_out_of_arrays(run: hs.Solution) -> None:
         assert block.times.tolist() == [float(o.instant) for o in every]
         assert block.until == every[-1].instant
         for component, kind in (("f", None), ("f", "transition"), ("f", "monitor"), ("kick", None)):
-            wanted = [o.component == component and kind in (None, o.kind) for o in every]
-            assert block.chosen(component, kind).tolist() == wanted
+            wanted = [float(o.instant) for o in every if o.component == component and kind in (None, o.kind)]
+            assert block.times_of(component, kind).tolist() == wanted
         rest = block.since(len(block) // 2)
         assert [repr(o) for o in rest] == [repr(o) for o in every[len(block) // 2 :]]
     times = [e.t for e in run.events if e.component == "f"]

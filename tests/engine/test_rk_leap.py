@@ -216,12 +216,15 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
 
 def test_a_segment_too_long_for_any_room_is_left_to_the_general_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """Again and again, and the room does not grow for it."""
-    model = hs.Model(
-        "spring",
-        states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")],
-        schedules=[hs.Schedule("tick", period=50.0)],
-    )
-    whole = hs.simulate(model, (0, 200), integrator="dop853", rtol=1e-12)
+
+    def spring() -> hs.Model:
+        return hs.Model(
+            "spring",
+            states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")],
+            schedules=[hs.Schedule("tick", period=50.0)],
+        )
+
+    whole = hs.simulate(spring(), (0, 200), integrator="dop853", rtol=1e-12)
     monkeypatch.setattr(leaper, "_ROOM", 0)
     monkeypatch.setattr(leaper, "_FEWEST", 4)
     monkeypatch.setattr(leaper, "_LONGEST", 0)
@@ -233,6 +236,6 @@ def test_a_segment_too_long_for_any_room_is_left_to_the_general_way(monkeypatch:
         made.append(self)
 
     monkeypatch.setattr(leaper.Leaper, "_renew", noted)
-    cramped = hs.simulate(model, (0, 200), integrator="dop853", rtol=1e-12)
+    cramped = hs.simulate(spring(), (0, 200), integrator="dop853", rtol=1e-12)
     assert {one.steps for one in made} == {4}
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)

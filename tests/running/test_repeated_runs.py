@@ -11,6 +11,8 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.recent import system_of
+from hybridsim.integrators.registry import registered
+from hybridsim.integrators.scipy_solvers import ScipyRK45
 
 SPAN = (0, 0.06)
 METHODS = ["exact", "taylor", "dop853", "scipy-rk45", "rk4-dichotomy"]
@@ -154,3 +156,87 @@ def test_a_sweep_in_threads_is_the_sweep_in_turn(integrator: str) -> None:
     for thread in threads:
         thread.join()
     assert found == in_turn
+
+
+# -- the same arguments again ------------------------------------------------------------------------------------
+
+
+def test_the_same_words_find_the_run_that_was_prepared(model: hs.Model) -> None:
+    """Only for plain numbers and words; times of output are not among them, and may differ."""
+    kept = system_of(model).runs
+    first = hs.simulate(model, SPAN, integrator="exact", save="events")
+    assert len(kept) == 1
+    again = hs.simulate(model, SPAN, integrator="exact", save="events")
+    assert len(kept) == 1 and again._run is first._run and again is not first
+    assert again.stats["compile_time"] == 0.0
+    assert [e.t for e in again.events] == [e.t for e in first.events]
+    for other in ({"save": "all"}, {"rtol": 1e-8}, {"max_step": 1.0}):
+        hs.simulate(model, SPAN, **{"integrator": "exact", "save": "events"} | other)
+    assert len(kept) == 4
+    for not_plain in ({"x0": {"v": 0.1}}, {"z0": {"f": "stick"}}, {"limits": {"events": 3}}):
+        hs.simulate(model, SPAN, integrator="exact", **not_plain)
+    hs.simulate(model, list(SPAN), integrator="exact")
+    hs.simulate(model, SPAN, integrator="taylor", atol=[1e-12, 1e-12])
+    assert len(kept) == 4
+
+
+def test_the_times_of_output_are_those_of_each_call(model: hs.Model) -> None:
+    grids = [np.linspace(0.0, 0.06, m) for m in (3, 7, 5)]
+    runs = [hs.simulate(model, SPAN, integrator="exact", t_eval=grid) for grid in grids]
+    plain = hs.simulate(model, SPAN, integrator="exact")
+    assert [run.t.tolist() for run in runs] == [grid.tolist() for grid in grids]
+    assert [run.y.tolist() for run in runs] == [plain(grid).tolist() for grid in grids]
+    assert len(plain.t) > 7
+    with pytest.raises(hs.UsageError, match="t_eval does not lie within"):
+        hs.simulate(model, SPAN, integrator="exact", t_eval=[0.0, 1.0])
+
+
+def test_what_equals_a_number_and_is_none_is_refused_every_time(model: hs.Model) -> None:
+    hs.simulate(model, (0.0, 1.0), integrator="exact", max_step=1.0, save=1.0)
+    for wrong in ({"max_step": True}, {"save": True}):
+        with pytest.raises(hs.UsageError, match="is True"):
+            hs.simulate(model, (0.0, 1.0), integrator="exact", **{"max_step": 1.0, "save": 1.0} | wrong)
+    with pytest.raises(hs.UsageError, match="a time of t_span is True"):
+        hs.simulate(model, (0.0, True), integrator="exact", max_step=1.0, save=1.0)
+
+
+def test_a_name_that_means_another_class_is_another_run(model: hs.Model) -> None:
+    class Mine(ScipyRK45):
+        name = "mine"
+
+    class Yours(ScipyRK45):
+        name = "mine"
+
+    for cls in (Mine, Yours, Mine):
+        with registered(cls) as name:
+            assert type(hs.simulate(model, SPAN, integrator=name)._run.method) is cls
+    with pytest.raises(hs.UsageError, match="there is no integrator 'mine'"):
+        hs.simulate(model, SPAN, integrator="mine")
+
+
+def test_functions_that_change_their_answers_are_asked_each_time() -> None:
+    """What they return at the start is looked at before every run."""
+    force = [1.0]
+
+    def flow(t: float, x: np.ndarray, p: np.ndarray) -> list[float]:
+        return [force[0]] if force[0] else []
+
+    model = hs.Model("changing", states={"x": 0.0}, flow=flow)
+    assert hs.simulate(model, (0, 1), integrator="scipy-rk45")(1.0)[0] == pytest.approx(1.0)
+    force[0] = 0.0
+    with pytest.raises(hs.UsageError):
+        hs.simulate(model, (0, 1), integrator="scipy-rk45")
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_a_run_of_events_alone_goes_on_over_many_leaps(model: hs.Model, integrator: str) -> None:
+    """Of more segments than one call of the compiled loop has room for; the end is all that is kept of them."""
+    span, keywords = (0.0, 12.0), {"integrator": integrator, "save": "events"}
+    whole = hs.simulate(model, span, **keywords)
+    assert len(whole.events) > 3000
+    for events in (3, 1100, 2050):
+        part = hs.simulate(model, span, **keywords, limits={"events": events})
+        assert part.status == "limit"
+        rest = part.resume()
+        assert rest.status == "finished" and [repr(e) for e in rest.events] == [repr(e) for e in whole.events]
+        assert rest.t.tolist() == whole.t.tolist() == [12.0] and rest.y.tolist() == whole.y.tolist()
