@@ -224,7 +224,7 @@ def test_functions_that_change_their_answers_are_asked_each_time() -> None:
     model = hs.Model("changing", states={"x": 0.0}, flow=flow)
     assert hs.simulate(model, (0, 1), integrator="scipy-rk45")(1.0)[0] == pytest.approx(1.0)
     force[0] = 0.0
-    with pytest.raises(hs.UsageError):
+    with pytest.raises(hs.ModelError, match="returned list of shape"):
         hs.simulate(model, (0, 1), integrator="scipy-rk45")
 
 
