@@ -185,12 +185,12 @@ class TapeBuilder:
             if pair not in known:
                 known[pair] = self._op(rows, SINCOS, a[0])
             return known[pair] + (0 if kind is sp.sin else 1)
-        if kind in (sp.sinh, sp.cosh):
+        if isinstance(e, (sp.sinh, sp.cosh)):
             pair = ("sinhcosh", e.args[0])
             if pair not in known:
                 known[pair] = self._op(rows, SINHCOSH, a[0])
-            return known[pair] + (0 if kind is sp.sinh else 1)
-        if kind is sp.tanh:
+            return known[pair] + (0 if isinstance(e, sp.sinh) else 1)
+        if isinstance(e, sp.tanh):
             # (e^u - e^-u)/(e^u + e^-u) overflows; 1 - 2/(e^{2u} + 1) loses digits at 0: use y' = (1 - y^2) u'
             return self._op(rows, TANGENT, a[0], 1)
         if kind is sp.log:
