@@ -48,8 +48,9 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         ahead = system.flow(s + step, x + step * rates, p, z)
         if not np.isfinite(ahead).all():
             names = [system.names[i] for i in np.flatnonzero(~np.isfinite(ahead))]
-            power = power_without_value(system, names, float(here) + step, x + step * rates)
-            return _said(system, "just after, the rate of", names, x, z) + power
+            why = power_without_value(system, names, float(here) + step, x + step * rates)
+            why = why or _of_function(system, s + step, x + step * rates, p, z)
+            return _said(system, "just after, the rate of", names, x, z) + why
         guards = system.rows(
             "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
         )[0]
@@ -71,12 +72,20 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
     if not names:
         return ""
     t = float(p[system.layout.origin_at]) + s
-    return _said(system, "the rate of", names, x, z) + _cause(system, names, t, x)
+    why = _cause(system, names, t, x) or _of_function(system, s, x, p, z)
+    return _said(system, "the rate of", names, x, z) + why
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
     """What has no value in the rates of some states; empty where that cannot be told."""
     return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
+
+
+def _of_function(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
+    """What a Python function returns where a rate has no value; empty for a model of expressions."""
+    from hybridsim.engine.python_code import PythonCode
+
+    return system.code.flow_without_value(s, x, p, z) if isinstance(system.code, PythonCode) else ""
 
 
 def _steep(
