@@ -18,6 +18,11 @@ def held(system: System, z: np.ndarray) -> str:
     return f"{', '.join(names)} held: many motions come to rest in the same state" if names else ""
 
 
+def said_of_direction(t0: float, t1: float) -> str:
+    """What is to be known of a run backward that did not reach its end, for whom did not mean to run so."""
+    return f"; this run goes backward in time, from t = {t0!r} to {t1!r}: give t_span the other way round to go forward"
+
+
 def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
     """Why a guard of a component without a surface cannot be crossed backward; empty if none fired."""
     for g in fired:

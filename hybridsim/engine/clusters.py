@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.engine.program_names import declared_name
 from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
 
 if TYPE_CHECKING:
     from hybridsim.engine.lower import Lowering
@@ -29,9 +30,7 @@ def normal_loads(
             guards = [lowering.inline(lowering.convert(g.expr), definitions) for g in m.guards]
             used = {u for e in (*values.values(), *guards) for u in e.free_symbols} & normal.keys()
             for u in used:
-                slopes = {
-                    n: lowering.sp.simplify(lowering.sp.diff(e, u)) for n, e in values.items() if e.has(u)
-                }
+                slopes = {n: simplified(lowering.sp.diff(e, u)) for n, e in values.items() if e.has(u)}
                 own = unknown.get(c)
                 if set(slopes) - {declared_name(own) if own is not None else None} or any(
                     e.free_symbols & set(unknown.values()) for e in slopes.values()

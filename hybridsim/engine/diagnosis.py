@@ -48,8 +48,9 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         ahead = system.flow(s + step, x + step * rates, p, z)
         if not np.isfinite(ahead).all():
             names = [system.names[i] for i in np.flatnonzero(~np.isfinite(ahead))]
-            power = power_without_value(system, names, float(here) + step, x + step * rates)
-            return _said(system, "just after, the rate of", names, x, z) + power
+            why = power_without_value(system, names, float(here) + step, x + step * rates)
+            why = why or _of_function(system, s + step, x + step * rates, p, z)
+            return _said(system, "just after, the rate of", names, x, z) + why
         guards = system.rows(
             "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
         )[0]
@@ -59,6 +60,8 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
             # what a mode holds has the rate of its constraint: the one that is declared is in the guards
             held = [system.names[i] for g in without for i in system.pins.get(int(system.owner[g]), ())]
             return _said(system, "just after,", titles, x, z) + _cause(system, held, float(here), x)
+    if power := _power_without_series(system, x, x + reach * rates):
+        return power
     return _steep(system, record, s, x, p, z, rates, first, reach)
 
 
@@ -69,12 +72,20 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
     if not names:
         return ""
     t = float(p[system.layout.origin_at]) + s
-    return _said(system, "the rate of", names, x, z) + _cause(system, names, t, x)
+    why = _cause(system, names, t, x) or _of_function(system, s, x, p, z)
+    return _said(system, "the rate of", names, x, z) + why
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
     """What has no value in the rates of some states; empty where that cannot be told."""
     return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
+
+
+def _of_function(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
+    """What a Python function returns where a rate has no value; empty for a model of expressions."""
+    from hybridsim.engine.python_code import PythonCode
+
+    return system.code.flow_without_value(s, x, p, z) if isinstance(system.code, PythonCode) else ""
 
 
 def _steep(
@@ -135,6 +146,35 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
         if value is not None and value < 0.0:  # None: it depends on what a mode sets
             remedy = f"to go on beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
             return f": '{write(node)}' has no value for {write(base)} < 0; {remedy}, or end the run there by a monitor"
+    return ""
+
+
+def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> str:
+    """The whole power under a name that has a value beyond zero and no Taylor series there, and what to write."""
+    from hybridsim.expr.grammar import WHOLE_POWERS
+    from hybridsim.expr.write import write
+    from hybridsim.model.meanings import Meanings
+    from hybridsim.model.nonsmooth import roots_in
+    from hybridsim.model.one_sided import number_of
+
+    model = system.model
+    if model.flow is not None:
+        return ""
+    meanings, numbers = Meanings(model), model.parameter_values()
+    points = [numbers | dict(zip(system.names, point.tolist(), strict=True)) for point in (x, ahead)]
+    for state in model.states:
+        for node, base, _ in roots_in(state.der, meanings):
+            power = number_of(node.right, numbers, meanings.lookup) if isinstance(node, ast.BinOp) else None
+            if power is None or power != round(power) or power in WHOLE_POWERS:
+                continue
+            values = [number_of(base, point, meanings.lookup) for point in points]
+            if any(value is not None and value <= 0.0 for value in values):
+                text, place = write(base), state.der.place or state.place
+                return (
+                    f"{place.prefix if place else ''}'{write(node)}' in the rate of {state.name} has no Taylor series "
+                    f"at {text} <= 0, as its exponent is {power:g} under a name; write the number itself, or choose an "
+                    "integrator without series, such as dop853"
+                )
     return ""
 
 

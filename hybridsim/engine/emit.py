@@ -320,7 +320,7 @@ class Emitter:
         program = self.program
         names = [*program.derivatives, *guards, *(n for _, n in program.surfaces)]
         names += [f"monitor_{k}" for k in range(len(program.model.monitors))]
-        builder = TapeBuilder()
+        builder = TapeBuilder(self._fixed())
         shared: dict[Any, int] = {}
         parts: list[Any] = []
         for item in needed(program.items, names):
@@ -345,6 +345,14 @@ class Emitter:
             "constants": tuple((r, *value) for value, r in builder.constants.items()),
             "parameters": tuple((r, int(w[2:-1])) for r, w in sources.items() if w.startswith("p[")),
         }
+
+    def _fixed(self) -> set[str]:
+        """Names of parameters, and of what is made of them alone."""
+        found = {user(q.name) for q in self.program.model.parameters}
+        for item in self.program.items:
+            if isinstance(item, Assign) and {s.name for s in item.expression.free_symbols} <= found:
+                found.add(item.name)
+        return found
 
     def _branch(self, builder: TapeBuilder, item: Switch, mode: int) -> tuple[Any, ...]:
         return tuple(builder.rows([(a.name, a.expression) for a in item.branches[mode]], {}))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
 
 if TYPE_CHECKING:
     from hybridsim.engine.lower import Lowering
@@ -169,7 +170,7 @@ class HeldStates:
                 return False
             x = self.states[self._uses((c, 0))[0]]
             ratio = sp.diff(one, x) / sp.diff(other, x)
-        apart = sp.simplify(one - ratio * other)
+        apart = simplified(one - ratio * other)
         return bool(apart != 0) and (apart.free_symbols | ratio.free_symbols) <= self.lowering.parameters
 
     def _acyclic(self, pins: dict[Held, int]) -> bool:
@@ -208,7 +209,7 @@ class HeldStates:
 
     def _pinned(self, c: Held, x: Any, name: str, raw: Any, before: Any) -> Switch:
         sp, s = self.lowering.sp, self.surfaces[c]
-        value = sp.simplify(-sp.expand(s).coeff(x, 0) / sp.diff(s, x))
+        value = simplified(-s.subs(x, 0) / sp.diff(s, x))
         return self._in_hold(c[0], name, _where_pinned(sp, value, raw), before)
 
     def holding(self, i: int) -> list[int]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
-from hybridsim.engine.backward import cross_backward, has_no_past, held
+from hybridsim.engine.backward import cross_backward, has_no_past, held, said_of_direction
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import in_the_way
 from hybridsim.engine.gathering import behind, closed_now, holds_several
@@ -90,6 +90,8 @@ class ModeLoop:
             self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
             self.record.stop_early("interrupted", "", self.task.t0)
+        if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
+            self.record.message += said_of_direction(self.task.t0, self.task.t1)
         if self.adopted == self.origin:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice

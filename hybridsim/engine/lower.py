@@ -18,6 +18,7 @@ from hybridsim.engine.program_names import declared_name, user
 from hybridsim.engine.second_order import Partner, attraction, partners
 from hybridsim.engine.ties import Tie, help_of_ties, ties, without_share
 from hybridsim.errors import ModelError, Place
+from hybridsim.expr.simplify import is_short, simplified
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.switching import ATTRACTION
 
@@ -293,7 +294,7 @@ class Lowering:
                 if slope != 0:
                     total += slope * self._inline_unknown(d, definitions | blends, all_unknown)
             for d in order:
-                effect[c, d] = sp.simplify(sp.diff(total, unknown[d]))
+                effect[c, d] = simplified(sp.diff(total, unknown[d]))
                 if effect[c, d].free_symbols & all_unknown:
                     raise nonlinear(self, c, d, effect[c, d].free_symbols & all_unknown)
             rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
@@ -356,7 +357,7 @@ class Lowering:
             if c in self.never_held:
                 return [branches(c, unknown[c].name, sp.Integer(0))]
             value = -rate[c] / effect[c, c]
-            if value.count_ops() < 200:
+            if value.count_ops() < 200 and is_short(value):
                 value = sp.expand(sp.cancel(sp.together(value)))
             value = value.xreplace({sp.zoo: sp.nan})  # where a sign in the effect is zero: it cannot be held
             return [branches(c, unknown[c].name, value)]
@@ -487,7 +488,6 @@ class Lowering:
         surface = self.components[c].surface
 
         def reduced(e: Any) -> Any:
-            exact = sp.nsimplify(self.convert(e), rational=True)
-            return sp.factor(sp.simplify(exact))
+            return simplified(sp.nsimplify(self.convert(e), rational=True))
 
         return c, reduced(surface.jump_above), reduced(surface.jump_below)

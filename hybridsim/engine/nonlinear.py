@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.engine.program_names import declared_name
 from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
 
 if TYPE_CHECKING:
     from hybridsim.engine.lower import Lowering
@@ -16,7 +17,7 @@ def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any])
     for c, u in unknown.items():
         for x, rate in zip(lowering.states, rates, strict=True):
             component = lowering.components[c]
-            if u in lowering.sp.simplify(lowering.sp.diff(rate, u)).free_symbols:
+            if u in simplified(lowering.sp.diff(rate, u)).free_symbols:
                 name = declared_name(u)
                 raise ModelError(
                     f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",

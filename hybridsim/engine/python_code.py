@@ -94,6 +94,25 @@ class PythonCode:
         last, self.forms.failures.last = self.forms.failures.last, ""
         return last
 
+    def flow_without_value(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
+        """What a flow returns where a rate is no finite number, in words with its name.
+
+        Empty where it raises: that is told by `report`, also where compiled code does not (it divides by zero).
+        """
+        function, given = self.forms.flow_of(z), self.forms.arguments(s, x, p)
+        try:
+            with np.errstate(all="ignore"):  # it looks for what is no number
+                found = rates(function, self.parts.states, *given)
+        except Exception as fault:  # a user's code may raise anything
+            self.forms.failures.note(function, given[0], fault, True)
+            return ""
+        if np.isfinite(found).all():
+            return ""
+        shown = ", ".join(f"{rate:g}" for rate in found)
+        return (
+            f": the function {function_name(function)} returned ({shown}); look there for a division by zero"
+        )
+
     @property
     def refused_in_words(self) -> str:
         """Why the functions are not compiled."""

@@ -114,9 +114,7 @@ class Forms:
 
     def flow(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
         """Rates in the modes z."""
-        parts = self.parts
-        mode = z[parts.component] if parts.component >= 0 else -1
-        function = next(f for m, f in parts.flows if m in (mode, -1))
+        parts, function = self.parts, self.flow_of(z)
         t, state, named = self.arguments(s, x, p)
         try:
             out[: parts.states] = rates(function, parts.states, t, state, named).tolist()
@@ -125,6 +123,11 @@ class Forms:
             out[: parts.states] = [math.nan] * parts.states
             return 1
         return 0
+
+    def flow_of(self, z: Any) -> Function:
+        """The function that gives the rates in the modes z."""
+        mode = z[self.parts.component] if self.parts.component >= 0 else -1
+        return next(f for m, f in self.parts.flows if m in (mode, -1))
 
     def row(self, scalars: tuple[Scalar, ...]) -> Function:
         """Form of several numbers; those of modes that are not active are 1."""

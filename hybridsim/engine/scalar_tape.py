@@ -93,9 +93,11 @@ def is_same(first: Expression, second: Expression, at_zero: str) -> bool:
     """Whether two expressions agree, by algebra, where one of their arguments is zero."""
     import sympy as sp
 
+    from hybridsim.expr.simplify import simplified
+
     names = tuple(sorted(first.names | second.names | {at_zero}))
     difference = _form(first, names, "") - _form(second, names, "")
-    return bool(sp.simplify(difference.subs(sp.Symbol(f"v_{at_zero}", real=True), 0)) == 0)
+    return bool(simplified(difference.subs(sp.Symbol(f"v_{at_zero}", real=True), 0)) == 0)
 
 
 def _form(expression: Expression, names: Sequence[str], positive: str) -> Any:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.engine.program import Assign, Item, Switch
 from hybridsim.engine.program_names import user
+from hybridsim.expr.simplify import simplified
 from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def partners(
 
     rate : of each surface's function without any relay. effect : of each relay (second) on each such rate (first).
     """
-    sp, found = lowering.sp, {}
+    found = {}
     for c in sorted(lowering.never_held):
         if any(effect[c, d] != 0 for d in surfaces):
             continue
@@ -56,7 +57,7 @@ def partners(
             is_relay = lowering.components[d].surface.unique
             if not is_relay or d in lowering.never_held or effect[d, c] == 0:
                 continue
-            factor = sp.simplify(written_out / surfaces[d])
+            factor = simplified(written_out / surfaces[d])
             if factor.is_number and factor.is_real and factor != 0:
                 found[c] = Partner(d, factor)
                 break

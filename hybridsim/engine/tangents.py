@@ -26,6 +26,7 @@ from hybridsim.engine.tape import (
     ADD,
     ANGLE,
     DIV,
+    EQUAL,
     EXP,
     INTEGRAL,
     MAX,
@@ -95,8 +96,11 @@ def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
         _combine(D, out, 1.0 if takes_a else 0.0, a, 0.0 if takes_a else 1.0, b)
     elif op == SELECT:
         source = b if u != 0.0 else c
-        _combine(D, out, 1.0, source, 0.0, source)
-    else:  # comparisons and logic
+        for j in range(D.shape[1]):  # what is so at one point alone is not so beside it
+            D[out, j] = D[c, j] if u != 0.0 and D[a, j] != 0.0 else D[source, j]
+    elif op == EQUAL:
+        _combine(D, out, 1.0, a, -1.0, b)
+    else:  # other comparisons and logic
         _combine(D, out, 0.0, a, 0.0, a)
 
 

@@ -7,8 +7,10 @@ generated source, and run by `hybridsim.engine.jets` to get Taylor coefficients 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Any
+
+from hybridsim.expr.grammar import WHOLE_POWERS
 
 # Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
 COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
@@ -22,9 +24,15 @@ _MAX_INTEGER_POWER = 4096
 
 
 class TapeBuilder:
-    """Turns SymPy expressions over named registers into rows; equal subexpressions share a register."""
+    """Turns SymPy expressions over named registers into rows; equal subexpressions share a register.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    fixed : names of what is constant in a segment: parameters, and what is made of them alone.
+    """
+
+    def __init__(self, fixed: Set[str] = frozenset()) -> None:
+        self.fixed = fixed
         self.registers: dict[str, int] = {}  # name -> register
         self.constants: dict[tuple[float, float], int] = {}  # value and bound of its error -> register
         self.count = 0
@@ -121,7 +129,26 @@ class TapeBuilder:
             power = self._products(source, abs(n), known, rows)
             return power if n > 0 else self._op(rows, DIV, self._constant(1.0), power)
         logarithm = self._op(rows, INTEGRAL, source, source, LOG)
-        return self._op(rows, EXP, self._op(rows, MUL, self._emit(exponent, known, rows), logarithm))
+        power = self._op(rows, EXP, self._op(rows, MUL, self._emit(exponent, known, rows), logarithm))
+        if (
+            exponent.is_number
+            or not {s.name for s in exponent.free_symbols} <= self.fixed
+            or base.is_positive
+        ):
+            return power
+        return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
+
+    def _whole(
+        self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
+    ) -> int:
+        """A power whose exponent may turn out to be whole: it has a value at 0 and below then."""
+        one = self._constant(1.0)
+        for n in WHOLE_POWERS:
+            product = self._products(source, abs(n), known, rows) if n else one
+            whole = self._op(rows, DIV, one, product) if n < 0 else product
+            is_so = self._op(rows, EQUAL, exponent, self._constant(float(n)))
+            power = self._op(rows, SELECT, is_so, whole, power)
+        return power
 
     def _products(self, source: int, n: int, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         """A register to the power n >= 1 by squaring."""
@@ -185,12 +212,12 @@ class TapeBuilder:
             if pair not in known:
                 known[pair] = self._op(rows, SINCOS, a[0])
             return known[pair] + (0 if kind is sp.sin else 1)
-        if kind in (sp.sinh, sp.cosh):
+        if isinstance(e, (sp.sinh, sp.cosh)):
             pair = ("sinhcosh", e.args[0])
             if pair not in known:
                 known[pair] = self._op(rows, SINHCOSH, a[0])
-            return known[pair] + (0 if kind is sp.sinh else 1)
-        if kind is sp.tanh:
+            return known[pair] + (0 if isinstance(e, sp.sinh) else 1)
+        if isinstance(e, sp.tanh):
             # (e^u - e^-u)/(e^u + e^-u) overflows; 1 - 2/(e^{2u} + 1) loses digits at 0: use y' = (1 - y^2) u'
             return self._op(rows, TANGENT, a[0], 1)
         if kind is sp.log:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridsim.engine.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
 
 if TYPE_CHECKING:
     from hybridsim.engine.lower import Lowering
@@ -35,12 +36,12 @@ def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
             if c == p or surface.is_unilateral or surface.unique:
                 continue
             slopes = [(sp.diff(rate, x), sp.diff(velocity, x)) for x in lowering.states]
-            factors = {sp.simplify(a / b) for a, b in slopes if b != 0}
+            factors = {simplified(a / b) for a, b in slopes if b != 0}
             if len(factors) != 1 or any(a != 0 for a, b in slopes if b == 0):
                 continue
             (factor,) = factors
             if factor.is_Number and factor != 0:
-                apart = sp.simplify(rate - factor * velocity)
+                apart = simplified(rate - factor * velocity)
                 found.append(Tie(p, c, factor, apart == 0))
     return found
 

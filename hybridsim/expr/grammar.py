@@ -75,5 +75,8 @@ MAX_DERIVED_DEPTH = 140
 MAX_DERIVED_NODES = 20_000
 # x**64 spans the doubles already for x in [1e-5, 1e5]; larger constant powers are slips or bombs.
 MAX_POWER = 64
+# Whole values of a parameter for which a power with it as exponent is a product, and has a value at 0 and below. Three
+# products, as the dearest needs, cost as much as exp(p log u) does, which is there for all other values.
+WHOLE_POWERS = range(-2, 5)
 # Whole numbers above this are not exact as doubles.
 MAX_INTEGER = 2**53

@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy
 
+from hybridsim.expr import hyperbolic
 from hybridsim.expr.parse import Expression, require_names
 
 
@@ -39,9 +40,9 @@ _FUNCTIONS: dict[str, Any] = {
     "acos": sympy.acos,
     "atan": sympy.atan,
     "atan2": sympy.atan2,
-    "sinh": sympy.sinh,
-    "cosh": sympy.cosh,
-    "tanh": sympy.tanh,
+    "sinh": hyperbolic.sinh,
+    "cosh": hyperbolic.cosh,
+    "tanh": hyperbolic.tanh,
     "exp": exp,
     "log": sympy.log,
     "sqrt": sympy.sqrt,

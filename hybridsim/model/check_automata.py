@@ -37,6 +37,9 @@ def _component(scope: Scope, component: Component) -> None:
         scope.unknown(component, f"{what}: no initial mode", component.initial, names, "modes")
     if component.initial is None and component.surface is None:
         remedy = f"write initial = true in one of: {', '.join(names)}."
+        if not (component.place and component.place.file):
+            remedy = f"give it as hs.Component({component.name!r}, [...], initial={names[0]!r}), or any of: "
+            remedy += f"{', '.join(names)}."
         scope.fail(component, f"{what} does not say in which of its {len(names)} modes it starts", remedy)
     _surface(scope, component, what, names)
     _limit(scope, component, what, names)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import Place
+from hybridsim.expr.grammar import WHOLE_POWERS
 from hybridsim.expr.write import write
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.one_sided import names_of, number_of
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VelocityPower:
-    """A root or a power whose exponent is not written as a whole number, of what is zero where a contact sticks.
+    """A root or a power, of what is zero where a contact sticks, that is no product there.
+
+    Its exponent is no whole number, or a parameter with a larger one than such powers are made products for.
 
     Parameters
     ----------
@@ -126,6 +129,8 @@ def _judged(
     for one in candidates:
         power = 0.5 if one.exponent is None else number_of(one.exponent, numbers, meanings.lookup)
         is_whole = power is not None and power == round(power)
+        if is_whole and power in WHOLE_POWERS:
+            continue
         for family, contact in one.families.items():
             if _vanishes(one.base, family, numbers, meanings):
                 is_signed = not (one.is_force or one.is_conditional or is_whole)

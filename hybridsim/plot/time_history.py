@@ -20,9 +20,10 @@ from hybridsim.plot.scale import label_axis
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from hybridsim.model import Model
     from hybridsim.solution import Event, Solution
 
-_MOST_QUANTITIES = 4  # drawn unasked
+_MOST_QUANTITIES = 4  # drawn unasked, and as many outputs
 _MOST_MARKS = 150  # event lines; closer together they would be a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is not seen
 _ROW, _STRIP = 1.75, 0.34  # inches
@@ -54,13 +55,13 @@ def time_history(
 
     Parameters
     ----------
-    quantities : names of states and outputs; the first four of them if not given.
+    quantities : names of states and outputs; the first four of them, and the first four outputs, if not given.
     t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
     axes : where to draw: one for each quantity, one more if the model has components; new if not given.
     """
     refuse_arrays(solution)
     model = solution.model
-    names = list(units_of(model))[:_MOST_QUANTITIES] if quantities is None else list(quantities)
+    names = _unasked(model) if quantities is None else list(quantities)
     units = [unit_of(solution, name) for name in names]
     window = window_of(solution, t_span)
     pieces = pieces_of(solution, names, window)
@@ -80,6 +81,13 @@ def time_history(
     label_axis(lowest.xaxis, "t", time_unit(model), window.t0, window.t1)
     style.head(history.quantities[0], model.title or model.name, window.note)
     return history
+
+
+def _unasked(model: Model) -> list[str]:
+    """What is drawn without being asked for: what was declared first, and what was declared to be looked at."""
+    names = list(units_of(model))[:_MOST_QUANTITIES]
+    outputs = [output.name for output in model.outputs][:_MOST_QUANTITIES]
+    return list(dict.fromkeys([*names, *outputs]))
 
 
 def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> TimeHistoryAxes:

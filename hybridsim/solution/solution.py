@@ -365,7 +365,8 @@ class Solution(InTables):
     def message(self) -> str:
         """One sentence about how the run ended."""
         why = f", chosen because {self._reason}" if self._reason else ""
-        return self._trajectory.message or f"reached t = {self.t_end!r} with {self.integrator}{why}"
+        how = " backward in time" if self.t_end < self.t_start else ""
+        return self._trajectory.message or f"reached t = {self.t_end!r}{how} with {self.integrator}{why}"
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -58,3 +58,12 @@ def test_what_cannot_be_is_named(make: Callable[[], object], says: str) -> None:
     with pytest.raises(UsageError, match=says) as caught:
         make()
     assert caught.value.remedy
+
+
+def test_a_component_without_a_start_mode_is_told_the_remedy_of_its_language() -> None:
+    modes = [hs.Mode("on"), hs.Mode("off")]
+    model = hs.Model("m", [hs.State("x", 0.0, "1")], components=[hs.Component("relay", modes)])
+    with pytest.raises(hs.ModelError) as caught:
+        hs.simulate(model, (0.0, 1.0))
+    assert "hs.Component('relay', [...], initial='on')" in str(caught.value)
+    assert "initial = true" not in str(caught.value)

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscillator_model
 
+import hybridsim as hs
 from hybridsim.errors import UsageError
 from hybridsim.plot import friction_loop, phase_portrait, save, time_history
 
@@ -34,6 +35,13 @@ def test_time_history_draws_the_states_and_outputs() -> None:
         t, y = drawn(axes).T
         assert y == pytest.approx(solution(t)[i], nan_ok=True)
     assert {text.get_text() for text in history.modes.get_legend().get_texts()} == {"slip+", "slip-", "stick"}
+
+
+def test_outputs_are_drawn_beside_many_states() -> None:
+    states = [hs.State(f"x{k}", float(k), "0") for k in range(6)]
+    model = hs.Model("many", states, outputs=[hs.Output("total", "x0 + x5")])
+    history = time_history(hs.simulate(model, (0.0, 1.0)))
+    assert [axes.get_ylabel() for axes in history.quantities] == ["x0", "x1", "x2", "x3", "total"]
 
 
 def test_long_runs_show_their_last_periods_and_say_so() -> None:

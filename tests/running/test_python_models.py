@@ -404,3 +404,28 @@ def test_a_function_of_other_arguments_is_told_what_it_is_called_with() -> None:
     model = hs.Model("turn", states={"x": 1.0, "v": 0.0}, flow=lambda t, x: (x[1], -x[0]))
     with pytest.raises(hs.ModelError, match=r"takes \(t, x\), and is called with \(t, x, p\)"):
         hs.simulate(model, (0, 1))
+
+
+def raising(t: float, x: Any, p: Any) -> Any:
+    return -1.0, 1.0 / max(x[0], 0.0)  # of a plain 0
+
+
+def returning(t: float, x: Any, p: Any) -> Any:
+    return -1.0, 1.0 / (0.5 * (x[0] + abs(x[0])))  # of a zero of NumPy's
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "scipy-rk45"])
+@pytest.mark.parametrize(
+    ("flow", "told"),
+    [
+        (raising, "the function raising raised ZeroDivisionError"),
+        (returning, "the function returning returned (-1, inf); look there for a division by zero"),
+    ],
+)
+def test_a_division_by_zero_in_a_flow_is_told_with_the_name_of_the_function(
+    integrator: str, flow: Any, told: str
+) -> None:
+    """Compiled code raises at neither: what Python says of the same call is told."""
+    sol = hs.simulate(hs.Model("drained", {"h": 1.0, "y": 0.0}, flow=flow), (0, 2), integrator=integrator)
+    assert sol.status == "step-failure"
+    assert told in sol.message

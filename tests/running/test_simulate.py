@@ -142,3 +142,13 @@ def test_a_guard_that_is_negative_from_the_start_is_named_with_its_value() -> No
     sol = hs.simulate(model, (0, 1))
     assert sol.status == "cascade"
     assert "Guard floor is -1.5 in flight before and after" in sol.message and "turn its sign" in sol.message
+
+
+def test_a_run_backward_says_so() -> None:
+    sol = hs.simulate(hs.load("dfcs"), (1.0, 0.0))
+    assert sol.status == "backward-nonunique"
+    assert (
+        "this run goes backward in time, from t = 1.0 to 0.0: give t_span the other way round" in sol.message
+    )
+    free = hs.simulate(hs.Model("decay", [hs.State("x", 1.0, "-x")]), (1.0, 0.0))
+    assert free.message.startswith("reached t = 0.0 backward in time with ")
