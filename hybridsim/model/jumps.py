@@ -16,7 +16,7 @@ from zlib import crc32
 
 from hybridsim.expr import of_tree, parse
 from hybridsim.expr.grammar import TIME
-from hybridsim.expr.polynomial import Polynomial, polynomial, tree_of
+from hybridsim.expr.polynomial import Monomial, Polynomial, polynomial, tree_of
 from hybridsim.expr.rebuild import with_names
 from hybridsim.model.component import Choice, Component, Corner, Guard, Mode
 from hybridsim.model.meanings import Meanings
@@ -113,7 +113,7 @@ class Borders:
         rows = [self._slopes(other) for other in (*others, argument)]
         for other, row in zip(others, rows[:-1], strict=True):
             if row is not None and rows[-1] is not None and _rank([row, rows[-1]]) < 2:
-                return "" if apart_by(self._meanings, other, argument)[1] else "it may meet a border along it"
+                return "" if apart_by(self._meanings, other, argument)[2] else "it may meet a border along it"
         known = [row for row in rows if row is not None]
         distinct = [row for k, row in enumerate(known) if all(_rank([row, other]) > 1 for other in known[:k])]
         return (
@@ -154,30 +154,55 @@ def _rank(rows: list[list[Fraction]]) -> int:
     return rank
 
 
-def apart_by(meanings: Meanings, first: ast.expr, second: ast.expr) -> tuple[Fraction, Polynomial]:
-    """k and the constant c, not zero, of which second = k (first - c); (0, {}) where there are none."""
+def apart_by(
+    meanings: Meanings, first: ast.expr, second: ast.expr
+) -> tuple[Polynomial, Polynomial, Polynomial]:
+    """n, d and g = n first - d second, constant and not zero, of parallel borders; all empty for others.
+
+    n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
+    """
     p, q = (polynomial(meanings.written_out(argument)) for argument in (first, second))
-    common = [m for m in p if m in q and any(name in meanings.moving for name, _ in m)]
-    if common:
-        ratio = q[common[0]] / p[common[0]]
-        apart = {m: p.get(m, Fraction(0)) - q.get(m, Fraction(0)) / ratio for m in {**p, **q}}
-        apart = {m: c for m, c in apart.items() if c}
-        if all(name.isidentifier() and name not in meanings.moving for m in apart for name, _ in m):
-            return ratio, apart
-    return Fraction(0), {}
+
+    def is_constant(one: Polynomial) -> bool:
+        return all(name.isidentifier() and name not in meanings.moving for m in one for name, _ in m)
+
+    moved = [m for m in p if any(name in meanings.moving for name, _ in m)]
+    for other in q if moved else ():
+        shape = _times(other, moved[0], -1)
+        n = {tuple((name, power) for name, power in shape if power > 0): q[other] / p[moved[0]]}
+        d = {tuple((name, -power) for name, power in shape if power < 0): Fraction(1)}
+        if is_constant(n) and is_constant(d):
+            apart: dict[Monomial, Fraction] = {}
+            for one, factor, sign in ((p, n, 1), (q, d, -1)):
+                ((by, size),) = factor.items()
+                for m, c in one.items():
+                    product = _times(m, by)
+                    apart[product] = apart.get(product, Fraction(0)) + sign * size * c
+            apart = {m: c for m, c in apart.items() if c}
+            if is_constant(apart):
+                return n, d, apart
+    return {}, {}, {}
+
+
+def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
+    """The product of a monomial with a power of another."""
+    powers = dict(one)
+    for name, count in other:
+        powers[name] = powers.get(name, 0) + power * count
+    return tuple(sorted((name, count) for name, count in powers.items() if count))
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
     """sign(first)*sign(second) over u = sign(first) and w = sign(second); None where the two are not parallel.
 
-    Where second = k (first - c), the product is s - s e u + e w with s = sign(k) and e = sign(c).
+    With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
+    the value 0, one border is constant, and has the sign that this gives it.
     """
-    ratio, apart = apart_by(meanings, first, second)
-    if not ratio:
+    found = apart_by(meanings, first, second)
+    if not found[0]:
         return None
-    s = ast.Constant(1) if ratio > 0 else ast.UnaryOp(ast.USub(), ast.Constant(1))
-    e = ast.Call(ast.Name("sign", ast.Load()), [tree_of(apart)], [])
-    return with_names(parse("s - s*e*u + e*w").tree, {"s": s, "e": e})
+    signs = [ast.Call(ast.Name("sign", ast.Load()), [tree_of(part)], []) for part in found]
+    return with_names(parse("n*d - d*g*u + n*g*w").tree, dict(zip("ndg", signs, strict=True)))
 
 
 def multiplied(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:

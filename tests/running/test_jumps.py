@@ -53,17 +53,37 @@ def test_whole_fields(integrator: str) -> None:
 
 @pytest.mark.parametrize("integrator", METHODS)
 @pytest.mark.parametrize(
-    "rate", ["-(1 if x + v > d else -1 if x + v < -d else 0)", "-(sign(x + v - d) + sign(v + d + x))/2"]
+    "rate",
+    [
+        "-(1 if x + v > d else -1 if x + v < -d else 0)",
+        "-(1 if k*x + k*v > k*d else -1 if x + v < -d else 0)",
+        "-(sign(x + v - d) + sign(v + d + x))/2",
+    ],
 )
 def test_a_relay_with_a_dead_zone(integrator: str, rate: str) -> None:
     """Full thrust up to x + v = d, none up to -d, and along that x decays by exp(-t)."""
-    built = model(("x", 1.0, "v"), ("v", 0.0, rate), parameters={"d": 0.1})
+    built = model(("x", 1.0, "v"), ("v", 0.0, rate), parameters={"d": 0.1, "k": 0.7})
     sol = run(integrator, built, 6.0)
     first = math.sqrt(1 + 2 * 0.9) - 1
     second = first + 0.2 / first
     assert [e.t for e in sol.events] == pytest.approx([first, second], abs=1e-8)
     x = 1 - first**2 / 2 - 0.2
     assert sol(6.0)[0] == pytest.approx(-0.1 + (x + 0.1) * math.exp(second - 6.0), abs=1e-8)
+
+
+# v falls from 4 at the rate 1 to v = 1, then at 3 where k v < -1, else at 2: over the border at -1/k, if it is below
+@pytest.mark.parametrize(
+    ("k", "end"),
+    [(2.0, -0.5 - 3 * 2.25), (0.5, -2 - 3 * 1.5), (0.0, -5.0), (-0.5, -5.0), (-2.0, 0.5 - 17 / 3)],
+)
+@pytest.mark.parametrize(
+    "rate", ["-(1 if v > d else (3 if k*v < -d else 2))", "-(1 if v > d else (3 if v*k + d < 0 else 2))"]
+)
+def test_parallel_borders_with_a_parameter_as_their_ratio(rate: str, k: float, end: float) -> None:
+    built = model(("v", 4.0, rate), parameters={"d": 1.0, "k": k})
+    sol = hs.simulate(built, (0.0, 6.0), integrator="taylor")
+    assert sol.success and not sol.warnings
+    assert sol(6.0)[0] == pytest.approx(end, abs=1e-12)
 
 
 @pytest.mark.parametrize("d", [0.0, -0.1])
