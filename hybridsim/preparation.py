@@ -63,8 +63,10 @@ def prepared(
     """The run of these arguments, and the seconds that compiling took; keywords: what an option may be meant to be."""
     question = None
     if x0 is z0 is limits is None:
-        words = (integrator, rtol, atol, max_step, first_step, save)
-        question = _question(t_span, (*words, *chain(*options.items())) if options else words)
+        words: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
+        if options:  # an option that is a whole number is refused as 16.0, which equals 16
+            words += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
+        question = _question(t_span, words)
         known = known_system(model)
         run = None if known is None else known.runs.get(question)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # as registered now

@@ -109,7 +109,7 @@ class ModeLoop:
             self.timetable.kept(self.origin)
             self.standing, self.adopted, stop = self.plan.start(due), self.origin, False
             if not self.plan.begins_silently:
-                stop = self._adopt(self.origin, self.outcome, task.x0, due, ())
+                stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due, ())
             step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             self._mark(step_size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -95,7 +95,21 @@ class RungeKuttaLeaper(Leaper):
         self.codes: EndsShelf = system.code.shared(f"ends of {shape}", lambda: EndsShelf(system, *shape))
         self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
         given = np.array([tolerances.first_step or 0.0])
-        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest, given)
+        self.control: tuple[Any, ...] = (
+            rtol,
+            tolerances.atol,
+            self.order,
+            tolerances.max_step,
+            longest,
+            given,
+        )
+
+    def anew(self) -> RungeKuttaLeaper:
+        """The same for another run, which takes its own first step."""
+        other = cast("RungeKuttaLeaper", super().anew())
+        *rest, given = self.control
+        other.control = (*rest, given.copy())
+        return other
 
     def _room(self) -> Room:
         system, n, columns = self.system, self.system.n, self.order + 1

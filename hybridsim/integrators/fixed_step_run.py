@@ -100,7 +100,7 @@ class FixedStepRun:
         self.gauge = Gauge(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
-        self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete
+        self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete.copy()
         self._holds = np.array([a.hold for a in system.automata], dtype=np.int64)
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
         self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
@@ -136,7 +136,9 @@ class FixedStepRun:
             self.timetable.kept(self.origin)
             if self._overlaps(range(len(self.z))):
                 return
-            if (self.declared or due) and self._settle(self.origin, (), due, self.task.x0, starting=True):
+            if (self.declared or due) and self._settle(
+                self.origin, (), due, self.task.x0.copy(), starting=True
+            ):
                 return
         while self.origin != self.end:
             arrays = {name: np.array(getattr(self, name)) for name in _STATE}

@@ -96,7 +96,7 @@ class Moreau(Integrator):
         """Run a task with fixed steps."""
         step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
         refuse_longer(step, task.tolerances.max_step, self.name)
-        march = MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0)
+        march = MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0.copy())
         return FixedStepRun(system, task, march, progress).run()
 
 

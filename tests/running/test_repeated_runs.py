@@ -38,6 +38,39 @@ def test_the_second_run_is_the_first(model: hs.Model, integrator: str) -> None:
     assert system_of(model) is system_of(model)
 
 
+@pytest.mark.parametrize("integrator", [*METHODS, "moreau", "rodas5p"])
+def test_what_is_done_to_an_event_at_the_start_stays_there(integrator: str) -> None:
+    """A clock ticks at t0: its states are the first ones of the run."""
+    servo = hs.load("sampled-servo")
+    options = {"integrator": integrator} | (
+        {"step": 1e-3} if integrator in ("moreau", "rk4-dichotomy") else {}
+    )
+    wanted = content(hs.simulate(servo, (0, 0.5), **options))
+    kept, spoilt = (hs.simulate(servo, (0, 0.5), **options) for _ in range(2))
+    for event in spoilt.events:
+        event.x_minus[:] = event.x_plus[:] = 99.0
+    assert content(hs.simulate(servo, (0, 0.5), **options)) == wanted == content(kept)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5"])
+def test_every_run_takes_the_first_step_that_is_given(integrator: str) -> None:
+    options = {"integrator": integrator, "first_step": 1e-5}
+    runs = [hs.simulate("dfcs", SPAN, **options) for _ in range(2)]  # models of their own
+    model = hs.load("dfcs")
+    runs += [hs.simulate(model, SPAN, **options) for _ in range(3)]
+    assert len({run.stats["steps"] for run in runs}) == 1
+    assert all(content(run) == content(runs[0]) for run in runs)
+    assert runs[0].stats["steps"] > hs.simulate(model, SPAN, integrator=integrator).stats["steps"]
+
+
+def test_an_option_of_another_kind_is_refused_every_time(model: hs.Model) -> None:
+    """16.0 equals 16, and is no whole number to an option."""
+    hs.simulate(model, SPAN, integrator="rk4-dichotomy", max_bisections=16)
+    for _ in range(2):
+        with pytest.raises(hs.UsageError, match=r"max_bisections is 16\.0"):
+            hs.simulate(model, SPAN, integrator="rk4-dichotomy", max_bisections=16.0)
+
+
 @pytest.mark.parametrize("integrator", METHODS)
 def test_what_is_done_to_a_result_stays_there(model: hs.Model, integrator: str) -> None:
     """Arrays that a run gave away are written over; the next run does not notice."""
