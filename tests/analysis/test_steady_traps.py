@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -266,3 +267,40 @@ def test_a_state_that_only_adds_up_is_named() -> None:
     found = hs.steady_state(model(f'{forced}\nspent = {{start = 0, der = "0.1*v**2"}}'), max_periods=256)
     assert found.kind == "not settled"
     assert "spent goes on moving away" in found.message
+
+
+# -- a state that only adds up ------------------------------------------------------------------------------------
+
+
+def servo(functions: bool, with_angle: bool) -> hs.Model:
+    """A motor switched on and off by its speed, which goes to and fro between two limits; the angle only adds up."""
+    parameters = {"U": 300.0, "tau": 0.05, "low": 175.0, "high": 185.0}
+    if not functions:
+        states = [hs.State("phi", 0, "w")] if with_angle else []
+        on = hs.Mode("on", hs.Guard("fast", "high - w", "off"), set={"u": "U"})
+        off = hs.Mode("off", hs.Guard("slow", "w - low", "on"), set={"u": 0})
+        states += [hs.State("w", 0, "(u - w)/tau")]
+        return hs.Model("servo", states, parameters, components=[hs.Component("relay", [on, off], "on")])
+
+    def driven(t: float, x: np.ndarray, p: Any) -> Any:
+        return x[1], (p.U - x[1]) / p.tau
+
+    def free(t: float, x: np.ndarray, p: Any) -> Any:
+        return x[1], -x[1] / p.tau
+
+    on = hs.Mode("on", hs.Guard("fast", lambda t, x, p: p.high - x[1], "off"), flow=driven)
+    off = hs.Mode("off", hs.Guard("slow", lambda t, x, p: x[1] - p.low, "on"), flow=free)
+    states = {"phi": 0.0, "w": 0.0}
+    relay = hs.Component("relay", [on, off], "on")
+    return hs.Model("servo", states, parameters, flow=driven, components=[relay])
+
+
+def test_an_angle_that_only_adds_up_is_named_soon() -> None:
+    """The speed repeats after tau log(high/low) + tau log((U - low)/(U - high)), and the angle never does."""
+    closed = 0.05 * (math.log(185.0 / 175.0) + math.log(125.0 / 115.0))
+    assert hs.steady_state(servo(False, False)).period == pytest.approx(closed, rel=1e-10)
+    for functions in (False, True):
+        found = hs.steady_state(servo(functions, True), max_periods=64)
+        assert found.kind == "not settled" and "phi goes on moving away" in found.message
+        assert ("Python functions" in found.message) == functions
+        assert math.isnan(found.lyapunov) == functions

@@ -142,6 +142,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
 def free_passings(motion: Motion, start: Point | None, duration: float, largest: np.ndarray) -> Passings:
     """At every rise of the state that moves most through the middle of its range, in the later half of a run.
 
+    A state that only adds up, such as the angle of a shaft, passes there once: it is taken where there is no other.
     largest (n,): the scale of each state when it moved most, brought up to date. A motion that has died out beside that
     rests: what is left of it may be rounding, which may repeat.
     """
@@ -163,11 +164,19 @@ def free_passings(motion: Motion, start: Point | None, duration: float, largest:
             end = point_at_end(following)
             return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
         largest[:] = 0.5 * (high - low)
-    j = int(np.argmax(moves))
+    others = np.where(_goes_on(late, high - low), 0.0, moves)
+    j = int(np.argmax(others if others.max() > RESTS else moves))
     times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
     points = [point_at(late, t) for t in times]
     values = np.array([p.values for p in points]).reshape(len(points), len(scale))
     return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
+
+
+def _goes_on(solution: Solution, moves: np.ndarray) -> np.ndarray:
+    """Which states (n,), whose ranges are given, move on as much in each quarter of a run, the same way."""
+    steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
+    is_steady = np.ptp(steps, axis=1) <= _STEADY * np.abs(steps[:, 0])
+    return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))
 
 
 def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:

@@ -18,6 +18,7 @@ from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
 from hybridsim.analysis.variations.sizes import ranges
+from hybridsim.engine.recent import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
 
@@ -271,7 +272,12 @@ class _Search:
     def _other(self, passings: Passings) -> SteadyState:
         """A motion that does not repeat: told apart by its largest Lyapunov exponent."""
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
-        first, second = largest_exponents(self.motion, passings.last, base)
+        has_slopes = system_of(
+            self.motion.model
+        ).has_tape  # exponents take derivatives, which functions have not
+        first, second = math.nan, math.nan
+        if has_slopes:
+            first, second = largest_exponents(self.motion, passings.last, base)
         exponent = 0.5 * (first + second)
         leaving = self._leaving(passings)
         if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not leaving:
@@ -281,7 +287,12 @@ class _Search:
         else:
             kind = UNSETTLED
         message = (
-            f"{kind} after {self.periods} periods: largest Lyapunov exponent {exponent:.3g} per unit of time"
+            f"{kind} after {self.periods} periods: "
+            + (
+                f"largest Lyapunov exponent {exponent:.3g} per unit of time"
+                if has_slopes
+                else "the exponents of Python functions, whose derivatives are not known, do not tell what it is"
+            )
             + (
                 f", and {leaving} goes on moving away: nothing holds it back, or it only adds up"
                 if leaving
