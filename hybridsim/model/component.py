@@ -226,6 +226,10 @@ class Component(Declared):
     limit: Choice | None = None
 
     def __post_init__(self) -> None:
+        given: object = self.initial
+        if isinstance(given, Mode):  # where the name of the first mode goes
+            remedy = "give several modes as a list, [hs.Mode(...), hs.Mode(...)]"
+            raise self._fault(f"initial is the mode {given.name!r}", remedy)
         self._texts("name", "initial")
         self._parts("modes", Mode)
         limit: object = self.limit

@@ -35,6 +35,10 @@ X = hs.State("x", 0, "1")
         (lambda: hs.Guard("g", "x", then=5), "Guard g: then holds 5"),
         (lambda: hs.Choice("b", reset="x"), "Choice: reset is 'x'"),
         (lambda: hs.Component("c", modes="m"), "Component c: modes holds 'm'"),
+        (
+            lambda: hs.Component("c", hs.Mode("on"), hs.Mode("off")),  # type: ignore[arg-type]  # the slip meant
+            "Component c: initial is the mode 'off'\ngive several modes as a list",
+        ),
         (lambda: hs.Component("c", [hs.Mode("m")], surface="x"), "Component c: surface is 'x'"),
         (lambda: hs.Contact("f", "v", "N", 5), "Contact f: law is 5"),
         (lambda: hs.Contact("f", None, "N", "coulomb"), "Contact f: velocity is None"),
