@@ -93,13 +93,14 @@ def _kernels() -> dict[int, str]:
     from hybridsim.engine import jit
 
     found = {address: f"kernel {key[0].__name__}" for key, address in jit._addresses.items()}
-    for kernel in (o for o in gc.get_objects() if isinstance(o, CPUDispatcher)):
-        for compiled in kernel.overloads.values():
-            library = compiled.library
-            for function in library._final_module.functions:
-                name = re.search(r"^_ZN9hybridsim.*?\d([a-z_]+)B\d+v", function.name)
-                if name and not function.is_declaration:
-                    found[library.get_pointer_to_function(function.name)] = f"kernel {name[1]}"
+    dispatchers = (o for o in gc.get_objects() if isinstance(o, CPUDispatcher))
+    libraries = [compiled.library for kernel in dispatchers for compiled in kernel.overloads.values()]
+    libraries += [made._library for made in jit._reached]  # their own code is apart from what is called by C
+    for library in libraries:
+        for function in library._final_module.functions:
+            name = re.search(r"^_ZN9hybridsim.*?\d([a-z_]+)B\d+v", function.name)
+            if name and not function.is_declaration:
+                found[library.get_pointer_to_function(function.name)] = f"kernel {name[1]}"
     return found
 
 
