@@ -272,9 +272,8 @@ class _Search:
     def _other(self, passings: Passings) -> SteadyState:
         """A motion that does not repeat: told apart by its largest Lyapunov exponent."""
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
-        has_slopes = system_of(
-            self.motion.model
-        ).has_tape  # exponents take derivatives, which functions have not
+        # exponents take derivatives, which Python functions do not have
+        has_slopes = system_of(self.motion.model).has_tape
         first, second = math.nan, math.nan
         if has_slopes:
             first, second = largest_exponents(self.motion, passings.last, base)
