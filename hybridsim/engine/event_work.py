@@ -87,13 +87,6 @@ class Work(NamedTuple):
 
 
 @inlined
-def put(source: Any, out: Any) -> None:
-    """Copy an array; a slice assignment takes ten times as long for a few numbers."""
-    for i in range(source.shape[0]):
-        out[i] = source[i]
-
-
-@inlined
 def find_modes(modes: Any, z: Any) -> int:
     """Row of a vector of modes on the shelf; -1 where it is not."""
     for k in range(modes.shape[0]):

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import LEAP, called_by, find_modes, put
+from hybridsim.engine.event_work import LEAP, called_by, find_modes
+from hybridsim.engine.few import few, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address

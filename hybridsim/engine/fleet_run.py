@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import LEAP, put
+from hybridsim.engine.event_work import LEAP
+from hybridsim.engine.few import put
 from hybridsim.engine.fleet_start import plain_start, rests_for_ever
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL

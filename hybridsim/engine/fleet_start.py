@@ -10,7 +10,8 @@ from typing import Any
 
 from hybridsim.engine.decide import FINE, choose
 from hybridsim.engine.event_verdicts import cluster_of, guard_series, judge_candidate, judge_members
-from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by, find_modes, put
+from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by, find_modes
+from hybridsim.engine.few import put
 from hybridsim.engine.jets import UNIT, run_series
 from hybridsim.engine.jit import call, kernel, merged
 from hybridsim.engine.leap import set_origin

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import find_modes, put
+from hybridsim.engine.event_work import find_modes
+from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.few import few
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.guard_polynomials import (
     falls_over,
@@ -124,23 +125,43 @@ def linear_coefficient(
 
 
 @inlined
+def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
+    """Of y = (x, w): a coefficient's bound is at most the largest of its roundings times this."""
+    size = 0.0
+    for m in range(x.shape[0]):
+        few()
+        size += abs(x[m]) + _IN_UNITS * x_error[m]
+    for m in range(w.shape[0]):
+        few()
+        size += abs(w[m]) + _IN_UNITS * w_error[m]
+    return size
+
+
+@inlined
+def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
+    """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 if it is in doubt."""
+    row, value, n = lin.series[k, g, order], 0.0, x.shape[0]
+    for m in range(n):
+        few()
+        value += row[m] * x[m]
+    for m in range(w.shape[0]):
+        few()
+        value += row[n + m] * w[m]
+    if not abs(value) > lin.largest[k, g, order] * size:
+        return 0
+    return 1 if value > 0.0 else -1
+
+
+@inlined
 def linear_side(
     lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, w: Any, w_error: Any
 ) -> tuple[int, int, bool]:
     """As `hybridsim.engine.decide.side_after`, coefficient by coefficient; and whether it is a question of rounding."""
-    is_open, n, size = False, x.shape[0], 0.0
-    for m in range(n):
-        size += abs(x[m]) + _IN_UNITS * x_error[m]
-    for m in range(w.shape[0]):
-        size += abs(w[m]) + _IN_UNITS * w_error[m]
+    is_open, size = False, size_of_point(x, x_error, w, w_error)
     for order in range(decreed, ORDER + 1):
-        value = 0.0
-        for m in range(n):
-            value += lin.series[k, g, order, m] * x[m]
-        for m in range(w.shape[0]):
-            value += lin.series[k, g, order, n + m] * w[m]
-        if abs(value) > lin.largest[k, g, order] * size:  # far beyond its bound
-            return (1 if value > 0.0 else -1), order, False
+        sign = clear_sign(lin, k, g, order, x, w, size)
+        if sign != 0:  # far beyond its bound
+            return sign, order, False
         value, bound = linear_coefficient(lin, k, g, order, x, x_error, w, w_error)
         if value > bound:
             return 1, order, False

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.clear_event import settle_clearly
 from hybridsim.engine.decide import FINE
 from hybridsim.engine.event_verdicts import (
     guard_series,
@@ -28,8 +29,8 @@ from hybridsim.engine.event_work import (
     called_by,
     find_modes,
     located,
-    put,
 )
+from hybridsim.engine.few import fill, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, merged
 from hybridsim.engine.linear_kernels import errors_of_time, functions_of_time
@@ -111,8 +112,7 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
     put(at.x_error, x_error)
     put(at.z, z)
     on_surface, sides, orders, floors = work.on_surface, work.sides, work.orders, work.floors
-    for i in range(on_surface.shape[0]):
-        on_surface[i] = False
+    fill(on_surface, False)
     k = find_modes(tapes.modes, z)
     if k < 0:
         return False
@@ -165,6 +165,8 @@ def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, w
     if work.whole[FIRED] == NOBODY:
         at, k = located(state, work), find_modes(tapes.modes, state.z)
         guard_series(tapes, inputs, lin, k, at, at.x, at.x_error, work)
+        return 1
+    if is_linear(lin) and settle_clearly(automata, tapes, lin, state, work):
         return 1
     if not settle_ordinary(automata, tapes, inputs, lin, state, work):
         return 0

@@ -11,7 +11,8 @@ import math
 from typing import Any
 
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
-from hybridsim.engine.event_work import find_modes, put
+from hybridsim.engine.event_work import find_modes
+from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT

@@ -18,7 +18,7 @@ from math import comb
 
 import numpy as np
 
-from hybridsim.engine.event_work import put
+from hybridsim.engine.few import put
 from hybridsim.engine.jit import allocating_kernel, kernel
 from hybridsim.engine.stepping import StepFailure
 

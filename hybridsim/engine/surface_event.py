@@ -6,7 +6,8 @@ from typing import Any
 
 from hybridsim.engine.decide import FINE, LEAVES, NONE, NONUNIQUE, choose, preference
 from hybridsim.engine.event_verdicts import UNKNOWN, cluster_of, goes_on, judge_candidate
-from hybridsim.engine.event_work import called_by, located, put
+from hybridsim.engine.event_work import called_by, located
+from hybridsim.engine.few import put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, merged
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.event_work import put
+from hybridsim.engine.few import put
 from hybridsim.engine.jit import call, kernel
 from hybridsim.model.impact import ROUNDING
 

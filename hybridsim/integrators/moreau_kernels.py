@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import put
+from hybridsim.engine.few import put
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rosenbrock_step import factor, solve

@@ -1,0 +1,131 @@
+"""Events of linear modes whose outcome is plain at first sight: one contact changes its mode, all else is clear.
+
+What decides is the coefficient of each guard that its decreed zeros leave first. Where all of these are far beyond
+their rounding errors, the outcome is that of `hybridsim.engine.surface_event`, for a fraction of the work; where any is
+not, nothing has been decided.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.engine.decide import decreed_zeros
+from hybridsim.engine.event_verdicts import is_continuous
+from hybridsim.engine.event_work import FIRED, called_by, find_modes, located
+from hybridsim.engine.few import few, put
+from hybridsim.engine.jets import UNIT
+from hybridsim.engine.jit import call, inlined, kernel
+from hybridsim.engine.linear_kernels import clear_sign, linear_coefficient, size_of_point
+
+_UNCLEAR = 0
+
+
+@inlined
+def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
+    """The decreed zeros of a guard in modes z, which component c begins at its surface."""
+    is_its = automata.owner[g] == c
+    is_holding = z[c] == automata.hold[c]
+    return decreed_zeros(automata.place[g] == 0, is_its, is_holding, is_smooth, False, False)
+
+
+@inlined
+def _verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: bool, size: float, work: Any) -> int:
+    """1 where the modes on trial, which row k is of, certainly go on; -1 where c leaves them; _UNCLEAR."""
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        few()
+        g = tapes.active[i]
+        zeros = _zeros_of(automata, work.trial, c, g, is_smooth)
+        sign = clear_sign(lin, k, g, zeros, work.x_after, work.w, size)
+        if sign <= 0:
+            return sign if automata.owner[g] == c else _UNCLEAR
+    return 1
+
+
+@inlined
+def _is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, state: Any, work: Any) -> bool:
+    """Whether the guard that fired certainly goes on beyond its zero, and no other of the modes in row k is at zero."""
+    at, c, size = located(state, work), automata.owner[fired], 0.0
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        few()
+        g = tapes.active[i]
+        if g == fired:
+            is_holding = at.z[c] == automata.hold[c]
+            zeros = decreed_zeros(automata.place[g] == 0, True, is_holding, False, True, False)
+            after = size_of_point(work.x_after, work.slopes, work.w, work.w_error)
+            if clear_sign(lin, k, g, zeros, work.x_after, work.w, after) >= 0:
+                return False
+        else:
+            if size == 0.0:
+                size = size_of_point(at.x, at.x_error, work.w, work.w_error)
+            if clear_sign(lin, k, g, 0, at.x, work.w, size) == _UNCLEAR:
+                return False
+    return True
+
+
+@kernel
+def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
+    """Whether the event in the work space is clear; then what holds after it has taken the place of the state.
+
+    Another event is left to others, whatever has been written to the work space.
+    """
+    fired, at = work.whole[FIRED], located(state, work)
+    c = automata.owner[fired]
+    hold, now = automata.hold[c], at.z[c]
+    if hold < 0 or automata.is_corner[c]:
+        return False
+    for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
+        few()
+        d = automata.cluster[i]
+        if automata.is_unilateral[d] or (d != c and at.z[d] == automata.hold[d]):
+            return False  # they are decided together
+    before = find_modes(tapes.modes, at.z)
+    if before < 0:
+        return False
+    x, x_error, trial = work.x_after, work.slopes, work.trial
+    put(at.x_error, x_error)
+    put(at.z, trial)
+    trial[c] = hold
+    call(called_by(work).project, at.s, at.x, at.p, trial, x)
+    pin = automata.pin[c, 0]
+    if pin >= 0:
+        x_error[pin] = UNIT * abs(x[pin])
+    if not _is_alone(automata, tapes, lin, before, fired, state, work):
+        return False
+    size = size_of_point(x, x_error, work.w, work.w_error)
+    found, after, is_smooth = -1, -1, False
+    for turn in range(3):
+        mode = (hold + turn) % 3  # the one that holds is preferred to those beside it
+        if mode == now:
+            continue
+        trial[c] = mode
+        k = find_modes(tapes.modes, trial)
+        if k < 0:
+            return False
+        smooth = False
+        if now == hold:
+            smooth = is_continuous(called_by(work), automata, at, x, trial, work.everything, fired, work.jumps)
+        verdict = _verdict(automata, tapes, lin, k, c, smooth, size, work)
+        if verdict == _UNCLEAR or (verdict > 0 and found >= 0):
+            return False
+        if verdict > 0:
+            found, after, is_smooth = mode, k, smooth
+            if now != hold:
+                break
+    if found < 0:
+        return False
+    state.z[c] = trial[c] = found
+    put(x, state.x)
+    put(x_error, state.x_error)
+    sides, orders, floors = state.sides, state.orders, state.floors
+    for i in range(tapes.active_start[before], tapes.active_start[before + 1]):
+        few()
+        g = tapes.active[i]
+        sides[g], orders[g], floors[g] = 1, 0, 0.0
+    for i in range(tapes.active_start[after], tapes.active_start[after + 1]):
+        few()
+        g = tapes.active[i]
+        zeros = _zeros_of(automata, trial, c, g, is_smooth)
+        sides[g], orders[g], floors[g] = 1, zeros, 0.0
+        if zeros > 0:
+            floors[g] = linear_coefficient(lin, after, g, 0, x, x_error, work.w, work.w_error)[1]
+    return True
