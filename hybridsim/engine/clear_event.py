@@ -42,23 +42,14 @@ def _verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: boo
 
 
 @inlined
-def _is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, state: Any, work: Any) -> bool:
+def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) -> bool:
     """Whether the guard that fired certainly goes on beyond its zero, and no other of the modes in row k is at zero."""
-    at, c, size = located(state, work), automata.owner[fired], 0.0
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         few()
         g = tapes.active[i]
-        if g == fired:
-            is_holding = at.z[c] == automata.hold[c]
-            zeros = decreed_zeros(automata.place[g] == 0, True, is_holding, False, True, False)
-            after = size_of_point(work.x_after, work.slopes, work.w, work.w_error)
-            if clear_sign(lin, k, g, zeros, work.x_after, work.w, after) >= 0:
-                return False
-        else:
-            if size == 0.0:
-                size = size_of_point(at.x, at.x_error, work.w, work.w_error)
-            if clear_sign(lin, k, g, 0, at.x, work.w, size) == _UNCLEAR:
-                return False
+        sign = clear_sign(lin, k, g, 1 if g == fired else 0, work.x_after, work.w, size)
+        if sign == _UNCLEAR or (g == fired and sign > 0):
+            return False
     return True
 
 
@@ -86,12 +77,12 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
     put(at.z, trial)
     trial[c] = hold
     call(called_by(work).project, at.s, at.x, at.p, trial, x)
+    size = size_of_point(x, x_error, work.w, work.w_error)
+    if not _is_alone(tapes, lin, before, fired, size, work):
+        return False
     pin = automata.pin[c, 0]
     if pin >= 0:
         x_error[pin] = UNIT * abs(x[pin])
-    if not _is_alone(automata, tapes, lin, before, fired, state, work):
-        return False
-    size = size_of_point(x, x_error, work.w, work.w_error)
     found, after, is_smooth = -1, -1, False
     for turn in range(3):
         mode = (hold + turn) % 3  # the one that holds is preferred to those beside it
@@ -127,5 +118,5 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
         zeros = _zeros_of(automata, trial, c, g, is_smooth)
         sides[g], orders[g], floors[g] = 1, zeros, 0.0
         if zeros > 0:
-            floors[g] = linear_coefficient(lin, after, g, 0, x, x_error, work.w, work.w_error)[1]
+            floors[g] = linear_coefficient(lin, after, g, 0, x, x_error, work)[1]
     return True

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import filled_up
 from hybridsim.engine.segment_end import State
 
 _NONE, _NO_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # there are no monitors where there are leaps
@@ -19,8 +20,8 @@ _REAL, _WHOLE = ("x", "x_error", "p", "floors"), ("z", "sides", "orders")
 class Desk(NamedTuple):
     """The state, the same as kernels take it, room for events, scratch arrays of the kernel.
 
-    The arrays of the state lie one behind the other, real numbers in `real` and whole ones in `whole`, of the lengths
-    that go with them: so they are copied in two pieces.
+    The arrays of the state lie one behind the other, real numbers in `real` and whole ones in `whole`, each filled up
+    with zeros: so they are copied in two pieces.
     """
 
     state: State
@@ -36,8 +37,8 @@ class Desk(NamedTuple):
         """A desk for states like this one."""
         fields = _fields(outcome, p)
         slices = {**_slices(fields, _REAL), **_slices(fields, _WHOLE)}
-        real = np.concatenate([fields[name] for name in _REAL]).astype(float)
-        whole = np.concatenate([fields[name] for name in _WHOLE]).astype(np.int64)
+        real = np.zeros(sum(filled_up(len(fields[name])) for name in _REAL))
+        whole = np.zeros(sum(filled_up(len(fields[name])) for name in _WHOLE), dtype=np.int64)
         parts = {name: (real if name in _REAL else whole)[part] for name, part in slices.items()}
         state = State(**parts)
         return cls(state, packed(state), work, room, real, whole, slices)
@@ -78,5 +79,5 @@ def _fields(outcome: Outcome, p: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _slices(fields: dict[str, np.ndarray], names: tuple[str, ...]) -> dict[str, slice]:
-    ends = list(accumulate((len(fields[name]) for name in names), initial=0))
-    return {name: slice(*ends[k : k + 2]) for k, name in enumerate(names)}
+    begins = accumulate((filled_up(len(fields[name])) for name in names), initial=0)
+    return {name: slice(k, k + len(fields[name])) for name, k in zip(names, begins, strict=False)}

@@ -67,7 +67,7 @@ def guard_side(
     k: the row of the modes whose `guard_series` were asked for last.
     """
     if is_linear(lin):
-        return linear_side(lin, k, g, decreed, x, x_error, work.w, work.w_error)
+        return linear_side(lin, k, g, decreed, x, x_error, work)
     values, bounds = work.judged[0, g], work.judged[1, g]
     side, order = side_after(values, bounds, decreed)
     return side, order, side == 0 and open_question(values, bounds, decreed)
@@ -77,7 +77,7 @@ def guard_side(
 def size_at(lin: Any, k: int, g: int, x: Any, x_error: Any, work: Any) -> tuple[float, float]:
     """The value of a guard and its bound."""
     if is_linear(lin):
-        return linear_coefficient(lin, k, g, 0, x, x_error, work.w, work.w_error)
+        return linear_coefficient(lin, k, g, 0, x, x_error, work)
     return work.judged[0, g, 0], work.judged[1, g, 0]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from hybridsim.engine.jets import ORDER
 from hybridsim.engine.jit import ENABLED, inlined, merged
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import vector_of
 
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
 FIRED, DISCRETE, DISCRETE_AT = range(3)  # of `Work.whole`
@@ -45,8 +46,8 @@ class Work(NamedTuple):
     functions (5,): those of `Functions`. reached (2,): addresses of kernels: the one that settles it, and that of a
     leap. whole, real: what the places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes
     (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
-    factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled. sides,
-    orders, floors (G,): of the guards just after it. The last ones have a row for each joint candidate.
+    factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled; sizes,
+    w_sizes: of states and of these. sides, orders, floors (G,): of the guards just after it. The last ones have a row for each joint candidate.
     """
 
     functions: np.ndarray
@@ -64,6 +65,8 @@ class Work(NamedTuple):
     factors: np.ndarray
     w: np.ndarray
     w_error: np.ndarray
+    sizes: np.ndarray
+    w_sizes: np.ndarray
     judged: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
@@ -130,14 +133,16 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
             reached=numbers(2),
             whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at], dtype=np.int64),
             real=np.zeros(2),
-            **{name: np.empty(system.n) for name in ("y", "y_error", "slopes", "x_after")},
+            **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             z_after=numbers(count),
             p_after=np.empty(system.layout.size),
             V=np.empty((registers, ORDER + 1)),
             E=np.empty((registers, ORDER + 1)),
-            factors=np.zeros((2 * atoms, 2)),
-            w=np.zeros(monomials),
-            w_error=np.zeros(monomials),
+            factors=_atoms(atoms),
+            w=vector_of(monomials),
+            w_error=vector_of(monomials),
+            sizes=vector_of(system.n),
+            w_sizes=vector_of(monomials),
             judged=np.empty((2, guards, ORDER + 1)),
             sides=np.ones(guards, dtype=np.int64),
             orders=numbers(guards),
@@ -161,6 +166,13 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
         )
     )
     return work
+
+
+def _atoms(count: int) -> np.ndarray:
+    """Room for the values of so many atoms and their errors, and one, which has none."""
+    factors = np.zeros((2 * count + 1, 2))
+    factors[-1, 0] = 1.0
+    return factors
 
 
 def functions_of(system: Any) -> Functions:

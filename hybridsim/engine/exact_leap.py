@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.event_work import LEAP, called_by, find_modes
-from hybridsim.engine.few import few, put
+from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address
+from hybridsim.engine.jit import call, call_kernel, kernel, kernel_address
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
@@ -31,6 +31,7 @@ from hybridsim.engine.linear_kernels import (
     to_modal,
 )
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import dot, vector_of
 from hybridsim.engine.segment_end import (
     is_crowded,
     moved_on,
@@ -48,7 +49,7 @@ class Room(NamedTuple):
 
     rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
     target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
-    followed (1,). Modal coordinates (J,), terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state;
+    followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state;
     hints (K, G): when a guard was zero last.
     """
 
@@ -60,6 +61,7 @@ class Room(NamedTuple):
     points: np.ndarray
     c: np.ndarray
     v: np.ndarray
+    sizes: np.ndarray
     terms: np.ndarray
     starts: np.ndarray
     hints: np.ndarray
@@ -146,6 +148,7 @@ def room_for(system: Any, tables: Any) -> Room:
             points=np.zeros(1, dtype=np.int64),
             c=np.zeros(widest, dtype=complex),
             v=np.zeros(widest, dtype=complex),
+            sizes=vector_of(widest),
             terms=np.zeros((2, TERMS)),
             starts=np.zeros((system.guard_count, TERMS + 2)),
             hints=np.zeros(tables.farthest.shape),
@@ -200,7 +203,7 @@ def exact_leap(
             return STOPPED
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
-        state_sizes(lin, k, c, v, scale)
+        state_sizes(lin, k, c, v, room.sizes, scale)
         if holding(automata, z):
             call(functions.project, s, y, p, z, y1)
             put(y1, y)
@@ -230,10 +233,11 @@ def exact_leap(
         set_origin(place, rates, clock[0], clock[1], p)
         s_error = 2.0 * 2.0**-52 * s
         functions_of_time(lin, 0.0, p, work.factors, work.w)
-        value, slope = _value_and_slope(lin, k, fired, y, work.w)
+        value = dot(lin.series, (k, fired, 0), (y, work.w))
+        slope = dot(lin.series, (k, fired, 1), (y, work.w))
         if abs(value) > s_error * abs(slope) and slope != 0.0 and math.isfinite(value / slope):
             s_error = abs(value / slope)
-        errors_of_time(lin, 0.0, s_error, p, work.factors, work.w_error)
+        errors_of_time(lin, s_error, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
         if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
@@ -260,16 +264,3 @@ def reach_leap(
     """Compile what a leap needs, if need be, and put the addresses where kernels find them."""
     reach_settling(automata, tapes, inputs, lin, state, work)
     work.reached[LEAP] = kernel_address(exact_leap, automata, tapes, inputs, lin, state, work, room, record)
-
-
-@inlined
-def _value_and_slope(lin: Any, k: int, g: int, x: Any, w: Any) -> tuple[float, float]:
-    """A guard and its rate at y = (x, w)."""
-    n, value, slope = x.shape[0], 0.0, 0.0
-    for m in range(n):
-        value += lin.series[k, g, 0, m] * x[m]
-        slope += lin.series[k, g, 1, m] * x[m]
-    for m in range(w.shape[0]):
-        value += lin.series[k, g, 0, n + m] * w[m]
-        slope += lin.series[k, g, 1, n + m] * w[m]
-    return value, slope

@@ -73,7 +73,7 @@ class ExactLeaper:
         try:
             desk = spare.pop()
         except IndexError:
-            work = work_space(system, len(tables.kinds), len(tables.factor_start) - 1)
+            work = work_space(system, len(tables.kinds), len(tables.factors))
             desk = Desk.of(outcome, p, work, room_for(system, tables))
             reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
         desk.take_up(outcome, p)

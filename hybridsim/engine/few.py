@@ -14,15 +14,19 @@ if ENABLED:
     from numba import types
     from numba.extending import intrinsic
 
+    def left_as_it_is(builder: Any) -> None:
+        """Code that is none, of which the compiler does not know that: it leaves the loop around it alone."""
+        nothing = ir.InlineAsm(ir.FunctionType(ir.VoidType(), []), "", "", side_effect=True)
+        call = builder.call(nothing, [])
+        call.attributes.add("nounwind")
+        call.attributes.add("readnone")
+
     @intrinsic
     def few(typingctx: Any) -> Any:
-        """Says in a loop that it has few turns: code that is none, of which the compiler does not know that."""
+        """Says in a loop that it has few turns."""
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            nothing = ir.InlineAsm(ir.FunctionType(ir.VoidType(), []), "", "", side_effect=True)
-            call = builder.call(nothing, [])
-            call.attributes.add("nounwind")
-            call.attributes.add("readnone")
+            left_as_it_is(builder)
             return context.get_dummy_value()
 
         return types.void(), generate

@@ -179,7 +179,7 @@ class _Ship:
     def __init__(self, fleet: Fleet, tables: Any, p: np.ndarray) -> None:
         system = fleet.system
         n, widest, count, whole = system.n, tables.values.shape[1], len(fleet.hold), np.int64
-        work = work_space(system, len(tables.kinds), len(tables.factor_start) - 1)
+        work = work_space(system, len(tables.kinds), len(tables.factors))
         none, guards = np.zeros(0, dtype=whole), system.guard_count
         blank = Outcome(
             np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),

@@ -16,6 +16,7 @@ from hybridsim.engine.jets import UNIT, run_series
 from hybridsim.engine.jit import call, kernel, merged
 from hybridsim.engine.leap import set_origin
 from hybridsim.engine.linear_kernels import functions_of_time, to_modal
+from hybridsim.engine.panels import LANES
 
 _UNKNOWN = -1  # in place of a mode
 
@@ -140,14 +141,15 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
     are taken at the origin of the state; c: room for modal coordinates.
     """
     x, z, p = state.x, state.z, state.p
-    k, n = find_modes(tapes.modes, z), x.shape[0]
+    k = find_modes(tapes.modes, z)
     if k < 0:
         return False
     functions_of_time(lin, 0.0, p, work.factors, work.w)
-    for i in range(n):
-        for m in range(lin.slopes.shape[2]):
-            if lin.slopes[k, i, m] != 0.0 and (m >= n or x[m] != 0.0):
-                return False  # it moves, or is driven
+    for m in range(lin.slopes.shape[2]):
+        for q in range(lin.slopes.shape[1]):
+            for i in range(LANES):
+                if lin.slopes[k, q, m, i] != 0.0 and (m >= x.shape[0] or x[m] != 0.0):
+                    return False  # it moves, or is driven
     to_modal(lin, k, x, work.w, c)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]

@@ -37,7 +37,7 @@ class FleetTables:
 
     def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
         self.numbers = numbers
-        self.form = len(fields["kinds"]), len(fields["factor_start"]), modes, fields["values"].shape[1]
+        self.form = len(fields["kinds"]), len(fields["factors"]), modes, fields["values"].shape[1]
         counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
         shared = {name for name in LinearTables._fields if _is_shared(name)}
         self._arrays = fields  # the packs hold addresses alone
@@ -64,7 +64,7 @@ class FleetTables:
 
 
 def _is_shared(name: str) -> bool:
-    return name in ("kinds", "term_start", "sources", "factor_start", "factors", "phases")
+    return name in ("kinds", "term_start", "sources", "factors", "phases")
 
 
 def fleet_tables(

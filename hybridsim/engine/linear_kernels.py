@@ -23,6 +23,7 @@ from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.jit import allocating_kernel, inlined, kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_guards import FARTHEST, TERMS
+from hybridsim.engine.panels import LANES, dot, product, times
 
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _PARTS = 10**6  # of that size: a second's work
@@ -44,84 +45,92 @@ def size_of(z: complex) -> float:
 
 @inlined
 def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
-    """Monomials at local time s. factors: room for (2 A, 2) values of atoms, and what bounds their errors."""
+    """Monomials at local time s. factors: room for values of atoms, (2 A + 1, 2) with one at its end, and behind each
+    a bound of what its argument errs by, but for s."""
     for a in range(lin.kinds.shape[0]):
-        angle = lin.offsets[a]
-        for i in range(lin.term_start[a], lin.term_start[a + 1]):
-            angle += lin.weights[i] * p[lin.sources[i]]
-        if lin.kinds[a] == TIME:
-            factors[2 * a, 0] = s
+        kind, rate, angle = lin.kinds[a], lin.rates[a], lin.offsets[a]
+        value, other = factors[2 * a], factors[2 * a + 1]
+        if kind == TIME:
+            value[0] = s
             continue
-        angle += lin.rates[a] * s
-        if lin.kinds[a] == ANGLE:
-            factors[2 * a, 0], factors[2 * a + 1, 0] = math.sin(angle), math.cos(angle)
-        elif lin.kinds[a] == GROWTH:
-            factors[2 * a, 0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises beyond
+        error = UNIT * abs(angle)
+        first = lin.term_start[a]
+        for i in range(first, lin.term_start[a + 1]):
+            few()
+            source, weight = lin.sources[i], lin.weights[i]
+            term = weight * p[source]
+            angle += term
+            if lin.phases[0] <= source < lin.phases[1]:
+                error += 2.0 * UNIT * abs(term)
+            if weight != 1.0 or i > first:
+                error += 2.0 * UNIT * abs(term)
+        turned = rate * s
+        angle += turned
+        if rate != 0.0:
+            error += UNIT * (abs(turned) + abs(angle))
+        value[1] = error
+        if kind == ANGLE:
+            value[0], other[0] = math.sin(angle), math.cos(angle)
+        elif kind == GROWTH:
+            value[0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises beyond
         else:
-            factors[2 * a, 0] = angle
+            value[0] = angle
     for m in range(w.shape[0]):
-        value = 1.0
-        for i in range(lin.factor_start[m], lin.factor_start[m + 1]):
-            value *= factors[lin.factors[i], 0]
-        w[m] = value
+        few()
+        product, row = 1.0, lin.factors[m]
+        for i in range(row.shape[0]):
+            few()
+            product *= factors[row[i], 0]
+        w[m] = product
 
 
 @inlined
-def errors_of_time(lin: Any, s: float, s_error: float, p: Any, factors: Any, w_error: Any) -> None:
-    """Bounds of the errors of `functions_of_time`, whose values `factors` holds, at a local time good to s_error."""
+def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None:
+    """Bounds of the errors of `functions_of_time`, which was asked last, at a local time good to s_error."""
     for a in range(lin.kinds.shape[0]):
-        if lin.kinds[a] == TIME:
-            factors[2 * a, 1] = s_error
+        kind, value, other = lin.kinds[a], factors[2 * a], factors[2 * a + 1]
+        if kind == TIME:
+            value[1] = s_error
             continue
-        angle, error = lin.offsets[a], UNIT * abs(lin.offsets[a])
-        for i in range(lin.term_start[a], lin.term_start[a + 1]):
-            source = lin.sources[i]
-            term = lin.weights[i] * p[source]
-            angle += term
-            is_phase = lin.phases[0] <= source < lin.phases[1]
-            error += (2.0 * UNIT if is_phase else 0.0) * abs(term)
-            if lin.weights[i] != 1.0 or i > lin.term_start[a]:
-                error += 2.0 * UNIT * abs(term)
-        if lin.rates[a] != 0.0:
-            turned = lin.rates[a] * s
-            angle += turned
-            error += abs(lin.rates[a]) * s_error + UNIT * (abs(turned) + abs(angle))
-        value = factors[2 * a, 0]
-        if lin.kinds[a] == ANGLE:
-            other = factors[2 * a + 1, 0]
-            factors[2 * a, 1] = abs(other) * error + 0.5 * error * error + 2.0 * UNIT * abs(value)
-            factors[2 * a + 1, 1] = abs(value) * error + 0.5 * error * error + 2.0 * UNIT * abs(other)
-        elif lin.kinds[a] == GROWTH:
-            factors[2 * a, 1] = value * (error + 2.0 * UNIT)
+        error = value[1] + abs(lin.rates[a]) * s_error
+        if kind == ANGLE:
+            one, two, rest = abs(value[0]), abs(other[0]), 0.5 * error * error
+            value[1] = two * error + rest + 2.0 * UNIT * one
+            other[1] = one * error + rest + 2.0 * UNIT * two
+        elif kind == GROWTH:
+            value[1] = value[0] * (error + 2.0 * UNIT)
         else:
-            factors[2 * a, 1] = error
+            value[1] = error
     for m in range(w_error.shape[0]):
-        value, error = 1.0, 0.0
-        for i in range(lin.factor_start[m], lin.factor_start[m + 1]):
-            v, e = factors[lin.factors[i], 0], factors[lin.factors[i], 1]
-            error = error * (abs(v) + e) + abs(value) * e
-            value *= v
-            if i > lin.factor_start[m]:
-                error += UNIT * abs(value)
+        few()
+        product, error, row = 1.0, 0.0, lin.factors[m]
+        for i in range(row.shape[0]):
+            few()
+            factor = factors[row[i]]
+            v, e = factor[0], factor[1]
+            error = error * (abs(v) + e) + abs(product) * e
+            product *= v
+            if i > 0:
+                error += UNIT * abs(product)
         w_error[m] = error
 
 
 @inlined
-def linear_coefficient(
-    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, w: Any, w_error: Any
-) -> tuple[float, float]:
+def linear_coefficient(lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any) -> tuple[float, float]:
     """A Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
-    n = x.shape[0]
-    value = bound = 0.0
-    for m in range(n):
-        row, size = lin.series[k, g, order, m], abs(x[m]) + x_error[m]
-        value += row * x[m]
-        bound += abs(row) * x_error[m] + lin.roundings[k, g, order, m] * size
+    w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
+    for m in range(x.shape[0]):
+        few()
+        sizes[m] = abs(x[m]) + x_error[m]
+        bound += abs(lin.series[k, g, order, m]) * x_error[m]
+    n = lin.series.shape[3] - w.shape[0]
+    n -= n % LANES
     for m in range(w.shape[0]):
-        row, size = lin.series[k, g, order, n + m], abs(w[m]) + w_error[m]
-        value += row * w[m]
-        bound += abs(row) * w_error[m] + lin.roundings[k, g, order, n + m] * size
-    return value, bound
+        few()
+        w_sizes[m] = abs(w[m]) + w_error[m]
+        bound += abs(lin.series[k, g, order, n + m]) * w_error[m]
+    value = dot(lin.series, (k, g, order), (x, w))
+    return value, bound + dot(lin.roundings, (k, g, order), (sizes, w_sizes))
 
 
 @inlined
@@ -140,29 +149,21 @@ def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
 @inlined
 def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
     """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 if it is in doubt."""
-    row, value, n = lin.series[k, g, order], 0.0, x.shape[0]
-    for m in range(n):
-        few()
-        value += row[m] * x[m]
-    for m in range(w.shape[0]):
-        few()
-        value += row[n + m] * w[m]
+    value = dot(lin.series, (k, g, order), (x, w))
     if not abs(value) > lin.largest[k, g, order] * size:
         return 0
     return 1 if value > 0.0 else -1
 
 
 @inlined
-def linear_side(
-    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, w: Any, w_error: Any
-) -> tuple[int, int, bool]:
+def linear_side(lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any) -> tuple[int, int, bool]:
     """As `hybridsim.engine.decide.side_after`, coefficient by coefficient; and whether it is a question of rounding."""
-    is_open, size = False, size_of_point(x, x_error, w, w_error)
+    is_open, size = False, size_of_point(x, x_error, work.w, work.w_error)
     for order in range(decreed, ORDER + 1):
-        sign = clear_sign(lin, k, g, order, x, w, size)
+        sign = clear_sign(lin, k, g, order, x, work.w, size)
         if sign != 0:  # far beyond its bound
             return sign, order, False
-        value, bound = linear_coefficient(lin, k, g, order, x, x_error, w, w_error)
+        value, bound = linear_coefficient(lin, k, g, order, x, x_error, work)
         if value > bound:
             return 1, order, False
         if value < -bound:
@@ -174,26 +175,22 @@ def linear_side(
 @inlined
 def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
     """Modal coordinates of y = (x, w)."""
-    n = x.shape[0]
-    for j in range(lin.counts[k]):
-        real = imaginary = 0.0
-        for m in range(n):
-            weight = lin.inverse[k, j, m]
-            real, imaginary = real + weight.real * x[m], imaginary + weight.imag * x[m]
-        for m in range(w.shape[0]):
-            weight = lin.inverse[k, j, n + m]
-            real, imaginary = real + weight.real * w[m], imaginary + weight.imag * w[m]
-        c[j] = complex(real, imaginary)
+    for q in range(lin.inverse.shape[1]):
+        few()
+        a, b, d, e = times(lin.inverse, (k, q), (x, w))
+        c[2 * q], c[2 * q + 1] = complex(a, b), complex(d, e)
 
 
 @inlined
 def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
     """Modal coordinates after a time d: exp(B d) c."""
     j = 0
-    while j < lin.counts[k]:
-        end = lin.ends[k, j]
+    values, ends, count = lin.values[k], lin.ends[k], lin.counts[k]
+    while j < count:
+        few()
+        end = ends[j]
         if end == j + 1:
-            value = lin.values[k, j]
+            value = values[j]
             if value == 0.0:
                 out[j] = c[j]
             else:
@@ -203,6 +200,10 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
         else:
             _move_block(lin, k, j, end, c, d, out)
         j = end
+    while j < out.shape[0]:  # what others left there
+        few()
+        out[j] = 0.0
+        j += 1
 
 
 @allocating_kernel
@@ -249,35 +250,25 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
 @inlined
 def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
     """States at modal coordinates c."""
-    for i in range(x.shape[0]):
-        total = 0.0
-        for j in range(lin.counts[k]):
-            b = lin.basis[k, i, j]
-            total += b.real * c[j].real - b.imag * c[j].imag
-        x[i] = total
+    product(lin.states, k, (c,), x)
 
 
 @inlined
 def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
     """Rates of the states at y = (x, w)."""
-    n = x.shape[0]
-    for i in range(n):
-        total = 0.0
-        for m in range(n):
-            total += lin.slopes[k, i, m] * x[m]
-        for m in range(w.shape[0]):
-            total += lin.slopes[k, i, n + m] * w[m]
-        out[i] = total
+    product(lin.slopes, k, (x, w), out)
 
 
 @inlined
-def state_sizes(lin: Any, k: int, before: Any, after: Any, scale: Any) -> None:
-    """What the states are summed from, in size, with modal coordinates before and after at the ends of a segment."""
-    for i in range(scale.shape[0]):
-        total = 0.0
-        for j in range(lin.counts[k]):
-            total += size_of(lin.basis[k, i, j]) * max(size_of(before[j]), size_of(after[j]))
-        scale[i] = total
+def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: Any) -> None:
+    """What the states are summed from, in size, with modal coordinates before and after at the ends of a segment.
+
+    larger: room for their sizes.
+    """
+    for j in range(before.shape[0]):
+        few()
+        larger[j] = max(size_of(before[j]), size_of(after[j]))
+    product(lin.spreads, k, (larger,), scale)
 
 
 @inlined

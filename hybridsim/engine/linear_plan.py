@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from threading import Lock
 from typing import Any
 
@@ -47,7 +47,9 @@ class LinearPlan:
         self._guards = entries(
             (k * guards + g, form) for k, mode in enumerate(modes) for g, form in mode.guards.items()
         )
-        known, terms = atoms.known, [term for a in atoms.known for term in a.terms]
+        used = sorted({a for m in monomials for a, _ in m})
+        known = [atoms.known[a] for a in used]
+        terms = [term for a in known for term in a.terms]
         self._computed = {
             name: np.array([numbers.place(value) for value in values], dtype=np.int64)
             for name, values in (
@@ -60,8 +62,7 @@ class LinearPlan:
             "kinds": np.array([a.kind for a in known], dtype=np.int64),
             "term_start": np.cumsum([0, *(len(a.terms) for a in known)]).astype(np.int64),
             "sources": np.array([source for source, _ in terms], dtype=np.int64),
-            "factor_start": np.cumsum([0, *(len(m) for m in monomials)]).astype(np.int64),
-            "factors": np.array([2 * a + part for m in monomials for a, part in m], dtype=np.int64),
+            "factors": _factors([[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(known)),
         }
         self.recipe = Recipe(numbers)
 
@@ -79,6 +80,14 @@ class LinearPlan:
     def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
         """The atoms and monomials as arrays; registers as for `matrices`."""
         return self._fixed | {name: registers[..., places] for name, places in self._computed.items()}
+
+
+def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
+    """What each is a product of, filled up with ones."""
+    factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
+    for row, monomial in zip(factors, monomials, strict=True):
+        row[: len(monomial)] = monomial
+    return factors
 
 
 def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:

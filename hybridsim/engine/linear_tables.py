@@ -14,6 +14,7 @@ from hybridsim.engine.linear_guards import TERMS, guard_series, modal_guards
 from hybridsim.engine.linear_plan import plan_of
 from hybridsim.engine.modal import modals
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import LANES, panels_of, rows_of
 from hybridsim.engine.system import System
 
 _LARGEST = 1e150  # the square of it has a value yet
@@ -26,15 +27,18 @@ _lock = Lock()
 class LinearTables(NamedTuple):
     """One row for each vector of modes, in the order of the shelf; y = (states, monomials) has n + M entries.
 
-    kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factor_start (M + 1,), factors: the
-    monomials, 2*atom + part. phases (2,): the sources in p that are angles known to rounding only.
-    series (K, G, 4, n + M): Taylor coefficients of the guards; roundings likewise: bounds of their rounding errors for
-    y of size 1; largest (K, G, 4): of those of a coefficient. counts (K,), values (K, J), upper (K, J, J), ends (K, J):
-    the flow in modal coordinates; basis (K, n, J), inverse (K, J, n + M): what leads there and back. terms (K, G, J, 2,
-    TERMS): Taylor coefficients of the guards in modal coordinates, factors of their real and imaginary parts; sizes,
-    rests (K, G, J): bounds of the guard and of the first coefficient left out; farthest, grown (K, G): how far ahead
-    the latter holds, but for a factor. slopes (K, n, n + M): rates of the states. waves (K, G): the modal coordinate
-    that turns without damping, where a guard sees one such and else constants; -1 otherwise.
+    kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factors (M, D): the monomials, each a
+    product of 2*atom + part, and of ones: 2*A. phases (2,): the sources in p that are angles known to rounding only.
+    Rows over y have zeros behind states and monomials, and panels are what `hybridsim.engine.panels` makes of them.
+    series (K, G, 4, .): Taylor coefficients of the guards, by rows over y; roundings likewise: bounds of their rounding
+    errors for y of size 1; largest (K, G, 4): of those of a coefficient. counts (K,), values (K, J), upper (K, J, J),
+    ends (K, J): the flow in modal coordinates c, J even; basis (K, n, J); inverse (K, J / 2, ., 4): panels that lead
+    from y to c, a complex number being two; states (K, ., 2 J, 4): from c to the states, spreads (K, ., J, 4): from its
+    sizes to what these are summed from; slopes (K, ., ., 4): from y to their rates. terms (K, G, J, 2, TERMS): Taylor
+    coefficients of the guards in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J):
+    bounds of the guard and of the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds,
+    but for a factor. waves (K, G): the modal coordinate that turns without damping, where a guard sees one such and
+    else constants; -1 otherwise.
     """
 
     kinds: np.ndarray
@@ -43,7 +47,6 @@ class LinearTables(NamedTuple):
     term_start: np.ndarray
     sources: np.ndarray
     weights: np.ndarray
-    factor_start: np.ndarray
     factors: np.ndarray
     phases: np.ndarray
     series: np.ndarray
@@ -55,25 +58,26 @@ class LinearTables(NamedTuple):
     ends: np.ndarray
     basis: np.ndarray
     inverse: np.ndarray
+    states: np.ndarray
+    spreads: np.ndarray
+    slopes: np.ndarray
     terms: np.ndarray
     sizes: np.ndarray
     rests: np.ndarray
     farthest: np.ndarray
     grown: np.ndarray
-    slopes: np.ndarray
     waves: np.ndarray
 
 
 def no_tables() -> LinearTables:
     """Tables of a loop whose modes are not linear: empty."""
-    i, f, c = np.int64, np.float64, np.complex128
+    i, c = np.int64, np.complex128
     tables: LinearTables = packed(LinearTables(
-        np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros(1, i),
-        np.zeros(0, i), np.zeros(2, i), np.zeros((0, 0, 0, 0), f), np.zeros((0, 0, 0, 0), f),
-        np.zeros((0, 0, 0)), np.zeros(0, i),
+        np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros((0, 0), i),
+        np.zeros(2, i), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros(0, i),
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
-        np.zeros((0, 0, 0), c), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0), i),
+        *(np.zeros((0, 0, 0, LANES)) for _ in range(4)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)),
+        np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i),
     ))  # fmt: skip
     return tables
 
@@ -111,7 +115,7 @@ def angles_of(system: System) -> np.ndarray:
 def of_matrices(A: np.ndarray, rows: np.ndarray, n: int, horizon: float) -> dict[str, np.ndarray]:
     """The fields of the tables that have a row for each vector of modes, by name: of A (K, m, m), rows (K, G, m)."""
     count, guards, size = rows.shape
-    flows = modals(A, horizon, TERMS)
+    flows = modals(A, horizon, TERMS, multiple=LANES // 2)
     widest = flows.values.shape[1]
     series, roundings = (np.empty((count, guards, ORDER + 1, size)) for _ in range(2))
     guard_series(A, rows, series, roundings)
@@ -130,22 +134,26 @@ def of_matrices(A: np.ndarray, rows: np.ndarray, n: int, horizon: float) -> dict
         grown,
         waves,
     )
+    parts, basis = (n, size - n), flows.full_basis[:, :n].copy()
+    inverse = np.stack([flows.inverse.real, flows.inverse.imag], axis=2).reshape(count, 2 * widest, size)
     return {
-        "series": series,
-        "roundings": roundings,
+        "series": rows_of(series, parts),
+        "roundings": rows_of(roundings, parts),
         "largest": roundings.max(axis=-1),
         "counts": flows.counts,
         "values": flows.values,
         "upper": flows.upper,
         "ends": flows.ends,
-        "basis": flows.full_basis[:, :n].copy(),
-        "inverse": flows.inverse,
+        "basis": basis,
+        "inverse": panels_of(inverse, parts),
+        "states": panels_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(count, n, 2 * widest)),
+        "spreads": panels_of(np.abs(basis.real) + np.abs(basis.imag)),
+        "slopes": panels_of(A[:, :n], parts),
         "terms": terms,
         "sizes": sizes,
         "rests": rests,
         "farthest": farthest,
         "grown": grown,
-        "slopes": A[:, :n].copy(),
         "waves": waves,
     }
 
@@ -182,7 +190,7 @@ def _tables_of(
         tables = linear_tables(system, modes, p, horizon)
         if tables is None:
             return None
-        forms = len(tables.kinds), len(tables.factor_start), tables.values.shape
+        forms = len(tables.kinds), len(tables.factors), tables.values.shape
         spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {forms}", deque)
         found = (tables, spare)
         with _lock:

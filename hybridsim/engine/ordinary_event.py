@@ -143,7 +143,7 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
             return False
         if is_linear(lin):
             functions_of_time(lin, at.s, p, work.factors, work.w)
-            errors_of_time(lin, at.s, at.s_error, p, work.factors, work.w_error)
+            errors_of_time(lin, at.s_error, work.factors, work.w_error)
         continuous, is_on, vector = False, automata.is_corner[c], p
     k = find_modes(tapes.modes, z)
     if k < 0:

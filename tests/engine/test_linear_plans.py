@@ -10,6 +10,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.engine.linear_modes import what_is_not_linear
 from hybridsim.engine.linear_tables import linear_tables
+from hybridsim.engine.panels import rows_of
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -36,13 +37,12 @@ def rates(system: System, s: float, x: np.ndarray) -> np.ndarray:
         angle = tables.offsets[a] + sum(tables.weights[i] * p[tables.sources[i]] for i in terms)
         moved = angle + tables.rates[a] * s
         atoms.append({0: (s,), 1: (angle,), 2: (np.sin(moved), np.cos(moved)), 3: (np.exp(moved),)}[kind])
-    starts = tables.factor_start
-    functions = [
-        np.prod([atoms[f // 2][f % 2] for f in tables.factors[starts[m] : starts[m + 1]]])
-        for m in range(len(starts) - 1)
-    ]
+    one = 2 * len(atoms)
+    functions = [np.prod([atoms[f // 2][f % 2] for f in row if f != one]) for row in tables.factors]
     assert values["q"] == 0.0
-    return tables.slopes[0] @ np.concatenate([x, functions])
+    y = rows_of(np.concatenate([x, functions]), (len(x), len(functions)))
+    (panel,) = tables.slopes[0]
+    return (y @ panel)[: len(x)]
 
 
 def expected(values: dict[str, float], t: float, x: np.ndarray) -> list[float]:

@@ -14,6 +14,7 @@ from hybridsim.engine.linear_kernels import moved, states_of, to_modal
 from hybridsim.engine.linear_tables import LinearTables, no_tables
 from hybridsim.engine.modal import Modal, modal
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import filled_up, panels_of, vector_of
 
 UNIT = 2.0**-53
 ROUNDINGS = 256.0  # of the result, as ill conditioned as it is
@@ -46,12 +47,16 @@ def by_blocks(flow: Modal, y: np.ndarray, d: float) -> np.ndarray:
     empty = no_tables()
     fields = {name: getattr(empty, name) for name in LinearTables._fields}
     fields["counts"] = np.array([len(flow.values)])
-    for name in ("values", "upper", "ends", "inverse"):
+    for name in ("values", "upper", "ends"):
         fields[name] = getattr(flow, name)[None]
-    fields["basis"] = flow.full_basis[None]
-    c, v = np.zeros((2, len(flow.values)), dtype=complex)
-    out = np.empty(len(y))
-    _flow(packed(LinearTables(**fields)), y, np.zeros(0), d, c, v, out)
+    width = filled_up(2 * len(flow.values)) // 2
+    inverse, basis = flow.inverse, flow.full_basis
+    fields["inverse"] = panels_of(np.stack([inverse.real, inverse.imag], axis=1).reshape(1, -1, len(y)))
+    fields["states"] = panels_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(1, len(y), -1))
+    c, v = np.zeros((2, width), dtype=complex)
+    start, out = vector_of(len(y)), np.empty(len(y))
+    start[:] = y
+    _flow(packed(LinearTables(**fields)), start, np.zeros(0), d, c, v, out)
     return out
 
 
