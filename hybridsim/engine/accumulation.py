@@ -41,30 +41,39 @@ _NO_INTERVALS = np.empty(0)
 @kernel
 def may_end(
     gaps: Any,
-    high: float,
-    low: float,
+    at: Any,
+    is_begun: bool,
     instants: Any,
+    owners: Any,
+    component: int,
     shortest: float,
     resolution: float,
     work: Any,
     last: Any,
-) -> bool:
-    """Whether a series of intervals goes on at the last event, or may have come to its end before.
+) -> tuple[bool, int]:
+    """Whether a series of intervals goes on at the last event, or may have come to its end before; how many there are.
 
     In a series an interval is shorter than the one a turn before it, or next to nothing, many times in a row. It is not
     at its end as long as the next interval alone, by the factor of the last ones, is more than what ends it.
-    gaps (k,): intervals up to the instant (high, low), after which the instants (E, 2) follow. work (2, events of a
-    turn at most) is written to, and last (m,): the last intervals of all.
+    gaps (k,): intervals up to the instant in `at` (2,), if the series is begun. After it those of the instants (E, 2)
+    follow whose owner (E,) is the component; the last of them is left in `at`. work (2, events of a turn at most) is
+    written to, and last (m,): the last intervals of all, number i in place i % m.
     """
-    longest, known, ended = 0.0, gaps.shape[0], False
+    longest, known, ended, i = 0.0, gaps.shape[0], False, 0
+    high, low = at[0], at[1]
     before, falls = work[0], work[1]  # the last intervals; falls in a row, for turns of 1, 2, ... events
     before[:], falls[:] = math.inf, 0.0
-    for i in range(known + instants.shape[0]):
-        if i < known:
-            gap = gaps[i]
+    for e in range(-known, instants.shape[0]):
+        if e < 0:
+            gap = gaps[e + known]
+        elif owners[e] != component:
+            continue
         else:
-            gap = abs((instants[i - known, 0] - high) + (instants[i - known, 1] - low))
-            high, low = instants[i - known, 0], instants[i - known, 1]
+            gap = abs((instants[e, 0] - high) + (instants[e, 1] - low))
+            high, low = instants[e, 0], instants[e, 1]
+            if not is_begun:
+                is_begun = True
+                continue
         longest = max(longest, gap)
         is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(high))
         end = max(resolution, _END * 2.0**-52 * abs(high), _FAR_DOWN * longest)
@@ -74,22 +83,12 @@ def may_end(
             falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
             if falls[turn] >= _TERMS and i >= known:
                 ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
-        before[i % _MOST] = gap
-        place = i - known - instants.shape[0] + last.shape[0]
-        if place >= 0:
-            last[place] = gap
+        before[i % _MOST] = last[i % last.shape[0]] = gap
+        i += 1
+    at[0], at[1] = high, low
     for turn in range(_MOST):
         ended = ended or falls[turn] >= _TERMS
-    return ended
-
-
-@kernel
-def all_equal(numbers: Any) -> bool:
-    """Whether one or more numbers are all the same."""
-    for number in numbers:
-        if number != numbers[0]:
-            return False
-    return True
+    return ended, i
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
@@ -178,35 +177,33 @@ class Accumulation:
         is_short = count <= _KEPT + 1  # a series under way there has forecasts, which are made one by one
         if count < 2 or (is_short and self.paces):
             return self._one_by_one(instants, owners)
-        chosen: list[Any] = [slice(None)]
-        if not all_equal(owners):
-            counts = np.bincount(owners)
-            among = np.flatnonzero(counts)
-            if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
-                among = np.flatnonzero(counts > _TERMS)
-                self.forget(tuple(set(self.paces).difference(among.tolist())))
-            chosen = [np.flatnonzero(owners == c) for c in among]
+        counts = np.bincount(owners).tolist()
+        among = [c for c, events in enumerate(counts) if events]
+        if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
+            among = [c for c in among if counts[c] > _TERMS]
+            self.forget(tuple(set(self.paces).difference(among)))
         paces = []
-        for k in chosen:
-            component = int(owners[k][0])
-            may_have_ended, pace = self._paced(instants[k], component)
+        for component in among:
+            may_have_ended, pace = self._paced(instants, owners, component)
             if may_have_ended or (is_short and _next_turn(pace)[0]):  # worth a closer look
-                kept = np.sort(np.concatenate([np.arange(count)[k] for k in chosen]))
+                kept = np.isin(owners, among)
                 return self._one_by_one(instants[kept], owners[kept])
             paces.append((component, pace))
         self.paces.update(paces)
         self._unjudged.update([component for component, _ in paces])
         return None
 
-    def _paced(self, instants: np.ndarray, component: int) -> tuple[bool, Pace]:
+    def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
         """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
         pace = self.paces.get(component, BEGINNING)
-        first, rest = (pace.last, instants) if pace.last else (Instant(*instants[0].tolist()), instants[1:])
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
-        last = np.empty(min(_KEPT, len(pace.intervals) + len(rest)))
-        work, least = np.empty((2, _MOST)), (self.shortest, self.resolution)
-        ended = may_end(known, first.high, first.low, rest, *least, work, last)
-        return ended, Pace(Instant(*instants[-1].tolist()), tuple(last.tolist()), pace.longest)
+        at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, _MOST)), np.empty(_KEPT)
+        ended, count = may_end(
+            known, at, pace.last is not None, instants, owners, component, self.shortest, self.resolution, work, last
+        )  # fmt: skip
+        newest, oldest = last.tolist(), count % _KEPT
+        intervals = newest[:count] if count <= _KEPT else newest[oldest:] + newest[:oldest]
+        return ended, Pace(Instant(*at.tolist()), tuple(intervals), pace.longest)
 
     def _one_by_one(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
         for (high, low), c in zip(instants.tolist(), owners.tolist(), strict=True):

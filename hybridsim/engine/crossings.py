@@ -36,6 +36,18 @@ def _taking_part(
     return count, is_plain
 
 
+@kernel
+def _times_at(instants: Any, places: Any, first: int, component: int, times: Any) -> int:
+    """Times of the occurrences of a component, from that number on, and how many there are."""
+    count = 0
+    for i in range(first, places.shape[1]):
+        if places[1, i] == component:
+            e = places[0, i]
+            times[count] = instants[e, 0] + instants[e, 1]
+            count += 1
+    return count
+
+
 class Crossings(Sequence[Occurrence]):
     """E events in arrays; each is an occurrence for every component that changes its mode or is reset.
 
@@ -91,8 +103,10 @@ class Crossings(Sequence[Occurrence]):
         automata = self._system.automata
         for c, automaton in enumerate(automata):
             if automaton.name == component and kind in (None, automaton.kind):
-                times = self.times
-                return times if len(automata) == 1 else times[self._places[1] == c]
+                if len(automata) == 1:
+                    return self.times
+                times = np.empty(len(self))
+                return times[: _times_at(self._instants, self._all_places, self._first, c, times)]
         return np.empty(0)
 
     def kinds(self) -> Counter[str]:
