@@ -11,7 +11,7 @@ from typing import Any
 
 from hybridsim.engine.decide import decreed_zeros
 from hybridsim.engine.event_verdicts import is_continuous
-from hybridsim.engine.event_work import FIRED, called_by, find_modes, located
+from hybridsim.engine.event_work import FIRED, ROW, called_by, find_modes, located
 from hybridsim.engine.few import few, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
@@ -29,7 +29,9 @@ def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
 
 
 @inlined
-def _verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: bool, size: float, work: Any) -> int:
+def _verdict(
+    automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: bool, size: float, work: Any
+) -> int:
     """1 where the modes on trial, which row k is of, certainly go on; -1 where c leaves them; _UNCLEAR."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         few()
@@ -57,7 +59,8 @@ def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) 
 def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
     """Whether the event in the work space is clear; then what holds after it has taken the place of the state.
 
-    Another event is left to others, whatever has been written to the work space.
+    `ROW` of the work space is that of the modes before it, and then of those after it. Another event is left to others,
+    whatever has been written to the rest of the work space.
     """
     fired, at = work.whole[FIRED], located(state, work)
     c = automata.owner[fired]
@@ -69,9 +72,7 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
         d = automata.cluster[i]
         if automata.is_unilateral[d] or (d != c and at.z[d] == automata.hold[d]):
             return False  # they are decided together
-    before = find_modes(tapes.modes, at.z)
-    if before < 0:
-        return False
+    before = work.whole[ROW]
     x, x_error, trial = work.x_after, work.slopes, work.trial
     put(at.x_error, x_error)
     put(at.z, trial)
@@ -94,7 +95,9 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
             return False
         smooth = False
         if now == hold:
-            smooth = is_continuous(called_by(work), automata, at, x, trial, work.everything, fired, work.jumps)
+            smooth = is_continuous(
+                called_by(work), automata, at, x, trial, work.everything, fired, work.jumps
+            )
         verdict = _verdict(automata, tapes, lin, k, c, smooth, size, work)
         if verdict == _UNCLEAR or (verdict > 0 and found >= 0):
             return False
@@ -105,6 +108,7 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
     if found < 0:
         return False
     state.z[c] = trial[c] = found
+    work.whole[ROW] = after
     put(x, state.x)
     put(x_error, state.x_error)
     sides, orders, floors = state.sides, state.orders, state.floors

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.few import few
 from hybridsim.engine.jets import ORDER
 from hybridsim.engine.jit import ENABLED, inlined, merged
 from hybridsim.engine.packs import packed
 from hybridsim.engine.panels import vector_of
 
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
-FIRED, DISCRETE, DISCRETE_AT = range(3)  # of `Work.whole`
+FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # of `Work.whole`
 AT, AT_ERROR = range(2)  # of `Work.real`
 SETTLE, LEAP = range(2)  # of `Work.reached`
 NOBODY = -1  # in place of the guard that fired
@@ -47,7 +48,8 @@ class Work(NamedTuple):
     leap. whole, real: what the places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes
     (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
     factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled; sizes,
-    w_sizes: of states and of these. sides, orders, floors (G,): of the guards just after it. The last ones have a row for each joint candidate.
+    w_sizes: of states and of these. sides, orders, floors (G,): of the guards just after it. The last ones have a row
+    for each joint candidate.
     """
 
     functions: np.ndarray
@@ -93,10 +95,11 @@ class Work(NamedTuple):
 def find_modes(modes: Any, z: Any) -> int:
     """Row of a vector of modes on the shelf; -1 where it is not."""
     for k in range(modes.shape[0]):
-        same = True
-        for c in range(z.shape[0]):
-            same = same and modes[k, c] == z[c]
-        if same:
+        c = 0
+        while c < z.shape[0] and modes[k, c] == z[c]:
+            few()
+            c += 1
+        if c == z.shape[0]:
             return k
     return -1
 
@@ -131,7 +134,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
         Work(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
             reached=numbers(2),
-            whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at], dtype=np.int64),
+            whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64),
             real=np.zeros(2),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             z_after=numbers(count),

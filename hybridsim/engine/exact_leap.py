@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import LEAP, called_by, find_modes
+from hybridsim.engine.event_work import LEAP, ROW, called_by, find_modes
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
@@ -49,8 +49,8 @@ class Room(NamedTuple):
 
     rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
     target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
-    followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a state;
-    hints (K, G): when a guard was zero last.
+    followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2), a
+    state; hints (K, G): when a guard was zero last.
     """
 
     rates: np.ndarray
@@ -183,8 +183,8 @@ def exact_leap(
     for k in range(hints.shape[0]):
         for g in range(hints.shape[1]):
             hints[k, g] = 0.0
+    k = find_modes(tapes.modes, z)
     while True:
-        k = find_modes(tapes.modes, z)
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
             return AT_TARGET
@@ -240,10 +240,12 @@ def exact_leap(
         errors_of_time(lin, s_error, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
+        work.whole[ROW] = k
         if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
             return STOPPED
+        k = work.whole[ROW] if work.whole[ROW] != k else find_modes(tapes.modes, z)
         is_known = automata.hold[automata.owner[fired]] >= 0  # others may have changed what is in p
         put(y1, jumps[n_segments, 2])
         n_segments += 1

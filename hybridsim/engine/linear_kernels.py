@@ -116,7 +116,9 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
 
 
 @inlined
-def linear_coefficient(lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any) -> tuple[float, float]:
+def linear_coefficient(
+    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
+) -> tuple[float, float]:
     """A Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
@@ -148,7 +150,7 @@ def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
 
 @inlined
 def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
-    """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 if it is in doubt."""
+    """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 where in doubt."""
     value = dot(lin.series, (k, g, order), (x, w))
     if not abs(value) > lin.largest[k, g, order] * size:
         return 0
@@ -156,7 +158,9 @@ def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float
 
 
 @inlined
-def linear_side(lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any) -> tuple[int, int, bool]:
+def linear_side(
+    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
+) -> tuple[int, int, bool]:
     """As `hybridsim.engine.decide.side_after`, coefficient by coefficient; and whether it is a question of rounding."""
     is_open, size = False, size_of_point(x, x_error, work.w, work.w_error)
     for order in range(decreed, ORDER + 1):

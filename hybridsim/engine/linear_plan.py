@@ -62,7 +62,9 @@ class LinearPlan:
             "kinds": np.array([a.kind for a in known], dtype=np.int64),
             "term_start": np.cumsum([0, *(len(a.terms) for a in known)]).astype(np.int64),
             "sources": np.array([source for source, _ in terms], dtype=np.int64),
-            "factors": _factors([[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(known)),
+            "factors": _factors(
+                [[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(known)
+            ),
         }
         self.recipe = Recipe(numbers)
 

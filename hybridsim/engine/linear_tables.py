@@ -76,8 +76,9 @@ def no_tables() -> LinearTables:
         np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros((0, 0), i),
         np.zeros(2, i), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros(0, i),
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
-        *(np.zeros((0, 0, 0, LANES)) for _ in range(4)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i),
+        np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)),
+        np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i),
     ))  # fmt: skip
     return tables
 

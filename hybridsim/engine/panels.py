@@ -75,7 +75,9 @@ if ENABLED:
             place = builder.gep(place, [builder.mul(number, stride)])
         return builder.bitcast(place, _DOUBLE.as_pointer())
 
-    def _over_fours(context: Any, builder: Any, kind: Any, value: Any, row: Any, wide: int, body: Any, sums: Any) -> Any:
+    def _over_fours(
+        context: Any, builder: Any, kind: Any, value: Any, row: Any, wide: int, body: Any, sums: Any
+    ) -> Any:
         """Sums over a vector, four entries at a time; row: what goes with its begin, so many numbers to an entry.
 
         body(entries, row, sums) gives the next of the sums. Returns the sums, and what goes with the next vector.
@@ -122,7 +124,12 @@ if ENABLED:
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             place = _address(
-                context, builder, panels, arguments[0], at, cgutils.unpack_tuple(builder, arguments[1], len(at))
+                context,
+                builder,
+                panels,
+                arguments[0],
+                at,
+                cgutils.unpack_tuple(builder, arguments[1], len(at)),
             )
             sums = [_ZERO, _ZERO]
             parts = cgutils.unpack_tuple(builder, arguments[2], len(vectors))
@@ -163,7 +170,9 @@ if ENABLED:
 else:
 
     def _entries(vectors: tuple[Any, ...]) -> np.ndarray:
-        return rows_of(np.concatenate([v.view(float) for v in vectors]), [v.view(float).size for v in vectors])
+        return rows_of(
+            np.concatenate([v.view(float) for v in vectors]), [v.view(float).size for v in vectors]
+        )
 
     def times(panels: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
         """Four sums."""
