@@ -37,7 +37,7 @@ MODEL, PYTHON = "functions of the model, other kernels", "Python, NumPy and the 
 PARTS = {
     "first_zero": ZEROS, "first_exit_of": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
     "exact_leap": MOTION, "leap": MOTION,
-    "judge_candidate": MODES, "settle_event": MODES, "bounds": MODES,
+    "judge_candidate": MODES, "settle_event": MODES, "settle_clearly": MODES, "bounds": MODES,
     "series": SERIES, "values": SERIES, "ahead": SERIES, "sizes": SERIES, "advance": SERIES, "expand": SERIES,
 }  # fmt: skip
 

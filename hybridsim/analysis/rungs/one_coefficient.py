@@ -29,7 +29,8 @@ class OneCoefficient(Rung):
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
             raise NothingToDrop(
-                "mu_s = mu_k already: every contact breaks loose at the force with which it slides"
+                "there is no step between mu_s and mu_k: every contact breaks loose at the force with which it begins "
+                "to slide"
             )
         lowered = {c.name for c, jump in zip(model.contacts, jumps, strict=True) if jump}
         return with_contacts(model, lambda c: _lowered(c) if c.name in lowered else c, self.title)
