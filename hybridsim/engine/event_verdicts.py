@@ -55,7 +55,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
 @inlined
 def is_linear(lin: Any) -> bool:
     """Whether there are tables of linear modes."""
-    return lin.kinds.shape[0] > 0
+    return lin.counts.shape[0] > 0
 
 
 @inlined

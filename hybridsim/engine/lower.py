@@ -18,7 +18,7 @@ from hybridsim.engine.program_names import declared_name, user
 from hybridsim.engine.second_order import Partner, attraction, partners
 from hybridsim.engine.ties import Tie, help_of_ties, ties, without_share
 from hybridsim.errors import ModelError, Place
-from hybridsim.expr.simplify import is_short, simplified
+from hybridsim.expr.simplify import is_short, simplified, written_out
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.switching import ATTRACTION
 
@@ -358,7 +358,7 @@ class Lowering:
                 return [branches(c, unknown[c].name, sp.Integer(0))]
             value = -rate[c] / effect[c, c]
             if value.count_ops() < 200 and is_short(value):
-                value = sp.expand(sp.cancel(sp.together(value)))
+                value = written_out(value)
             value = value.xreplace({sp.zoo: sp.nan})  # where a sign in the effect is zero: it cannot be held
             return [branches(c, unknown[c].name, value)]
         # joint solve: rows of components that do not hold read "unknown = its declared value", less what that has from

@@ -34,6 +34,16 @@ def simplified(e: Any) -> Any:
     return min(found, e, key=sympy.count_ops)  # written out it may be longer
 
 
+def written_out(e: Any) -> Any:
+    """The same value over one denominator, as the sum that it is.
+
+    Exponentials count as names: exp(-t) would else be a quotient, and all beside it be multiplied by exp(t).
+    """
+    names = {part: sympy.Dummy(real=True) for part in e.atoms(sympy.exp)}
+    found = sympy.expand(sympy.cancel(sympy.together(e.xreplace(names))))
+    return found.xreplace({name: part for part, name in names.items()})
+
+
 def is_short(e: Any) -> bool:
     """Whether an expression stays so when it is written out, its functions' arguments with it."""
     return all(

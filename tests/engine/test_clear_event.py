@@ -36,12 +36,20 @@ def pair(a: float, w: float, first: dict[str, Any], second: dict[str, Any], belt
     )
 
 
+# no force of it is a function of time
+LEFT_ALONE = hs.Model(
+    "alone",
+    [hs.State("x", 0, "v"), hs.State("v", 0.1, "-x - f")],
+    contacts=[hs.Contact("f", velocity="v - 0.1", normal=1, **DROPPING)],
+)
+
 SCENES: dict[str, tuple[Any, float, int]] = {
     "reversals": (hs.load("dfcs").with_(F0=60, N=40, omega="1.4*sqrt(k/m)"), 0.1, 10),
     "stops": (hs.load("dfcs").with_(F0=30, N=40, omega="0.6*sqrt(k/m)"), 0.2, 30),
     "two contacts": (pair(1.0, 0.4, COULOMB, COULOMB), 150.0, 60),
     "two that let go": (pair(1.3, 0.7, DROPPING, DROPPING), 100.0, 30),
     "a belt": (pair(1.0, 0.5, DROPPING, DROPPING, belt=0.05), 100.0, 20),
+    "left alone": (LEFT_ALONE, 100.0, 15),
     "slow and hard to move": (pair(0.9, 0.05, COULOMB, DROPPING), 300.0, 15),
 }
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from engine.model_truth import combinations
 
+import hybridsim as hs
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.model import (
@@ -180,3 +181,20 @@ def test_a_jump_has_its_size_and_sign() -> None:
     above, below = jump(slider(STICTION))
     assert above == pytest.approx(0.1 * 7.3)
     assert below == pytest.approx(-0.1 * 7.3)
+
+
+@pytest.mark.parametrize("load", ["exp(-t/10)", "exp(-t/10)*cos(t)", "exp(-(t - x)/10)"])
+def test_what_decays_is_no_quotient(load: str) -> None:
+    """The force that holds has exp(-t/10) in it, and not exp(t/10), which has no value for long."""
+    model = hs.Model(
+        "decay",
+        [hs.State("x", 0, "v"), hs.State("v", 0, f"2 + {load} - x - f")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 0.1})],
+    )
+    late = {"x": 2.0, "v": 0.0}
+    sol = hs.simulate(model, (8000, 8010), x0=late, integrator="dop853")
+    assert sol.status == "finished" and sol.y[0, -1] == 2.0
+    if "x" not in load:
+        early = [hs.simulate(model, (0, 30), integrator=name) for name in ("exact", "taylor")]
+        times = [[e.t for e in run.events] for run in early]
+        assert len(times[0]) > 2 and times[0] == pytest.approx(times[1], rel=1e-7)
