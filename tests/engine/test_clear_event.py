@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from typing import Any
 
 import pytest
+from engine.uncompiled import uncompiled
 
 import hybridsim as hs
 from hybridsim.engine import ordinary_event
@@ -84,17 +82,8 @@ def both(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_nothing_is_settled_otherwise(scene: str) -> None:
-    code = f"from engine.test_clear_event import both\nboth({scene!r})"
-    path = os.pathsep.join(p for p in sys.path if p)
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"HYBRIDSIM_JIT": "0", "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    (clear, *one), (none, *other) = json.loads(done.stdout)
+    told = uncompiled(f"from engine.test_clear_event import both\nboth({scene!r})")
+    (clear, *one), (none, *other) = json.loads(told)
     assert none == 0
     assert clear >= SCENES[scene][2]
     assert one[0] == "finished"
