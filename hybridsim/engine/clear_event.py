@@ -11,11 +11,12 @@ from typing import Any
 
 from hybridsim.engine.decide import decreed_zeros
 from hybridsim.engine.event_verdicts import is_continuous
-from hybridsim.engine.event_work import FIRED, ROW, called_by, find_modes, located
+from hybridsim.engine.event_work import FIRED, ROW, called_by, located
 from hybridsim.engine.few import few, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.linear_kernels import clear_sign, linear_coefficient, size_of_point
+from hybridsim.engine.modes_index import find_modes
 
 _UNCLEAR = 0
 
@@ -90,7 +91,7 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
         if mode == now:
             continue
         trial[c] = mode
-        k = find_modes(tapes.modes, trial)
+        k = find_modes(tapes, trial)
         if k < 0:
             return False
         smooth = False

@@ -57,8 +57,13 @@ class CodeShelf(ABC):
             with self._lock:
                 former, codes = self._known[1], self._blank(len(tapes.modes))
                 for old, new in zip(former, codes, strict=True):
-                    new[: len(old)] = old  # a shelf only grows
-                self._known = known = tapes, codes, packed(codes)
+                    shared = min(len(old), len(new))
+                    new[:shared] = old[:shared]
+                known = tapes, codes, packed(codes)
+                if len(codes.lacked) >= len(
+                    former.lacked
+                ):  # a shelf only grows, but another thread may be ahead
+                    self._known = known
         return known[2]
 
     def look(self, tapes: Tapes, codes: Any) -> None:

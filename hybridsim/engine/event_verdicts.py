@@ -13,10 +13,11 @@ from hybridsim.engine.decide import (
     open_question,
     side_after,
 )
-from hybridsim.engine.event_work import called_by, find_modes, located
+from hybridsim.engine.event_work import called_by, located
 from hybridsim.engine.jets import ORDER, run_series
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel, merged
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
+from hybridsim.engine.modes_index import find_modes
 
 UNKNOWN = -2  # in place of a verdict
 
@@ -203,7 +204,7 @@ def judge_candidate(
     the components that are decided. UNKNOWN where these modes are not on the shelf. is_known: their guards' series are
     there.
     """
-    k = find_modes(tapes.modes, work.trial)
+    k = find_modes(tapes, work.trial)
     if k < 0:
         return UNKNOWN
     at, cluster = located(state, work), cluster_of(automata, c)

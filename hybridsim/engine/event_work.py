@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.few import few
 from hybridsim.engine.jets import ORDER
 from hybridsim.engine.jit import ENABLED, inlined, merged
 from hybridsim.engine.packs import packed
@@ -89,19 +88,6 @@ class Work(NamedTuple):
     all_sides: np.ndarray
     all_orders: np.ndarray
     all_floors: np.ndarray
-
-
-@inlined
-def find_modes(modes: Any, z: Any) -> int:
-    """Row of a vector of modes on the shelf; -1 where it is not."""
-    for k in range(modes.shape[0]):
-        c = 0
-        while c < z.shape[0] and modes[k, c] == z[c]:
-            few()
-            c += 1
-        if c == z.shape[0]:
-            return k
-    return -1
 
 
 @inlined

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import LEAP, ROW, called_by, find_modes
+from hybridsim.engine.event_work import LEAP, ROW, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_kernel, kernel, kernel_address
+from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
@@ -30,6 +30,7 @@ from hybridsim.engine.linear_kernels import (
     states_of,
     to_modal,
 )
+from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.packs import packed
 from hybridsim.engine.panels import dot, vector_of
 from hybridsim.engine.segment_end import (
@@ -50,7 +51,9 @@ class Room(NamedTuple):
     rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
     target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
     followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2),
-    a state; hints (K, G): when a guard was zero last.
+    a state; hints (K, G): how long after these modes
+    were entered a guard was zero when they were met last in this run, 0 where it was not;
+    former (G,): a row of it before the segment under way.
     """
 
     rates: np.ndarray
@@ -65,6 +68,7 @@ class Room(NamedTuple):
     terms: np.ndarray
     starts: np.ndarray
     hints: np.ndarray
+    former: np.ndarray
     scale: np.ndarray
     pace: np.ndarray
 
@@ -152,11 +156,19 @@ def room_for(system: Any, tables: Any) -> Room:
             terms=np.zeros((2, TERMS)),
             starts=np.zeros((system.guard_count, TERMS + 2)),
             hints=np.zeros(tables.farthest.shape),
+            former=np.zeros(tables.farthest.shape[1]),
             scale=np.empty(n),
             pace=np.empty(3),
         )
     )
     return room
+
+
+@inlined
+def stopped(hints: Any, k: int, former: Any) -> int:
+    """The segment under way is left to others, or to a leap that begins with it: its zeros have not been met."""
+    put(former, hints[k])
+    return STOPPED
 
 
 def exact_leap(
@@ -179,11 +191,8 @@ def exact_leap(
     n, n_segments = x.shape[0], 0
     pace = room.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
-    hints, is_known = room.hints, False
-    for k in range(hints.shape[0]):
-        for g in range(hints.shape[1]):
-            hints[k, g] = 0.0
-    k = find_modes(tapes.modes, z)
+    hints, former = room.hints, room.former
+    k, is_known = find_modes(tapes, z), False
     while True:
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
@@ -195,12 +204,13 @@ def exact_leap(
         if not is_known:
             set_origin(place, rates, clock[0], clock[1], p)
             functions_of_time(lin, 0.0, p, work.factors, work.w)
+        put(hints[k], former)
         to_modal(lin, k, x, work.w, c)
         fired, s = first_exit_of(lin, tapes, k, bound, state, room)
         if fired == _OPEN:
-            return STOPPED
+            return stopped(hints, k, former)
         if s > longest:
-            return STOPPED
+            return stopped(hints, k, former)
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
         state_sizes(lin, k, c, v, room.sizes, scale)
@@ -209,7 +219,7 @@ def exact_leap(
             put(y1, y)
         for i in range(n):
             if not abs(y[i]) < math.inf:
-                return STOPPED
+                return stopped(hints, k, former)
         ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
         rows[n_segments], fires[n_segments] = k, fired
         put(z, modes[n_segments])
@@ -226,7 +236,7 @@ def exact_leap(
             committed[0] = n_segments + 1
             return AT_TARGET
         if is_crowded(s, clock, pace):
-            return STOPPED
+            return stopped(hints, k, former)
         # the event is settled at the origin of the segment that follows, whose functions of time these are
         high, low = clock[0], clock[1]
         clock[0], clock[1] = moved_on(high, low, s)
@@ -244,8 +254,8 @@ def exact_leap(
         if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
-            return STOPPED
-        k = work.whole[ROW] if work.whole[ROW] != k else find_modes(tapes.modes, z)
+            return stopped(hints, k, former)
+        k = work.whole[ROW] if work.whole[ROW] != k else find_modes(tapes, z)
         is_known = automata.hold[automata.owner[fired]] >= 0  # others may have changed what is in p
         put(y1, jumps[n_segments, 2])
         n_segments += 1

@@ -35,6 +35,9 @@ class ExactLeaper:
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # the farthest that a segment might have gone so far
+        self.hints = np.zeros(
+            (0, system.guard_count)
+        )  # as in the room of a leap, where the last one left them
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # those that the sheet is for
         self.sheet: Sheet
@@ -46,13 +49,14 @@ class ExactLeaper:
         return other
 
     @property
-    def place(self) -> np.ndarray:
-        """How far ahead the tables reach."""
-        return np.array([self.horizon])
+    def place(self) -> tuple[np.ndarray, ...]:
+        """How far ahead the tables reach, and when guards were zero last: the last digits of a zero depend on it."""
+        return np.array([self.horizon]), self.hints.ravel()
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        self.horizon = float(place[0])
+        guards = self.system.guard_count
+        self.horizon, self.hints = float(place[0]), place[1:].reshape(-1, guards or 1)[:, :guards]
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
@@ -80,11 +84,14 @@ class ExactLeaper:
         room = desk.room
         room.rates[:], room.longest[0] = system.rates, self.longest
         room.times[:] = *target, *origin
+        hints, known = room.hints, len(self.hints)
+        hints[:known], hints[known:] = self.hints, 0.0
         began = perf_counter()
         code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
         record.counters.kernel_time += perf_counter() - began
         z, after = desk.leave()
         clock, count = room.times[2:].tolist(), int(room.committed[0])
+        self.hints = hints.copy()
         spare.append(desk)
         instants, owners = self._commit(tables, self.sheet.rows(memory), count, z, clock, record)
         shelf.surround(z)

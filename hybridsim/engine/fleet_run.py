@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.event_work import LEAP
-from hybridsim.engine.few import put
+from hybridsim.engine.few import fill, put
 from hybridsim.engine.fleet_start import plain_start, rests_for_ever
 from hybridsim.engine.jit import call_kernel, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL
@@ -93,6 +93,8 @@ def run_fleet(
                 at[NEXT] += 1
                 continue
             put(rates, room.rates)
+            for k in range(room.hints.shape[0]):
+                fill(room.hints[k], 0.0)
             clock[0], clock[1], target[0], target[1] = 0.0, 0.0, runs.ends[i], 0.0
             room.longest[0] = runs.longest[i]
             at[BEGUN], at[KEPT], at[RESUMED] = 1, 0, 0

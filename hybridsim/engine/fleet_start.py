@@ -10,12 +10,13 @@ from typing import Any
 
 from hybridsim.engine.decide import FINE, choose
 from hybridsim.engine.event_verdicts import cluster_of, guard_series, judge_candidate, judge_members
-from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by, find_modes
+from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.jets import UNIT, run_series
 from hybridsim.engine.jit import call, kernel, merged
 from hybridsim.engine.leap import set_origin
 from hybridsim.engine.linear_kernels import functions_of_time, to_modal
+from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.panels import LANES
 
 _UNKNOWN = -1  # in place of a mode
@@ -49,7 +50,7 @@ def plain_start(
     for c in range(z.shape[0]):
         if z[c] == _UNKNOWN and not _decide_cluster(automata, tapes, inputs, none, state, c, work):
             return False
-    k = find_modes(tapes.modes, z)
+    k = find_modes(tapes, z)
     if k < 0:
         return False
     at = Before(0.0, 0.0, x, x_error, p, z)
@@ -141,7 +142,7 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
     are taken at the origin of the state; c: room for modal coordinates.
     """
     x, z, p = state.x, state.z, state.p
-    k = find_modes(tapes.modes, z)
+    k = find_modes(tapes, z)
     if k < 0:
         return False
     functions_of_time(lin, 0.0, p, work.factors, work.w)

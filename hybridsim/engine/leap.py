@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.event_work import find_modes
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
+from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
 from hybridsim.engine.steps_ahead import (
     BETWEEN,
@@ -201,7 +201,7 @@ def leap(
     pace = room.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
-        k, first_step = find_modes(tapes.modes, z), n_steps
+        k, first_step = find_modes(tapes, z), n_steps
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
             return AT_TARGET, n_steps, n_segments

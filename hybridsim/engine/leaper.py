@@ -172,9 +172,9 @@ class Leaper(ABC):
         return sheet
 
     @property
-    def place(self) -> np.ndarray:
+    def place(self) -> tuple[np.ndarray, ...]:
         """How far the rows are written, and how many there are: where the next call has to pause."""
-        return np.array([*self.used, self.steps], dtype=float)
+        return (np.array([*self.used, self.steps], dtype=float),)
 
     @place.setter
     def place(self, place: np.ndarray) -> None:

@@ -67,11 +67,14 @@ class NoMode:
 
 
 def modes_of(
-    system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None
+    system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
 ) -> list[LinearMode | NoMode]:
-    """The forms of vectors of modes (K, components) of one run, some of which may only be neighbours of what it met."""
+    """The forms of vectors of modes (K, components) of one run, some of which may only be neighbours of what it met.
+
+    first: those before it are left out.
+    """
     found: list[LinearMode | NoMode] = []
-    for z in met:
+    for z in met[first:]:
         try:
             found.append(LinearMode(system, atoms, z, p))
         except DividesByZero:

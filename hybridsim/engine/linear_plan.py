@@ -9,44 +9,56 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.linear_form import Atoms, Form
-from hybridsim.engine.linear_modes import modes_of
+from hybridsim.engine.linear_modes import LinearMode, NoMode, modes_of
 from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
 
 _MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
 _MOST_VECTORS = 64  # sets of modes that plans are kept for
 
+Entries = np.ndarray  # (2, entries): where each goes, and the register that has its value
+
 _lock = Lock()
 
 
 class LinearPlan:
-    """Matrices of some vectors of modes (K, components) as entries whose values are registers of a recipe."""
+    """Matrices of some vectors of modes (K, components) as entries whose values are registers of a recipe.
 
-    def __init__(self, system: System, met: np.ndarray, p: np.ndarray) -> None:
-        numbers = Numbers(p[: system.layout.parameters].tolist())
-        atoms = Atoms()
-        modes = modes_of(system, atoms, met, numbers.inputs)
+    begun: a plan of the first of these vectors, at values for which it holds; the others are read in addition to it.
+    """
+
+    def __init__(
+        self, system: System, met: np.ndarray, p: np.ndarray, begun: LinearPlan | None = None
+    ) -> None:
+        if begun is None:
+            self._numbers, self._atoms = Numbers(p[: system.layout.parameters].tolist()), Atoms()
+            self._modes: list[LinearMode | NoMode] = []
+        else:
+            self._numbers, self._atoms, self._modes = begun._numbers, begun._atoms, list(begun._modes)
+        numbers, atoms, modes = self._numbers, self._atoms, self._modes
+        self._modes += modes_of(system, atoms, met, numbers.inputs, len(modes))
         monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
         n, guards = system.n, system.guard_count
         size = n + len(monomials)
         place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
-        def entries(rows: Iterable[tuple[int, Form]]) -> tuple[np.ndarray, np.ndarray]:
+        def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
             """Places in a matrix of `size` columns, and registers."""
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
-            places, registers = np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
-            return places, registers
+            return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
-        self._shapes = (len(met), size, size), (len(met), guards, size)
-        self._flow = entries(
-            (k * size + row, form)
-            for k, mode in enumerate(modes)
-            for row, form in [*enumerate(mode.rates), *motion]
+        self._shapes, self._monomials = ((len(met), size, size), (len(met), guards, size)), monomials
+        first, self._flow, self._guards = 0, entries(()), entries(())
+        if begun is not None and begun._monomials == monomials:
+            first, self._flow, self._guards = begun._shapes[0][0], begun._flow, begun._guards
+        new = [(k, modes[k]) for k in range(first, len(met))]
+        flow = entries(
+            (k * size + row, form) for k, mode in new for row, form in [*enumerate(mode.rates), *motion]
         )
-        self._guards = entries(
-            (k * guards + g, form) for k, mode in enumerate(modes) for g, form in mode.guards.items()
-        )
+        active = entries((k * guards + g, form) for k, mode in new for g, form in mode.guards.items())
+        self._flow = np.concatenate([self._flow, flow], axis=1)
+        self._guards = np.concatenate([self._guards, active], axis=1)
         used = sorted({a for m in monomials for a, _ in m})
         known = [atoms.known[a] for a in used]
         terms = [term for a in known for term in a.terms]
@@ -95,19 +107,39 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
 def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
     """The plan of these vectors of modes that holds at the parameters in p, and its registers there."""
     kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
+    inputs = p[: system.layout.parameters]
     with _lock:
         while len(kept) >= _MOST_VECTORS and met.tobytes() not in kept:
             del kept[next(iter(kept))]
         plans = kept.setdefault(met.tobytes(), [])
-    inputs = p[: system.layout.parameters]
-    for plan in list(plans):
-        registers = plan.recipe.values(inputs)
-        if registers is not None:
-            return plan, registers
-    plan = LinearPlan(system, met, p)
+        found = _that_holds(plans, inputs)
+        if found is None:
+            begun = _begun(kept, met, inputs)
+            found = _with_values(LinearPlan(system, met, p, begun), inputs)
+            if found is None:  # what is new is otherwise at the values of the plan that was begun
+                found = _with_values(LinearPlan(system, met, p), inputs)
+                assert found is not None  # the comparisons are those of these inputs
+            if len(plans) >= _MOST:
+                plans.clear()
+            plans.append(found[0])
+    return found
+
+
+def _with_values(plan: LinearPlan, inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
     registers = plan.recipe.values(inputs)
-    assert registers is not None  # the comparisons are those of these inputs
-    if len(plans) >= _MOST:
-        plans.clear()
-    plans.append(plan)
-    return plan, registers
+    return None if registers is None else (plan, registers)
+
+
+def _that_holds(plans: Iterable[LinearPlan], inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
+    """The first of some plans that holds at these inputs, and its registers there."""
+    return next((found for plan in plans if (found := _with_values(plan, inputs)) is not None), None)
+
+
+def _begun(kept: dict[bytes, list[LinearPlan]], met: np.ndarray, inputs: np.ndarray) -> LinearPlan | None:
+    """The plan of as many as possible of the first vectors: what a run meets grows by a few at the end, many times."""
+    whole = met.tobytes()
+    for key in sorted((key for key in kept if whole.startswith(key)), key=len, reverse=True):
+        found = _that_holds(kept[key], inputs)
+        if found is not None:
+            return found[0]
+    return None

@@ -83,23 +83,76 @@ def no_tables() -> LinearTables:
     return tables
 
 
-def linear_tables(system: System, met: np.ndarray, p: np.ndarray, horizon: float) -> LinearTables | None:
+class _Rows:
+    """The fields that have a row for each vector of modes, with room for more: those of a run grow many times.
+
+    Rows that are there do not change, so that tables made earlier are views of the same memory.
+    """
+
+    def __init__(self, fields: dict[str, np.ndarray]) -> None:
+        self.count, self._fields = len(fields["counts"]), fields
+
+    def first(self, count: int) -> dict[str, np.ndarray]:
+        """The first rows of each."""
+        return {name: field[:count] for name, field in self._fields.items()}
+
+    def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:
+        """These up to `first`, and new ones: in the room behind them, if nobody else has taken it."""
+        count = first + len(new["counts"])
+        with _lock:
+            rows = self
+            if self.count != first or count > len(self._fields["counts"]):
+                rows = _Rows(
+                    {name: _with_room(field[:first], 2 * count) for name, field in self._fields.items()}
+                )
+            for name, field in rows._fields.items():
+                field[first:count] = new[name]
+            rows.count = count
+        return rows
+
+
+def _with_room(field: np.ndarray, count: int) -> np.ndarray:
+    larger = np.zeros((count, *field.shape[1:]), dtype=field.dtype)
+    larger[: len(field)] = field
+    return larger
+
+
+class Made(NamedTuple):
+    """Tables of some vectors of modes at one set of values, and the matrices (K, m, m), (K, G, m) they are made of."""
+
+    tables: LinearTables
+    flows: np.ndarray
+    guards: np.ndarray
+    rows: _Rows
+
+
+def linear_tables(
+    system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
+) -> Made | None:
     """Tables of the vectors of modes met so far (K, components) at the parameters in p; horizon: of a segment.
 
-    None where a rate or guard has a coefficient that is no finite number, or one beyond all that squares.
+    begun: those of the first of these, which are taken up as far as they are the same. None where a rate or guard has a
+    coefficient that is no finite number, or one beyond all that squares.
     """
     plan, registers = plan_of(system, met, p)
-    A, rows = plan.matrices(registers)
-    if not is_finite(A, rows).all():
+    A, guards = plan.matrices(registers)
+    if not is_finite(A, guards).all():
         return None
+    rows = None if begun is None else _gone_on_with(begun, A, guards, system.n, horizon)
+    rows = rows or _Rows(of_matrices(A, guards, system.n, horizon))
     tables: LinearTables = packed(
-        LinearTables(
-            **plan.atoms(registers),
-            phases=angles_of(system),
-            **of_matrices(A, rows, system.n, horizon),
-        )
+        LinearTables(**plan.atoms(registers), phases=angles_of(system), **rows.first(len(met)))
     )
-    return tables
+    return Made(tables, A, guards, rows)
+
+
+def _gone_on_with(begun: Made, A: np.ndarray, guards: np.ndarray, n: int, horizon: float) -> _Rows | None:
+    """The rows of those begun with those of further matrices behind them; None where the first ones are others."""
+    first, widest = len(begun.flows), begun.tables.values.shape[1]
+    if not (np.array_equal(begun.flows, A[:first]) and np.array_equal(begun.guards, guards[:first])):
+        return None
+    new = of_matrices(A[first:], guards[first:], n, horizon, widest)
+    return begun.rows.gone_on_with(first, new) if new["values"].shape[1] == widest else None
 
 
 def is_finite(A: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -113,10 +166,15 @@ def angles_of(system: System) -> np.ndarray:
     return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
 
 
-def of_matrices(A: np.ndarray, rows: np.ndarray, n: int, horizon: float) -> dict[str, np.ndarray]:
-    """The fields of the tables that have a row for each vector of modes, by name: of A (K, m, m), rows (K, G, m)."""
+def of_matrices(
+    A: np.ndarray, rows: np.ndarray, n: int, horizon: float, least: int = 0
+) -> dict[str, np.ndarray]:
+    """The fields of the tables that have a row for each vector of modes, by name: of A (K, m, m), rows (K, G, m).
+
+    least: of J.
+    """
     count, guards, size = rows.shape
-    flows = modals(A, horizon, TERMS, multiple=LANES // 2)
+    flows = modals(A, horizon, TERMS, multiple=LANES // 2, least=least)
     widest = flows.values.shape[1]
     series, roundings = (np.empty((count, guards, ORDER + 1, size)) for _ in range(2))
     guard_series(A, rows, series, roundings)
@@ -176,25 +234,32 @@ def tables_of(
     last = system.tables.get(horizon)
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
         return last[1]
-    found = _tables_of(system, modes, p, horizon)
-    system.tables[horizon] = (modes, found)
+    made = _made(system, modes, p, horizon, None if last is None else last[2])
+    found = None if made is None else (made.tables, _scratch(system, made.tables))
+    system.tables[horizon] = (modes, found, made)
     return found
 
 
-def _tables_of(
-    system: System, modes: np.ndarray, p: np.ndarray, horizon: float
-) -> tuple[LinearTables, deque[Any]] | None:
-    kept: dict[bytes, tuple[LinearTables, deque[Any]]] = system.code.shared("linear", dict)
+def _scratch(system: System, tables: LinearTables) -> deque[Any]:
+    """Where scratch arrays for tables of this form wait."""
+    form = len(tables.kinds), len(tables.factors), tables.values.shape
+    spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {form}", deque)
+    return spare
+
+
+def _made(
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None
+) -> Made | None:
+    kept: dict[bytes, Made] = system.code.shared("linear", dict)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
     found = kept.get(key)
     if found is None:
-        tables = linear_tables(system, modes, p, horizon)
-        if tables is None:
+        found = linear_tables(system, modes, p, horizon, begun)
+        if found is None:
             return None
-        forms = len(tables.kinds), len(tables.factors), tables.values.shape
-        spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {forms}", deque)
-        found = (tables, spare)
         with _lock:
+            for other in [other for other, made in kept.items() if made is begun]:
+                del kept[other]  # the same for fewer modes
             while len(kept) >= _KEPT:
                 del kept[next(iter(kept))]
             kept[key] = found

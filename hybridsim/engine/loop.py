@@ -154,7 +154,7 @@ class ModeLoop:
             size = math.nan if step_size is None else step_size
             arrays = standing.outcome.arrays() | {"step_size": np.array(size)}
             if place is not None:
-                arrays["place"] = place
+                arrays["place"] = np.concatenate(place)
             return Checkpoint(origin, arrays, settled, paces, segments, occurrences)
 
         self.record.mark(checkpoint)

@@ -80,8 +80,10 @@ def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     return Modal(*(field[0] for field in modals(A[None], horizon)[1:-1]))
 
 
-def modals(A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1) -> Modals:
-    """The same for many matrices (K, m, m); J is filled up to a multiple."""
+def modals(
+    A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
+) -> Modals:
+    """The same for many matrices (K, m, m); J is filled up to a multiple, and to `least`."""
     scales = np.ones(A.shape[:2])
     _balance(np.abs(A), 1.0 / horizon, scales)
     balanced = A * scales[:, None, :] / scales[:, :, None]
@@ -99,7 +101,7 @@ def modals(A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple
     counts = (values.imag >= 0.0).sum(axis=1)
     for k, flow in others.items():
         counts[k] = len(flow.values)
-    count, size, widest = *A.shape[:2], -(-int(counts.max(initial=0)) // multiple) * multiple
+    count, size, widest = *A.shape[:2], -(-int(counts.max(initial=least)) // multiple) * multiple
     result = Modals(
         counts,
         np.zeros((count, widest), dtype=complex),

@@ -23,12 +23,12 @@ from hybridsim.engine.mode_code import (
     kept,
     mode_tape,
 )
+from hybridsim.engine.modes_index import index_of
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series_code import TooLong
 from hybridsim.engine.system import System
 
 _ALL = 27  # vectors of modes, as of three contacts: so many are on a shelf from the first on
-_LONGEST = 256  # vectors of modes on a shelf that is shared: each event searches it from one end to the other
 
 
 class Automata(NamedTuple):
@@ -61,7 +61,7 @@ class Automata(NamedTuple):
 
 class Tapes(NamedTuple):
     """One row or one slice for each vector of modes: modes, lean rows, those of high orders, constant rows, active
-    guards, registers.
+    guards, registers. places: see `hybridsim.engine.modes_index`.
 
     computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state.
     bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
@@ -69,6 +69,7 @@ class Tapes(NamedTuple):
     """
 
     modes: np.ndarray
+    places: np.ndarray
     lean_start: np.ndarray
     lean: np.ndarray
     high_start: np.ndarray
@@ -91,9 +92,9 @@ def automata_of(system: System) -> Automata:
 
 
 def shelf_of(system: System) -> TapeShelf:
-    """The shelf of all systems of one structure; a new one where it has grown too long to be searched."""
+    """The shelf of all systems of one structure."""
     shelf: TapeShelf = system.code.shared("shelf", lambda: TapeShelf(system))
-    return shelf if len(shelf.tapes.modes) <= _LONGEST else TapeShelf(system)
+    return shelf
 
 
 def _automata(system: System) -> Automata:
@@ -164,6 +165,7 @@ class TapeShelf:
         self._lock = Lock()
         self._engines: list[Any] = []  # what keeps machine code alive
         self._code = np.zeros((2, 0), dtype=np.int64)
+        self._rows: list[_ModeRows] = []  # of the vectors of modes met
         self.tapes = self._stacked()
 
     def look(self) -> None:
@@ -215,32 +217,56 @@ class TapeShelf:
 
     def _stacked(self) -> Tapes:
         system, met = self.system, list(self._met.values())
-        lean = [system.lean_tape(z) for z in met]
+        self._rows += [_ModeRows.of(system, z) for z in met[len(self._rows) :]]
+        rows = self._rows
         modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
         code = np.zeros((2, len(met)), dtype=np.int64)
         code[:, : self._code.shape[1]] = self._code
         self._code = code
-        active = [list(np.flatnonzero(system.active(z))) for z in met]
         tapes: Tapes = packed(
             Tapes(
                 modes,
-                *_rows([tape.rows for tape in lean]),
-                *_rows([np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5) for z in met]),
-                *_rows([tape.constant_rows for tape in lean]),
-                *_flat(active),
-                np.array([tape.derivatives for tape in lean], dtype=np.int64).reshape(len(met), system.n),
-                np.array([computed_rates(system, z) for z in met], dtype=np.bool_).reshape(
-                    len(met), system.n
-                ),
-                np.array([tape.guards for tape in lean], dtype=np.int64).reshape(
-                    len(met), system.guard_count
-                ),
+                index_of(modes),
+                *in_a_row([one.lean for one in rows]),
+                *in_a_row([one.high for one in rows]),
+                *in_a_row([one.constant for one in rows]),
+                *in_a_row([one.active for one in rows], columns=()),
+                np.array([one.derivatives for one in rows], dtype=np.int64).reshape(len(met), system.n),
+                np.array([one.computed for one in rows], dtype=np.bool_).reshape(len(met), system.n),
+                np.array([one.guards for one in rows], dtype=np.int64).reshape(len(met), system.guard_count),
                 *code,
             )
         )
         return tapes
 
 
-def _rows(tapes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    starts = np.cumsum([0, *(len(rows) for rows in tapes)]).astype(np.int64)
-    return starts, np.concatenate([np.zeros((0, 5), dtype=np.int64), *tapes])
+class _ModeRows(NamedTuple):
+    """What `Tapes` has of one vector of modes."""
+
+    lean: np.ndarray
+    high: np.ndarray
+    constant: np.ndarray
+    active: np.ndarray
+    derivatives: np.ndarray
+    computed: list[bool]
+    guards: np.ndarray
+
+    @classmethod
+    def of(cls, system: System, z: np.ndarray) -> _ModeRows:
+        """Worked out once: a shelf that grows by a few vectors of modes again and again takes up the others."""
+        tape = system.lean_tape(z)
+        return cls(
+            tape.rows,
+            np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5),
+            tape.constant_rows,
+            np.flatnonzero(system.active(z)),
+            tape.derivatives,
+            computed_rates(system, z),
+            tape.guards,
+        )
+
+
+def in_a_row(parts: list[np.ndarray], columns: tuple[int, ...] = (5,)) -> tuple[np.ndarray, np.ndarray]:
+    """Where each of several arrays of whole numbers begins, and all of them; columns: shape of an entry."""
+    starts = np.cumsum([0, *(len(part) for part in parts)]).astype(np.int64)
+    return starts, np.concatenate([np.zeros((0, *columns), dtype=np.int64), *parts])

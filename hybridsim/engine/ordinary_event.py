@@ -27,13 +27,13 @@ from hybridsim.engine.event_work import (
     NOBODY,
     Before,
     called_by,
-    find_modes,
     located,
 )
 from hybridsim.engine.few import fill, put
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, inlined, merged
 from hybridsim.engine.linear_kernels import errors_of_time, functions_of_time
+from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.surface_event import decide_surface
 
 
@@ -113,7 +113,7 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
     put(at.z, z)
     on_surface, sides, orders, floors = work.on_surface, work.sides, work.orders, work.floors
     fill(on_surface, False)
-    k = find_modes(tapes.modes, z)
+    k = find_modes(tapes, z)
     if k < 0:
         return False
     is_known = tapes.active_start[k + 1] - tapes.active_start[k] > 1
@@ -145,7 +145,7 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
             functions_of_time(lin, at.s, p, work.factors, work.w)
             errors_of_time(lin, at.s_error, work.factors, work.w_error)
         continuous, is_on, vector = False, automata.is_corner[c], p
-    k = find_modes(tapes.modes, z)
+    k = find_modes(tapes, z)
     if k < 0:
         return False
     after = Before(at.s, at.s_error, x, x_error, vector, at.z)
@@ -163,7 +163,7 @@ def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, w
     linear modes, empty for others. state: `hybridsim.engine.segment_end.State`.
     """
     if work.whole[FIRED] == NOBODY:
-        at, k = located(state, work), find_modes(tapes.modes, state.z)
+        at, k = located(state, work), find_modes(tapes, state.z)
         guard_series(tapes, inputs, lin, k, at, at.x, at.x_error, work)
         return 1
     if is_linear(lin) and settle_clearly(automata, tapes, lin, state, work):

@@ -11,13 +11,13 @@ import math
 from typing import Any
 
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
-from hybridsim.engine.event_work import find_modes
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
+from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
 from hybridsim.engine.segment_end import (
     is_crowded,
@@ -277,7 +277,7 @@ def rk_leap(
     pace = room.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
-        k, first_step = find_modes(tapes.modes, z), n_steps
+        k, first_step = find_modes(tapes, z), n_steps
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
             return AT_TARGET, n_steps, n_segments

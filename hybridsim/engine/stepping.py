@@ -203,10 +203,15 @@ class Leaps(Protocol):
     """A compiled mode loop of one run: whole segments and their ordinary events at once.
 
     It adds what it went over to the record as blocks (`hybridsim.engine.blocks`) and counts in its counters.
-    place: what it remembers from leap to leap, in an array; a run that goes on gives it back.
     """
 
-    place: np.ndarray
+    @property
+    def place(self) -> tuple[np.ndarray, ...]:
+        """What it remembers from leap to leap, in arrays that nobody changes."""
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        """Take it up again, all in a row, where a run goes on."""
 
     def anew(self) -> Leaps:
         """The same for another run, which remembers nothing yet; this one has never leapt."""

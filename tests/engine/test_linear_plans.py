@@ -30,7 +30,7 @@ def rates(system: System, s: float, x: np.ndarray) -> np.ndarray:
     """By the tables, from states and functions of time."""
     values = system.values
     p = system.vector(Instant(0.0), np.zeros(0))
-    tables = linear_tables(system, np.zeros((1, len(system.automata)), dtype=np.int64), p, 1.0)
+    tables = linear_tables(system, np.zeros((1, len(system.automata)), dtype=np.int64), p, 1.0).tables
     atoms = []
     for a, kind in enumerate(tables.kinds):
         terms = range(tables.term_start[a], tables.term_start[a + 1])
@@ -75,7 +75,7 @@ def test_the_order_of_values_does_not_matter() -> None:
 
     def tables(values: dict[str, float]) -> list[object]:
         system = System(MODEL.with_(**values))
-        made = linear_tables(system, modes, system.vector(Instant(0.0), np.zeros(0)), 1.0)
+        made = linear_tables(system, modes, system.vector(Instant(0.0), np.zeros(0)), 1.0).tables
         return [getattr(made, name).tolist() for name in ("slopes", "rates", "weights", "values", "inverse")]
 
     forward = [tables(values) for values in sets]

@@ -1,0 +1,141 @@
+"""Models with many vectors of modes: what was run before changes no bit, and a shelf may grow as long as it likes."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine.linear_tables import LinearTables, linear_tables
+from hybridsim.engine.mode_tables import TapeShelf, shelf_of
+from hybridsim.engine.modes_index import find_modes, index_of
+from hybridsim.engine.recent import system_of
+from hybridsim.engine.system import System
+from hybridsim.engine.timepair import Instant
+
+COMPILED = ("exact", "taylor", "dop853", "tsit5")
+
+
+class Shelf(NamedTuple):
+    """What `find_modes` looks at."""
+
+    modes: np.ndarray
+    places: np.ndarray
+
+
+def cornered_chain() -> hs.Model:
+    """Three masses on springs, each rubbing on the ground; a spring that is stiffer one way, two that saturate."""
+    loads = (
+        "1.7*sin(1.3*t) - 0.3*abs(x0)",
+        "2.1*sin(0.8*t) + 0.2*max(v1, 0.1)",
+        "1.1*sin(2.2*t) + 0.2*min(x2, 0.1)",
+    )
+    states = []
+    for i, load in enumerate(loads):
+        joints = "".join(f" - {3 + i + j}.0*(x{i} - x{j})" for j in (i - 1, i + 1) if 0 <= j < 3)
+        states += [
+            hs.State(f"x{i}", 0.3 - 0.4 * i, f"v{i}", nominal=1.0),
+            hs.State(
+                f"v{i}", 0.5 * i - 0.2, f"{load} - {4 + i}.0*x{i} - 0.1*v{i}{joints} - f{i}", nominal=1.0
+            ),
+        ]
+    contacts = [
+        hs.Contact(f"f{i}", velocity=f"v{i}", normal=0.4 + 0.2 * i, law="coulomb", arguments={"mu": 0.7})
+        for i in range(3)
+    ]
+    return hs.Model("cornered", states, contacts=contacts)
+
+
+def seven_contacts() -> hs.Model:
+    """Seven bodies that are pushed at rates of their own: 391 vectors of modes are met within a minute."""
+    return hs.Model(
+        "seven",
+        [
+            hs.State(f"v{i}", 0.0, f"a*sin({i + 1}*t + {i}) - f{i} - 0.01*v{i}**3", nominal=1.0)
+            for i in range(7)
+        ],
+        parameters={"a": 2.0},
+        contacts=[
+            hs.Contact(f"f{i}", velocity=f"v{i}", normal=1, law="coulomb", arguments={"mu": 0.5})
+            for i in range(7)
+        ],
+    )
+
+
+def bits(sol: hs.Solution) -> list[Any]:
+    return [(e.t, e.component, e.target, *e.x_plus.tolist()) for e in sol.events] + sol(sol.t_end).tolist()
+
+
+def first_and_later(model: hs.Model, integrator: str, end: float) -> tuple[list[Any], list[Any]]:
+    """Of a run that meets its modes one by one, and of one that knows them all beforehand."""
+    system = system_of(model)
+    vars(system.code)["_shared"].clear()
+    system.runs.clear()
+    runs = [hs.simulate(model, (0, end), integrator=integrator) for _ in range(2)]
+    return bits(runs[0]), bits(runs[1])
+
+
+@pytest.mark.parametrize("integrator", COMPILED)
+def test_a_first_run_is_as_later_ones(integrator: str) -> None:
+    """On its way it stops where modes are new, and goes on: this must change no digit."""
+    model = cornered_chain()
+    first, later = first_and_later(model, integrator, 40.0)
+    assert (
+        len(shelf_of(system_of(model)).tapes.modes) > 27
+    )  # those of three contacts alone are there from the first on
+    assert len(first) > 60
+    assert first == later
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
+def test_more_vectors_of_modes_than_are_searched(integrator: str) -> None:
+    model = seven_contacts()
+    runs = [hs.simulate(model.with_(a=a), (0, 60), integrator=integrator) for a in (2.0, 2.1, 2.0)]
+    assert len(shelf_of(system_of(model)).tapes.modes) > 256
+    assert [sol.status for sol in runs] == ["finished"] * 3
+    assert bits(runs[0]) == bits(runs[2])
+    # each body by itself: nothing joins them
+    for i in (0, 6):
+        alone = hs.Model(
+            "one",
+            [hs.State("v", 0.0, f"2.1*sin({i + 1}*t + {i}) - f - 0.01*v**3", nominal=1.0)],
+            contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 0.5})],
+        )
+        expected = hs.simulate(alone, (0, 60), integrator="taylor", rtol=1e-12).event_times("f")
+        found = runs[1].event_times(f"f{i}")
+        assert len(found) == len(expected)
+        assert np.abs(found - expected).max() < (1e-6 if integrator == "tsit5" else 1e-7)
+
+
+def test_a_vector_is_found_where_it_is() -> None:
+    draw = np.random.default_rng(5)
+    for count, components, modes in ((1, 1, 3), (32, 5, 3), (33, 5, 3), (200, 5, 3), (3000, 9, 4)):
+        vectors = np.array([np.unravel_index(i, (modes,) * components) for i in range(modes**components)])
+        vectors = vectors[draw.permutation(len(vectors))]
+        shelf, others = vectors[:count], vectors[count : count + 300]
+        tapes = Shelf(shelf, index_of(shelf))
+        assert [find_modes(tapes, z) for z in shelf] == list(range(len(shelf)))
+        assert {find_modes(tapes, z) for z in others} <= {-1}
+
+
+def test_tables_that_grew_are_those_made_at_once() -> None:
+    system = System(cornered_chain())
+    p = system.vector(Instant(0.0), np.zeros(0))
+    shelf = TapeShelf(system)
+    made, steps = None, []
+    for z in (
+        np.zeros(len(system.automata), dtype=np.int64),
+        *np.eye(len(system.automata), dtype=np.int64),
+    ):
+        shelf.surround(z)
+        made = linear_tables(system, shelf.tapes.modes, p, 100.0, made)
+        assert made is not None
+        steps.append(made)
+    assert len({id(step.rows) for step in steps}) < len(steps)  # some found room behind the former ones
+    system.code.shared("linear plans", dict).clear()
+    whole = linear_tables(system, shelf.tapes.modes, p, 100.0)
+    assert whole is not None
+    for name in LinearTables._fields:
+        np.testing.assert_array_equal(getattr(made.tables, name), getattr(whole.tables, name), err_msg=name)
