@@ -11,8 +11,9 @@ from hybridsim.engine.linear_tables import (
     LinearTables,
     angles_of,
     horizon_class,
-    is_finite,
+    leave_out,
     of_matrices,
+    unknown,
 )
 from hybridsim.engine.packs import packed
 from hybridsim.engine.system import System
@@ -94,11 +95,15 @@ def _group(
     system: System, plan: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
 ) -> FleetTables | None:
     A, rows = plan.matrices(registers)
-    finite = is_finite(A, rows)
-    numbers, registers, A, rows = numbers[finite], registers[finite], A[finite], rows[finite]
+    is_finite = leave_out(A, rows, system.n)
+    known = is_finite.any(axis=1)
+    numbers, registers, A, rows, is_finite = (
+        part[known] for part in (numbers, registers, A, rows, is_finite)
+    )
     if not len(numbers):
         return None
     modes = A.shape[1]
     A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # one behind the other
-    fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_matrices(A, rows, system.n, horizon)
+    of_modes = unknown(of_matrices(A, rows, system.n, horizon), is_finite.ravel())
+    fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_modes
     return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -55,11 +56,11 @@ def _named(reader: LinearReader, register: int, title: str) -> Form:
 
 
 class NoMode:
-    """In the place of a vector of modes that has no motion: nothing moves, and no guard admits it."""
+    """In the place of a vector of modes that has no motion: its rates are no numbers."""
 
-    def __init__(self, system: System, z: np.ndarray) -> None:
-        self.rates: list[Form] = [{} for _ in system.names]
-        self.guards: dict[int, Form] = {int(g): {(): -1.0} for g in np.flatnonzero(system.active(z))}
+    def __init__(self, system: System) -> None:
+        self.rates: list[Form] = [{(): math.nan} for _ in system.names]
+        self.guards: dict[int, Form] = {}
 
     def monomials(self) -> set[Monomial]:
         """It has no functions of time."""
@@ -80,7 +81,7 @@ def modes_of(
         except DividesByZero:
             if len(met) == 1:
                 raise
-            found.append(NoMode(system, z))
+            found.append(NoMode(system))
     return found
 
 

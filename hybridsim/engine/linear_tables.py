@@ -131,34 +131,50 @@ def linear_tables(
 ) -> Made | None:
     """Tables of the vectors of modes met so far (K, components) at the parameters in p; horizon: of a segment.
 
-    begun: those of the first of these, which are taken up as far as they are the same. None where a rate or guard has a
-    coefficient that is no finite number, or one beyond all that squares.
+    begun: those of the first of these, which are taken up as far as they are the same. None where each mode has a rate
+    or a guard with a coefficient that is no finite number, or one beyond all that squares.
     """
     plan, registers = plan_of(system, met, p)
     A, guards = plan.matrices(registers)
-    if not is_finite(A, guards).all():
+    is_finite = leave_out(A, guards, system.n)
+    if not is_finite.any():
         return None
-    rows = None if begun is None else _gone_on_with(begun, A, guards, system.n, horizon)
-    rows = rows or _Rows(of_matrices(A, guards, system.n, horizon))
+    rows = None if begun is None else _gone_on_with(begun, A, guards, is_finite, system.n, horizon)
+    rows = rows or _Rows(unknown(of_matrices(A, guards, system.n, horizon), is_finite))
     tables: LinearTables = packed(
         LinearTables(**plan.atoms(registers), phases=angles_of(system), **rows.first(len(met)))
     )
     return Made(tables, A, guards, rows)
 
 
-def _gone_on_with(begun: Made, A: np.ndarray, guards: np.ndarray, n: int, horizon: float) -> _Rows | None:
+def _gone_on_with(
+    begun: Made, A: np.ndarray, guards: np.ndarray, is_finite: np.ndarray, n: int, horizon: float
+) -> _Rows | None:
     """The rows of those begun with those of further matrices behind them; None where the first ones are others."""
     first, widest = len(begun.flows), begun.tables.values.shape[1]
     if not (np.array_equal(begun.flows, A[:first]) and np.array_equal(begun.guards, guards[:first])):
         return None
-    new = of_matrices(A[first:], guards[first:], n, horizon, widest)
+    new = unknown(of_matrices(A[first:], guards[first:], n, horizon, widest), is_finite[first:])
     return begun.rows.gone_on_with(first, new) if new["values"].shape[1] == widest else None
 
 
-def is_finite(A: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Whether all coefficients have squares; of matrices of many points, of which of them."""
-    inside = [(np.abs(part) < _LARGEST).all(axis=(-3, -2, -1)) for part in (A, rows)]
-    return np.logical_and(*inside)
+def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
+    """Which modes (..., K) have coefficients with squares; the others are changed to such as no guard admits.
+
+    A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together make modes without finite
+    numbers; runs have them as neighbours only. One that is in such a mode all the same is stopped by `unknown`.
+    """
+    is_finite = np.logical_and(*((np.abs(part) < _LARGEST).all(axis=(-2, -1)) for part in (A, guards)))
+    A[~is_finite, :n] = 0.0
+    guards[~is_finite] = 0.0
+    guards[~is_finite, :, n] = -1.0  # the first function of time is 1
+    return np.asarray(is_finite)
+
+
+def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, np.ndarray]:
+    """The fields of `of_matrices` with no numbers for the motion in modes that are left out: a leap stops there."""
+    fields["inverse"][~is_finite] = np.nan
+    return fields
 
 
 def angles_of(system: System) -> np.ndarray:

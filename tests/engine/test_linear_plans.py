@@ -99,3 +99,48 @@ def test_a_quotient_by_zero_is_said() -> None:
     broken = hs.simulate(model.with_(m=0), (0, 1), integrator="exact")
     assert broken.status == "step-failure"
     assert "the rate of v has a quotient by zero" in broken.message
+
+
+def test_a_neighbour_without_numbers_is_left_out() -> None:
+    """A contact and a relay that cannot both be held make a mode with infinite guards, in which nothing ever is."""
+    model = hs.Model(
+        "neighbours",
+        [
+            hs.State("x", 0.3, "v"),
+            hs.State("v", 0.0, "-4*x + 4*sin(t) - f - 0.4*u", nominal=1.0),
+        ],
+        contacts=[hs.Contact("f", velocity="v - 0.2", normal=0.5, law="coulomb", arguments={"mu": 0.7})],
+        surfaces=[hs.SwitchingSurface("u", "x + 0.5*v")],
+    )
+    system = System(model)
+    hold = np.array([[a.hold for a in system.automata], [a.above for a in system.automata]])
+    p = system.vector(Instant(0.0), np.zeros(0))
+    assert linear_tables(system, hold[:1], p, 10.0) is None
+    both = linear_tables(system, hold, p, 10.0)
+    assert both is not None
+    assert np.isnan(both.tables.inverse[0]).all()
+    assert np.isfinite(both.tables.inverse[1]).all()
+    exact, taylor = (hs.simulate(model, (0, 30), integrator=name, rtol=1e-12) for name in ("exact", "taylor"))
+    assert exact.stats["kernel_time"] > 0.0
+    assert len(exact.events) == len(taylor.events) > 10
+    np.testing.assert_allclose([e.t for e in exact.events], [e.t for e in taylor.events], atol=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_a_mode_without_numbers_is_not_gone_on_in(integrator: str) -> None:
+    """No guard is left to notice: the run says that the rate is no number."""
+    modes = [
+        hs.Mode("on", der={"x": "-1"}, guards=[hs.Guard("low", "x - 0.5", "off")]),
+        hs.Mode("off", der={"x": "1/(a - 1)"}),
+    ]
+    model = hs.Model(
+        "off",
+        [hs.State("x", 1.0, "0")],
+        parameters={"a": 1.0},
+        components=[hs.Component("s", modes, initial="on")],
+    )
+    sol = hs.simulate(model, (0, 2), integrator=integrator)
+    assert (sol.status, len(sol.events)) == ("step-failure", 1)
+    assert "not" in sol.message
+    assert "finite" in sol.message
+    assert hs.simulate(model.with_(a=2.0), (0, 2), integrator=integrator)(2.0)[0] == pytest.approx(2.0, abs=1e-8)
