@@ -116,7 +116,9 @@ class TaylorStepper:
         """
         powers = np.arange(1, coefficients.shape[1])
         slope = coefficients[:, 1:] @ (powers * d ** (powers - 1))
-        with np.errstate(invalid="ignore"):  # infinite rates less infinite slopes: that is no defect below a bound
+        with np.errstate(
+            invalid="ignore"
+        ):  # infinite rates less infinite slopes: that is no defect below a bound
             defect = abs(d) * np.abs(slope - self.flow.rhs(s0 + d, x1))
         self.flow.counters.rhs_evaluations += 1
         scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(x0), np.abs(x1))

@@ -7,12 +7,13 @@ pickled, so that reading a file runs no code of its writer.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import zipfile
 from dataclasses import asdict
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,10 +27,30 @@ if TYPE_CHECKING:
 
 FORMAT, VERSION = "hybridsim solution", 3
 _HEADER, _SEAL = "header", "digest"
+_REMEDY = "give a file that sol.save(...) has written"
 
 
 def save(solution: Solution, path: str | PathLike[str]) -> None:
     """Write a solution to a file; see `Solution.save`."""
+    stored = _stored(solution)
+    with whole_file(path) as partly, open(partly, "wb") as file:
+        np.savez(file, **stored)  # type: ignore[arg-type]  # its keywords are arrays, and one is a flag
+
+
+def to_bytes(solution: Solution) -> bytes:
+    """What a file of a solution holds: so it goes from process to process."""
+    file = io.BytesIO()
+    np.savez(file, **_stored(solution))  # type: ignore[arg-type]  # as above
+    return file.getvalue()
+
+
+def of_bytes(stored: bytes) -> Solution:
+    """The solution of which `to_bytes` has given these."""
+    return _read(io.BytesIO(stored), "the solution that another process sent")
+
+
+def _stored(solution: Solution) -> dict[str, np.ndarray]:
+    """The arrays of its file."""
     from hybridsim import __version__
     from hybridsim.engine.block_arrays import taken_apart
 
@@ -85,9 +106,7 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
     header["arrays"] = list(arrays)
     text = json.dumps(header, default=int)  # NumPy's whole numbers
     seal = np.frombuffer(_digest(text, arrays).encode(), dtype=np.uint8)
-    arrays |= {_HEADER: np.frombuffer(text.encode(), dtype=np.uint8), _SEAL: seal}
-    with whole_file(path) as partly, open(partly, "wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]  # its keywords are arrays, and one is a flag
+    return arrays | {_HEADER: np.frombuffer(text.encode(), dtype=np.uint8), _SEAL: seal}
 
 
 def load_solution(path: str | PathLike[str]) -> Solution:
@@ -119,25 +138,29 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     'finished'
     """
     name = os.fspath(path)
-    remedy = "give a file that sol.save(...) has written"
     try:
         with open(name, "rb") as file:
-            if not zipfile.is_zipfile(file):
-                raise ValueError("it is no archive of arrays")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as stored:
-                if _HEADER not in stored.files:
-                    raise ValueError("its arrays are others, and it has no header")
-                text = bytes(_array(stored, _HEADER)).decode()
-                header = json.loads(text)
-                if header["format"] != FORMAT:
-                    raise ValueError(f"its format is {header['format']!r}")
-                arrays = {key: _array(stored, key) for key in header.get("arrays", ())}
-                seal = bytes(stored[_SEAL]).decode() if _SEAL in stored.files else ""
+            return _read(file, name)
     except OSError as error:
-        raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=remedy) from error
+        raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=_REMEDY) from error
+
+
+def _read(file: IO[bytes], name: str) -> Solution:
+    try:
+        if not zipfile.is_zipfile(file):
+            raise ValueError("it is no archive of arrays")
+        file.seek(0)
+        with np.load(file, allow_pickle=False) as stored:
+            if _HEADER not in stored.files:
+                raise ValueError("its arrays are others, and it has no header")
+            text = bytes(_array(stored, _HEADER)).decode()
+            header = json.loads(text)
+            if header["format"] != FORMAT:
+                raise ValueError(f"its format is {header['format']!r}")
+            arrays = {key: _array(stored, key) for key in header.get("arrays", ())}
+            seal = bytes(stored[_SEAL]).decode() if _SEAL in stored.files else ""
     except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        raise UsageError(f"{name} holds no solution: {error}", remedy=remedy) from error
+        raise UsageError(f"{name} holds no solution: {error}", remedy=_REMEDY) from error
     if header.get("version") != VERSION:
         raise UsageError(
             f"{name} is of version {header.get('version')!r}, written by hybridsim {header.get('hybridsim')}; "
@@ -145,13 +168,13 @@ def load_solution(path: str | PathLike[str]) -> Solution:
             remedy="read it with that version",
         )
     if seal != _digest(text, arrays):
-        raise UsageError(f"{name} is damaged: it was changed after it was written", remedy=remedy)
+        raise UsageError(f"{name} is damaged: it was changed after it was written", remedy=_REMEDY)
     try:
         return _put_together(header, arrays)
     except HybridsimError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise UsageError(f"{name} is damaged: {type(error).__name__}: {error}", remedy=remedy) from error
+        raise UsageError(f"{name} is damaged: {type(error).__name__}: {error}", remedy=_REMEDY) from error
 
 
 def _array(stored: Any, key: str) -> np.ndarray:

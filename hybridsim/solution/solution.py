@@ -385,6 +385,12 @@ class Solution(InTables):
 
     # -- on disk, and on ------------------------------------------------------------------------------------
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as it is saved, to go from process to process; a model of Python functions cannot."""
+        from hybridsim.solution.archive import of_bytes, to_bytes
+
+        return of_bytes, (to_bytes(self),)
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the run to one file: the model, how it was run, the trajectory, where it goes on.
 

@@ -143,4 +143,6 @@ def test_a_mode_without_numbers_is_not_gone_on_in(integrator: str) -> None:
     assert (sol.status, len(sol.events)) == ("step-failure", 1)
     assert "not" in sol.message
     assert "finite" in sol.message
-    assert hs.simulate(model.with_(a=2.0), (0, 2), integrator=integrator)(2.0)[0] == pytest.approx(2.0, abs=1e-8)
+    assert hs.simulate(model.with_(a=2.0), (0, 2), integrator=integrator)(2.0)[0] == pytest.approx(
+        2.0, abs=1e-8
+    )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import pickle
 import zipfile
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +138,27 @@ def test_a_file_holds_all_of_a_solution(name: str, tmp_path: Path) -> None:
     if name in COMPILED:
         assert (sol(times) == again(times)).all()
     assert np.allclose(sol.output("f", times), again.output("f", times), rtol=0, atol=1e-10)
+
+
+def test_solutions_come_from_other_processes() -> None:
+    """Pools send them by pickle: to the last bit, and they go on as well as here."""
+    here = hs.simulate("dfcs", (0.0, 0.03), integrator="exact")
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        sent = pool.submit(hs.simulate, "dfcs", (0.0, 0.03), integrator="exact").result()
+    assert not difference(here, sent)
+    times = np.linspace(0.0, 0.03, 777)
+    assert (here(times) == sent(times)).all()
+    assert not difference(here.resume(0.05), sent.resume(0.05))
+
+
+def test_a_solution_of_functions_says_why_it_stays_in_its_process() -> None:
+    sol = hs.simulate(hs.Model("decay", states={"x": 1.0}, flow=decay), (0.0, 1.0), integrator="dop853")
+    with pytest.raises(hs.UsageError, match="decay"):
+        pickle.dumps(sol)
+
+
+def decay(t: float, x: np.ndarray, p: np.ndarray) -> list[float]:
+    return [-x[0]]
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
