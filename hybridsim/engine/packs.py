@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,9 +46,12 @@ if ENABLED:
 
         def __init__(self, arrays: Any, table: np.ndarray, numba_type: PackType, address: int) -> None:
             self.arrays, self.table, self.numba_type, self.address = arrays, table, numba_type, address
+            if arrays is not None:
+                vars(self).update(arrays._asdict())  # read as those of the tuple
 
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self.arrays, name)
+        if TYPE_CHECKING:
+
+            def __getattr__(self, name: str) -> Any: ...
 
     class PackType(types.Type):
         """Type of a packed tuple: its name, and (name, dtype, dimensions) of each field."""
