@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.linear_form import Atoms, Form
+from hybridsim.engine.linear_form import Atoms, Form, Monomial
 from hybridsim.engine.linear_modes import LinearMode, NoMode, modes_of
 from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
@@ -33,11 +33,14 @@ class LinearPlan:
         if begun is None:
             self._numbers, self._atoms = Numbers(p[: system.layout.parameters].tolist()), Atoms()
             self._modes: list[LinearMode | NoMode] = []
+            known: Iterable[Monomial] = ((),)
         else:
             self._numbers, self._atoms, self._modes = begun._numbers, begun._atoms, list(begun._modes)
+            known = begun._monomials
         numbers, atoms, modes = self._numbers, self._atoms, self._modes
-        self._modes += modes_of(system, atoms, met, numbers.inputs, len(modes))
-        monomials = atoms.closure({(), *(m for mode in modes for m in mode.monomials())})
+        read = modes_of(system, atoms, met, numbers.inputs, len(modes))
+        modes += read
+        monomials = atoms.closure({*known, *(m for mode in read for m in mode.monomials())})
         n, guards = system.n, system.guard_count
         size = n + len(monomials)
         place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
@@ -48,7 +51,8 @@ class LinearPlan:
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
-        self._shapes, self._monomials = ((len(met), size, size), (len(met), guards, size)), monomials
+        self._shapes = (len(met), size, size), (len(met), guards, size)
+        self._monomials: list[Monomial] = monomials
         first, self._flow, self._guards = 0, entries(()), entries(())
         if begun is not None and begun._monomials == monomials:
             first, self._flow, self._guards = begun._shapes[0][0], begun._flow, begun._guards
@@ -60,25 +64,25 @@ class LinearPlan:
         self._flow = np.concatenate([self._flow, flow], axis=1)
         self._guards = np.concatenate([self._guards, active], axis=1)
         used = sorted({a for m in monomials for a, _ in m})
-        known = [atoms.known[a] for a in used]
-        terms = [term for a in known for term in a.terms]
+        met_atoms = [atoms.known[a] for a in used]
+        terms = [term for a in met_atoms for term in a.terms]
         self._computed = {
             name: np.array([numbers.place(value) for value in values], dtype=np.int64)
             for name, values in (
-                ("rates", [a.rate for a in known]),
-                ("offsets", [a.offset for a in known]),
+                ("rates", [a.rate for a in met_atoms]),
+                ("offsets", [a.offset for a in met_atoms]),
                 ("weights", [weight for _, weight in terms]),
             )
         }
         self._fixed = {
-            "kinds": np.array([a.kind for a in known], dtype=np.int64),
-            "term_start": np.cumsum([0, *(len(a.terms) for a in known)]).astype(np.int64),
+            "kinds": np.array([a.kind for a in met_atoms], dtype=np.int64),
+            "term_start": np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
             "sources": np.array([source for source, _ in terms], dtype=np.int64),
             "factors": _factors(
-                [[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(known)
+                [[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)
             ),
         }
-        self.recipe = Recipe(numbers)
+        self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.

@@ -115,16 +115,22 @@ class Traced(float):
     __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # refused by being no function
 
 
-class Recipe:
-    """What was written down, for other inputs."""
+# registers, rows, and of comparisons both registers and how they came out
+_NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), dtype=np.int64)
 
-    def __init__(self, numbers: Numbers) -> None:
-        self._start = np.array(numbers.values)[:, None]
+
+class Recipe:
+    """What was written down, for other inputs; begun: of what the same numbers were some operations ago."""
+
+    def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
         self._inputs = len(numbers.inputs)
-        self._rows = np.array(numbers.rows, dtype=np.int64).reshape(-1, 5)
-        self._left = np.array([i for i, _, _ in numbers.comparisons], dtype=np.int64)
-        self._right = np.array([j for _, j, _ in numbers.comparisons], dtype=np.int64)
-        self._found = np.array([found for *_, found in numbers.comparisons], dtype=np.bool_)
+        parts = _NOTHING if begun is None else begun._parts
+        written: tuple[Sequence[Any], ...] = (numbers.values, numbers.rows, numbers.comparisons)
+        self._parts: tuple[np.ndarray, ...] = tuple(
+            _gone_on_with(part, lines) for part, lines in zip(parts, written, strict=True)
+        )
+        self._start, self._rows, compared = self._parts
+        self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
         """All registers at these inputs; None where a comparison comes out otherwise than it did."""
@@ -141,6 +147,12 @@ class Recipe:
         _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
         same = (found[:, self._left] == found[:, self._right]) == self._found
         return found, same.all(axis=1)
+
+
+def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
+    """What was written as an array (entries, width), of which the first entries are known."""
+    new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
+    return np.concatenate([known, new])
 
 
 @kernel
