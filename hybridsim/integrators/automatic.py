@@ -36,17 +36,21 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if not system.has_tape:
         return _for_functions(system, x0, z0, span)
     model = system.model
-    is_small = system.n + system.guard_count <= _SMALL and not (model.monitors or model.inputs)
-    if is_small and span[1] >= span[0] and what_is_not_linear(system) is None:
-        return Choice("exact", "its modes are linear in the states")
+    is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
+    is_watched, rest = bool(model.monitors or model.inputs), ""
+    if is_small and what_is_not_linear(system) is None:
+        if not is_watched:
+            return Choice("exact", "its modes are linear in the states")
+        what = "monitors" if model.monitors else "inputs"
+        rest = f" (they are linear, but with {what} exact cannot go from event to event in compiled code)"
     steps = _steps_for_stability(system, x0, z0, span)
     if steps > _MANY:
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
         return Choice("dop853", "its modes are not stiff at the start, and jump inside")
     if rtol < _TIGHT:
-        return Choice("taylor", "its modes are smooth and the tolerance is tight")
-    return Choice("dop853", "its modes are smooth and not stiff at the start")
+        return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")
+    return Choice("dop853", f"its modes are smooth and not stiff at the start{rest}")
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:

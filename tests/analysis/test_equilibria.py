@@ -114,3 +114,43 @@ def test_bad_questions_are_refused() -> None:
         hs.linearize("belt", "slide")
     with pytest.raises(UsageError, match="gives none"):
         hs.linearize("belt")
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_rest_is_found_in_any_unit(size: float) -> None:
+    """Nothing is said of nominal sizes, and rounding leaves a velocity of 1e-17 where it should be 0."""
+    draw = np.random.default_rng(4)
+    for _ in range(40):
+        ka, kb, kc = draw.uniform(1, 20, 3)
+        load = size * draw.uniform(-5, 5, 2)
+        model = hs.Model(
+            "two",
+            [
+                hs.State("x1", 0, "v1"),
+                hs.State("v1", 0, f"{load[0]} - {ka}*x1 - {kb}*(x1 - x2) - 0.1*v1"),
+                hs.State("x2", 0, "v2"),
+                hs.State("v2", 0, f"{load[1]} - {kc}*x2 - {kb}*(x2 - x1) - 0.1*v2"),
+            ],
+        )
+        (found,) = hs.equilibria(model)
+        expected = np.linalg.solve([[ka + kb, -kb], [-kb, kb + kc]], load)
+        assert found.x[[0, 2]] == pytest.approx(expected, rel=1e-12)
+        assert found.x[[1, 3]].tolist() == [0.0, 0.0]
+        assert found.growth == pytest.approx(-0.05, rel=1e-9)
+        assert hs.linearize(model).is_equilibrium
+
+
+def test_steady_sliding_of_two_blocks_is_found() -> None:
+    """mu_k N of each, held by the springs; the belt drags them off again: it is not stable."""
+    (found,) = hs.equilibria(hs.two_blocks_on_belt().to_model())
+    assert found.modes == {"f1": "slip-", "f2": "slip-"}
+    assert found.x[[1, 3]].tolist() == [0.0, 0.0]
+    assert found.growth > 0.0
+
+
+def test_where_no_rest_is_found_it_is_said_how_to_go_on() -> None:
+    adrift = hs.Model("adrift", [hs.State("x", 0, "v"), hs.State("v", 1, "1 + v*v")])
+    assert hs.equilibria(adrift) == ()
+    with pytest.raises(hs.SimulationError, match="from its start\n.*nominal") as caught:
+        hs.linearize(adrift)
+    assert "in the modes" not in str(caught.value)

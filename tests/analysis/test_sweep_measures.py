@@ -91,3 +91,11 @@ def test_an_option_that_nothing_knows_is_refused_before_the_first_point(measure:
         assert (
             hs.sweep("dfcs", {"F0": [20]}, measure, integrator="dop853", rtol=1e-8, **span).status[0] == "ok"
         )
+
+
+def test_an_equilibrium_has_no_period_and_is_a_result_all_the_same() -> None:
+    swept = hs.sweep("free-decay", {"k": [1.0, 4.0]}, ["kind", "period", "amplitude.x"])
+    assert swept.status.tolist() == ["ok", "ok"]
+    assert swept["kind"].tolist() == ["equilibrium", "equilibrium"]
+    assert np.isnan(swept["period"]).all()
+    assert swept["amplitude.x"].tolist() == [0.0, 0.0]

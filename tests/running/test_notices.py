@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -183,3 +185,10 @@ def test_a_load_that_is_negative_from_the_start(name: str, x: float) -> None:
     sol = hs.simulate(block, (0, 1), integrator=name)
     assert sol.status == "inconsistent" and sol.t_end == 0.0
     assert "normal load of contact f became negative: -1 - x**2 < 0" in sol.message
+
+
+def test_auto_says_what_keeps_a_linear_model_from_the_closed_form() -> None:
+    watched = replace(hs.load("dfcs"), monitors=(hs.Monitor("up", "v", direction="up"),))
+    sol = hs.simulate(watched, (0, 0.01))
+    assert "they are linear, but with monitors exact cannot go" in sol.message
+    assert "linear, but" not in hs.simulate("belt", (0, 0.1)).message

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 _STEPS = 50
+_DUST = 1e-10  # of the largest state
 _CLOSED = 1e-13  # of the terms of a rate: what it is to rounding
 _HALVINGS = 20
 
@@ -177,13 +178,32 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
         else:
             break  # as close as rounding lets it come, or nowhere near
         x, f, A = trial, found[0], found[1]
+    x, f, A = _without_dust(field, x, f, A)
     if (np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all():
         return x
+    modes = ", ".join(f"{c}: {m}" for c, m in field.system.mode_names(field.z).items())
     raise SimulationError(
-        f"no equilibrium of model {field.system.model.name} was found in the modes "
-        f"{', '.join(f'{c}: {m}' for c, m in field.system.mode_names(field.z).items())}",
-        remedy="give another start with at=, or a point to linearise about",
+        f"no equilibrium of model {field.system.model.name} was found from its start"
+        + (f", in the modes {modes}" if modes else ""),
+        remedy="start the model nearer to it, declare nominal sizes of its states, or give a point to linearise about "
+        "with at=",
     )
+
+
+def _without_dust(
+    field: Field, x: np.ndarray, f: np.ndarray, A: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """With zeros where rounding has left next to nothing and less is no worse: a velocity at rest has no other size."""
+    scale = np.abs(A).max(axis=1, initial=0.0)
+    scale[scale == 0.0] = 1.0
+    for j in field.free:
+        if 0.0 < abs(x[j]) <= _DUST * np.abs(x).max():
+            trial = x.copy()
+            trial[j] = 0.0
+            found = field(field.projected(trial))
+            if np.abs(found[0] / scale).sum() <= np.abs(f / scale).sum():
+                x, f, A = field.projected(trial), found[0], found[1]
+    return x, f, A
 
 
 def _terms(A: np.ndarray, sizes: np.ndarray) -> np.ndarray:

@@ -133,11 +133,12 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
     try:
         result = job.measure.run(job.at(settings), previous)
         found = readings(job.measure.read(result))
+        blank = getattr(job.measure, "blank", lambda _: ())(result)  # what is none at such a result
     except Incomplete as error:
         return Outcome(error.message, error.found), None
     except Exception as error:  # a measure may be anybody's: whatever it raises costs its own point only
         return Outcome(_said(error), None), None
-    missing = not_numbers(found)
+    missing = [name for name in not_numbers(found) if name not in blank]
     if missing:
         return Outcome(f"not a number: {', '.join(missing)}", found), None
     return Outcome(DONE, found), result

@@ -56,6 +56,10 @@ class Steady:
             raise Incomplete(f"{result.kind}: {result.message}", known)
         return {word: _reading(result, word) for word in self.words}
 
+    def blank(self, result: SteadyState) -> tuple[str, ...]:
+        """Readings that are none there: an equilibrium has no period."""
+        return ("period",) if result.kind == "equilibrium" else ()
+
 
 @dataclass(frozen=True)
 class Final:
