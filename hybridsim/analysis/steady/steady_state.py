@@ -17,10 +17,12 @@ from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
+from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.engine.recent import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
+from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -134,6 +136,7 @@ def steady_state(
         "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
     }
     told = arguments.callback(progress)
+    refuse_unknown([steady_state, simulate], {**method, **options})
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
