@@ -35,9 +35,8 @@ class ExactLeaper:
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # the farthest that a segment might have gone so far
-        self.hints = np.zeros(
-            (0, system.guard_count)
-        )  # as in the room of a leap, where the last one left them
+        # as in the room of a leap, where the last one left them
+        self.hints = np.zeros((0, system.guard_count))
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # those that the sheet is for
         self.sheet: Sheet
@@ -50,13 +49,24 @@ class ExactLeaper:
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """How far ahead the tables reach, and when guards were zero last: the last digits of a zero depend on it."""
-        return np.array([self.horizon]), self.hints.ravel()
+        """How far ahead the tables reach, and when guards were zero last: the last digits of a zero depend on it.
+
+        The hints come with their vectors of modes: another process has these in other rows.
+        """
+        count = len(self.hints)
+        modes = self.shelf.tapes.modes[:count]
+        return np.array([self.horizon, float(count)]), modes.ravel().astype(float), self.hints.ravel()
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        guards = self.system.guard_count
-        self.horizon, self.hints = float(place[0]), place[1:].reshape(-1, guards or 1)[:, :guards]
+        guards, components = self.system.guard_count, len(self.system.automata)
+        self.horizon, count = float(place[0]), int(place[1])
+        vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
+        hints = place[2 + count * components :].reshape(count, guards)
+        is_known = (hints > 0.0).any(axis=1)
+        rows = self.shelf.rows_of(vectors[is_known])
+        self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
+        self.hints[rows] = hints[is_known]
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory

@@ -202,6 +202,8 @@ class Leaper(ABC):
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
         while True:
+            # before the leap: another thread may put the very modes on the shelf that this one lacks
+            known = len(self.shelf.tapes.modes)
             rows, began = self._rows(), perf_counter()
             code, steps, count = self._go(to, clock, as_packed, work, room, rows)
             record.counters.kernel_time += perf_counter() - began
@@ -217,7 +219,6 @@ class Leaper(ABC):
                 owners.append(found[1])
             if is_full:
                 self._renew()
-            known = len(self.shelf.tapes.modes)
             self.shelf.surround(z)
             if is_full or len(self.shelf.tapes.modes) == known:
                 break

@@ -85,6 +85,17 @@ def modes_of(
     return found
 
 
+def single_changes(system: System) -> np.ndarray:
+    """Vectors of modes: the first of each component, and those that differ from it in one."""
+    first = np.zeros(len(system.automata), dtype=np.int64)
+    vectors = [first]
+    for c, automaton in enumerate(system.automata):
+        for m in range(1, len(automaton.modes)):
+            vectors.append(first.copy())
+            vectors[-1][c] = m
+    return np.array(vectors)
+
+
 def is_always_linear(system: System) -> bool:
     """Whether a model is linear in each of its modes whatever the values of its parameters."""
     return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))

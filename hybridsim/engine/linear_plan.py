@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from threading import Lock
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.linear_form import Atoms, Form, Monomial
-from hybridsim.engine.linear_modes import LinearMode, NoMode, modes_of
+from hybridsim.engine.linear_modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
 
@@ -33,7 +34,7 @@ class LinearPlan:
         if begun is None:
             self._numbers, self._atoms = Numbers(p[: system.layout.parameters].tolist()), Atoms()
             self._modes: list[LinearMode | NoMode] = []
-            known: Iterable[Monomial] = ((),)
+            known = self._first_read(system, met)
         else:
             self._numbers, self._atoms, self._modes = begun._numbers, begun._atoms, list(begun._modes)
             known = begun._monomials
@@ -83,6 +84,18 @@ class LinearPlan:
             ),
         }
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
+
+    def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
+        """Functions of time that do not depend on which modes a run meets first: the order of sums hangs on them.
+
+        Where all vectors of modes are met they are read in their order; else those that differ in one component come
+        first, in which there is nearly all that the others have.
+        """
+        vectors = single_changes(system)
+        if len(met) == math.prod(len(a.modes) for a in system.automata):
+            return ((),)
+        read = modes_of(system, self._atoms, vectors, self._numbers.inputs)
+        return {(), *(m for mode in read for m in mode.monomials())}
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.

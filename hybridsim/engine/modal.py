@@ -156,9 +156,15 @@ def _by_blocks(balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, sc
     partners = _partners(values)
     clusters = [_Cluster((i,), partners[i] == i) for i in range(len(values)) if values[i].imag >= 0.0]
     blocks = [(np.array([[values[i]]]), vectors[:, [i]]) for (i,) in (c.members for c in clusters)]
+    known: dict[
+        _Cluster, tuple[np.ndarray, np.ndarray]
+    ] = {}  # one of two is merged at a time, the others stay
     while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _merged(clusters, values)
-        blocks = [_block(balanced, c, values, partners) for c in clusters]
+        for cluster in clusters:
+            if cluster not in known:
+                known[cluster] = _block(balanced, cluster, values, partners)
+        blocks = [known[cluster] for cluster in clusters]
     return _joined(clusters, blocks, scale)
 
 
@@ -260,9 +266,8 @@ def _block(
     others = [i for i in range(len(A)) if i not in members]
 
     def inside(value: complex) -> bool:
-        return not others or bool(
-            np.abs(values[members] - value).min() < np.abs(values[others] - value).min()
-        )
+        far = np.abs(values - value)
+        return not others or bool(far[members].min() < far[others].min())
 
     triangular, vectors, count = schur(A.astype(complex), output="complex", sort=inside)
     return triangular[:count, :count], vectors[:, :count]

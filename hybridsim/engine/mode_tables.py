@@ -215,6 +215,17 @@ class TapeShelf:
                 self.tapes = self._stacked()
             self._surrounded.add(z.tobytes())
 
+    def rows_of(self, vectors: np.ndarray) -> np.ndarray:
+        """Rows of these vectors of modes (k, components), which are put on the shelf where they are not there."""
+        with self._lock:
+            met = len(self._met)
+            for z in vectors:
+                self._met.setdefault(z.tobytes(), z.copy())
+            if len(self._met) > met:
+                self.tapes = self._stacked()
+            numbers = {z: k for k, z in enumerate(self._met)}
+        return np.array([numbers[z.tobytes()] for z in vectors], dtype=np.int64)
+
     def _stacked(self) -> Tapes:
         system, met = self.system, list(self._met.values())
         self._rows += [_ModeRows.of(system, z) for z in met[len(self._rows) :]]

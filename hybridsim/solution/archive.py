@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridsim.solution.run import Run
     from hybridsim.solution.solution import Solution
 
-FORMAT, VERSION = "hybridsim solution", 3
+FORMAT, VERSION = "hybridsim solution", 4
 _HEADER, _SEAL = "header", "digest"
 _REMEDY = "give a file that sol.save(...) has written"
 

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,3 +145,74 @@ def test_tables_that_grew_are_those_made_at_once() -> None:
     assert whole is not None
     for name in LinearTables._fields:
         np.testing.assert_array_equal(getattr(made.tables, name), getattr(whole.tables, name), err_msg=name)
+
+
+def one_way_chain(contacts: int) -> hs.Model:
+    """Each mass is pulled by the one before it."""
+    return hs.Model(
+        "one-way",
+        [
+            state
+            for i in range(contacts)
+            for state in (
+                hs.State(f"x{i}", 0, f"v{i}"),
+                hs.State(
+                    f"v{i}",
+                    0,
+                    f"F*sin((0.7 + 0.26*{i})*t + {i}) - 2*x{i} + {f'x{i - 1}' if i else 0} - 0.02*v{i} - f{i}",
+                ),
+            )
+        ],
+        parameters={"F": 3.0, "mu": 0.3},
+        contacts=[
+            hs.Contact(f"f{i}", velocity=f"v{i}", normal=1 + 0.5 * i, law="coulomb", arguments={"mu": "mu"})
+            for i in range(contacts)
+        ],
+    )
+
+
+ELSEWHERE = """
+import sys
+import hybridsim as hs
+from engine.test_many_modes import bits, one_way_chain
+
+for other in (4.0, 8.0)[: int(sys.argv[1])]:  # with these its vectors of modes are met in another order
+    hs.simulate(one_way_chain(4), (0, 200), params={"F": other}, integrator="exact", save="nothing")
+print(repr(bits(hs.load_solution(sys.argv[2]).resume())))
+"""
+
+
+@pytest.mark.parametrize("before", [0, 2])
+def test_another_process_goes_on_to_the_same_bits(before: int, tmp_path: Path) -> None:
+    """What an unfinished run remembers of its modes is not bound to their order on the shelf."""
+    model = one_way_chain(4)
+    part = hs.simulate(model, (0, 2000), integrator="exact", limits={"events": 1})
+    assert part.status == "limit"
+    part.save(tmp_path / "part.hsol")
+    done = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, str(before), str(tmp_path / "part.hsol")],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    whole = hs.simulate(model, (0, 2000), integrator="exact")
+    assert len(whole.events) > 1100
+    assert bits(part.resume()) == bits(whole)
+    assert ast.literal_eval(done.stdout) == bits(whole)
+
+
+@pytest.mark.parametrize("integrator", COMPILED)
+def test_threads_that_meet_the_same_modes_change_no_bit(integrator: str) -> None:
+    """One may put modes on the shelf while the others are on their way to them."""
+    model = replace(one_way_chain(5), name=f"one-way-{integrator}")
+    system = system_of(model)
+    vars(system.code)["_shared"].clear()
+    values = {"F": np.linspace(2.5, 6, 16)}
+    many, one = (
+        hs.sweep(model, values, "final", workers=workers, t_span=(0, 60), integrator=integrator)
+        for workers in (4, 1)
+    )
+    for name in system.names:
+        assert many[f"final.{name}"].tolist() == one[f"final.{name}"].tolist()
