@@ -51,9 +51,8 @@ class Room(NamedTuple):
     rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
     target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
     followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2),
-    a state; hints (K, G): how long after these modes
-    were entered a guard was zero when they were met last in this run, 0 where it was not;
-    former (G,): a row of it before the segment under way.
+    a state; hints (K, G): how long after these modes were entered a guard was zero when they were met last in this run,
+    0 where it was not; former (G,): a row of it before the segment under way.
     """
 
     rates: np.ndarray

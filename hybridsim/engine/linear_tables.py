@@ -19,6 +19,7 @@ from hybridsim.engine.system import System
 
 _LARGEST = 1e150  # the square of it has a value yet
 _KEPT = 64  # tables of a structure, one for each set of parameter values
+_MOST_BYTES = 1 << 28  # of all of these, but for the last ones
 
 
 _lock = Lock()
@@ -91,6 +92,11 @@ class _Rows:
 
     def __init__(self, fields: dict[str, np.ndarray]) -> None:
         self.count, self._fields = len(fields["counts"]), fields
+
+    @property
+    def size(self) -> int:
+        """In bytes."""
+        return sum(field.nbytes for field in self._fields.values())
 
     def first(self, count: int) -> dict[str, np.ndarray]:
         """The first rows of each."""
@@ -276,7 +282,9 @@ def _made(
         with _lock:
             for other in [other for other, made in kept.items() if made is begun]:
                 del kept[other]  # the same for fewer modes
-            while len(kept) >= _KEPT:
-                del kept[next(iter(kept))]
             kept[key] = found
+            while len(kept) > _KEPT or (
+                len(kept) > 1 and sum(made.rows.size for made in kept.values()) > _MOST_BYTES
+            ):
+                del kept[next(iter(kept))]
     return found

@@ -216,3 +216,17 @@ def test_threads_that_meet_the_same_modes_change_no_bit(integrator: str) -> None
     )
     for name in system.names:
         assert many[f"final.{name}"].tolist() == one[f"final.{name}"].tolist()
+
+
+def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of hundreds of modes take some 30 MB each: the oldest are let go of."""
+    model = cornered_chain()
+    kept = system_of(model).code.shared("linear", dict)
+    kept.clear()
+    for end in (1.0, 20.0, 400.0):  # a table for each order of magnitude
+        hs.simulate(model, (0, end), integrator="exact", save="nothing")
+    assert len(kept) == 3
+    most = max(made.rows.size for made in kept.values())
+    monkeypatch.setattr("hybridsim.engine.linear_tables._MOST_BYTES", most)
+    hs.simulate(model, (0, 0.01), integrator="exact", save="nothing")
+    assert len(kept) == 1
