@@ -60,9 +60,8 @@ class CodeShelf(ABC):
                     shared = min(len(old), len(new))
                     new[:shared] = old[:shared]
                 known = tapes, codes, packed(codes)
-                if len(codes.lacked) >= len(
-                    former.lacked
-                ):  # a shelf only grows, but another thread may be ahead
+                # a shelf only grows, but another thread may be ahead
+                if len(codes.lacked) >= len(former.lacked):
                     self._known = known
         return known[2]
 

@@ -91,10 +91,9 @@ class LinearPlan:
         Where all vectors of modes are met they are read in their order; else those that differ in one component come
         first, in which there is nearly all that the others have.
         """
-        vectors = single_changes(system)
         if len(met) == math.prod(len(a.modes) for a in system.automata):
             return ((),)
-        read = modes_of(system, self._atoms, vectors, self._numbers.inputs)
+        read = modes_of(system, self._atoms, single_changes(system), self._numbers.inputs)
         return {(), *(m for mode in read for m in mode.monomials())}
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
