@@ -13,20 +13,19 @@ from hybridsim.engine.decide import (
     open_question,
     side_after,
 )
-from hybridsim.engine.event_work import called_by, located
+from hybridsim.engine.event_work import SERIES, called_by, located
 from hybridsim.engine.jets import ORDER, run_series
-from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel, merged
+from hybridsim.engine.jit import call, call_apart, call_kernel, call_series, inlined, kernel, merged
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
 from hybridsim.engine.modes_index import find_modes
 
 UNKNOWN = -2  # in place of a verdict
 
 
-@kernel
-def _interpreted_series(
+def interpreted_series(
     tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
-) -> None:
-    """As `guard_series`, by the interpreter of tapes."""
+) -> int:
+    """As `guard_series`, by the interpreter of tapes; reached by its address."""
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
@@ -36,6 +35,7 @@ def _interpreted_series(
         r = tapes.guards[k, g]
         for j in range(judged.shape[2]):
             judged[0, g, j], judged[1, g, j] = V[r, j], E[r, j]
+    return 0
 
 
 @inlined
@@ -50,7 +50,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
         call_series(tapes.bounds[k], at.s, at.s_error, x, x_error, at.p, work.judged)
         return
     tapes.lacked[k] += 1
-    call_apart(_interpreted_series, (tapes, inputs, k, at.s, at.s_error, x, x_error, at.p, work))
+    call_kernel(work.reached[SERIES], (tapes, inputs, k, at.s, at.s_error, x, x_error, at.p, work))
 
 
 @inlined
@@ -68,7 +68,7 @@ def guard_side(
     k: the row of the modes whose `guard_series` were asked for last.
     """
     if is_linear(lin):
-        return linear_side(lin, k, g, decreed, x, x_error, work)
+        return call_apart(linear_side, (lin, k, g, decreed, x, x_error, work))
     values, bounds = work.judged[0, g], work.judged[1, g]
     side, order = side_after(values, bounds, decreed)
     return side, order, side == 0 and open_question(values, bounds, decreed)

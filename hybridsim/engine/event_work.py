@@ -14,7 +14,7 @@ from hybridsim.engine.panels import vector_of
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
 FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # of `Work.whole`
 AT, AT_ERROR = range(2)  # of `Work.real`
-SETTLE, LEAP = range(2)  # of `Work.reached`
+SETTLE, LEAP, SERIES = range(3)  # of `Work.reached`
 NOBODY = -1  # in place of the guard that fired
 
 
@@ -43,12 +43,12 @@ class Work(NamedTuple):
     """Room for one event: series with bounds (registers, 4), judged (2, guards, 4): those of guards and their bounds,
     what holds after it, candidates.
 
-    functions (5,): those of `Functions`. reached (2,): addresses of kernels: the one that settles it, and that of a
-    leap. whole, real: what the places named FIRED, AT and so on say. y, y_error (n,): the state at the event, slopes
-    (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of x_after take the place of the slopes.
-    factors, w, w_error: functions of time of linear modes, which are to hold at the event when it is settled; sizes,
-    w_sizes: of states and of these. sides, orders, floors (G,): of the guards just after it. The last ones have a row
-    for each joint candidate.
+    functions (5,): those of `Functions`. reached (3,): addresses of kernels: the one that settles it, that of a leap,
+    and the interpreter of the series of guards. whole, real: what the places named FIRED, AT and so on say. y, y_error
+    (n,): the state at the event, slopes (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of
+    x_after take the place of the slopes. factors, w, w_error: functions of time of linear modes, which are to hold at
+    the event when it is settled; sizes, w_sizes: of states and of these. sides, orders, floors (G,): of the guards just
+    after it. The last ones have a row for each joint candidate.
     """
 
     functions: np.ndarray
@@ -119,7 +119,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
     work: Work = packed(
         Work(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
-            reached=numbers(2),
+            reached=numbers(3),
             whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64),
             real=np.zeros(2),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},

@@ -14,7 +14,7 @@ from hybridsim.engine.event_work import LEAP, ROW, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address
+from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address, merged
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
@@ -87,7 +87,7 @@ class Record(NamedTuple):
     jumps: np.ndarray
 
 
-@kernel
+@merged
 def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
     """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
 

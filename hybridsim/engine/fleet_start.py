@@ -13,7 +13,7 @@ from hybridsim.engine.event_verdicts import cluster_of, guard_series, judge_cand
 from hybridsim.engine.event_work import AT, AT_ERROR, Before, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.jets import UNIT, run_series
-from hybridsim.engine.jit import call, kernel, merged
+from hybridsim.engine.jit import call, call_apart, kernel, merged
 from hybridsim.engine.leap import set_origin
 from hybridsim.engine.linear_kernels import functions_of_time, to_modal
 from hybridsim.engine.modes_index import find_modes
@@ -121,8 +121,8 @@ def _decide_cluster(
             rest //= 3
         for i in range(count):
             trial[members[i]] = candidates[number, i]
-        verdicts[number] = judge_candidate(
-            automata, tapes, inputs, none, state, work, -1, False, first, number
+        verdicts[number] = call_apart(
+            judge_candidate, (automata, tapes, inputs, none, state, work, -1, False, first, number)
         )
         if verdicts[number] < -1:  # modes that are not on the shelf
             return False

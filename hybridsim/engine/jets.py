@@ -63,7 +63,7 @@ def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) ->
     return first + second, error
 
 
-@inlined
+@kernel
 def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[float, float]:
     """sum_{i=1}^{k-1} a_i b_{k-i}, or of i a_i b_{k-i}, and its error bound; summed as in `hybridsim.engine.taylor`."""
     total, error, m = 0.0, 0.0, k // 2
@@ -86,7 +86,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
         total = V[a, 0] * V[b, 0]
         error = abs(V[a, 0]) * E[b, 0] + E[a, 0] * (abs(V[b, 0]) + E[b, 0]) + UNIT * abs(total)
         return total, error
-    inner, e = _inner(V, E, a, b, k, False)
+    inner, e = call_apart(_inner, (V, E, a, b, k, False))
     ends, d = _pair(V, E, a, b, 0, k, 1.0, 1.0)
     total = inner + ends
     return total, e + d + UNIT * abs(total)
@@ -95,7 +95,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 @inlined
 def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
     """sum_{i=1}^{k} i a_i b_{k-i} and its error bound: the product a' b, times k."""
-    inner, error = _inner(V, E, a, b, k, True)
+    inner, error = call_apart(_inner, (V, E, a, b, k, True))
     last = k * V[a, k] * V[b, 0]
     error += k * (abs(V[a, k]) * E[b, 0] + E[a, k] * (abs(V[b, 0]) + E[b, 0])) + 2.0 * UNIT * abs(last)
     return inner + last, error + UNIT * abs(inner + last)
@@ -208,7 +208,7 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
         _put(V, E, out + 1, k, w if b == 0 else -w, d)
     elif op == INTEGRAL and c != ANGLE:
         # y' a = b'  =>  k y_k a_0 = k b_k - sum_{j<k} j y_j a_{k-j}
-        s, e = _inner(V, E, out, a, k, True)
+        s, e = call_apart(_inner, (V, E, out, a, k, True))
         n = V[b, k] - s * part
         _divide(V, E, out, k, n, E[b, k] + (e + 2.0 * UNIT * abs(s)) * part + UNIT * abs(n), a)
     elif op == INTEGRAL:
@@ -311,7 +311,7 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
     elif op == DIV and k == 0:
         _divide(V, E, out, 0, V[a, 0], E[a, 0], b)
     elif op == DIV:
-        y, e = _inner(V, E, out, b, k, False)
+        y, e = call_apart(_inner, (V, E, out, b, k, False))
         first = V[out, 0] * V[b, k]
         e += abs(V[out, 0]) * E[b, k] + E[out, 0] * (abs(V[b, k]) + E[b, k]) + UNIT * abs(first)
         y += first
@@ -323,7 +323,7 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
             e = E[a, 0] / (2.0 * y) if y > 0.0 else math.sqrt(E[a, 0])
             _put(V, E, out, 0, y, e + UNIT * abs(y))
         else:
-            y, e = _inner(V, E, out, out, k, False)
+            y, e = call_apart(_inner, (V, E, out, out, k, False))
             n = 0.5 * (V[a, k] - y)
             if V[out, 0] == 0.0 and n == 0.0 and E[a, k] + e == 0.0:
                 _put(V, E, out, k, 0.0, 0.0)

@@ -183,26 +183,34 @@ if ENABLED:
 
         return signature, generate
 
-    def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
+    def _type_by_address(given: Any) -> Any:
+        """Of a pack, of a number, or of an array, of which a kernel that is reached by address gets the elements."""
+        found = numba.typeof(given)
+        return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
+
+    def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
         made = _with_cache_folder(
             str(kernel_folder()),
-            lambda: numba.cfunc(
-                types.int64(*(pack.numba_type for pack in packs)), cache=True, error_model="numpy", _nrt=False
-            )(function),
+            lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(function),
         )
         _reached.append(made)
         return int(made.address)
 
     @intrinsic
-    def call_kernel(typingctx: Any, address: Any, packs: Any) -> Any:
-        """Call the kernel at an address with a tuple of packs."""
-        signature = types.int64(types.int64, packs)
+    def call_kernel(typingctx: Any, address: Any, arguments: Any) -> Any:
+        """Call the kernel at an address with a tuple of packs, numbers and contiguous arrays."""
+        arguments = types.Tuple([types.unliteral(a) for a in arguments])
+        signature = types.int64(types.int64, arguments)
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            word = ir.IntType(64)
-            kind = ir.FunctionType(word, [word] * len(packs))
-            words = cgutils.unpack_tuple(builder, args[1], len(packs))
-            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), words)
+            given = [
+                context.make_array(ty)(context, builder, value).data if isinstance(ty, types.Array) else value
+                for ty, value in zip(
+                    arguments, cgutils.unpack_tuple(builder, args[1], len(arguments)), strict=True
+                )
+            ]
+            kind = ir.FunctionType(ir.IntType(64), [value.type for value in given])
+            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), given)
 
         return signature, generate
 
@@ -278,14 +286,18 @@ else:
         """Nothing is compiled, and never called."""
         raise NotImplementedError
 
-    def _kernel_at(function: Callable[..., int], *packs: Any) -> int:
+    def _type_by_address(given: Any) -> Any:
+        """Nothing is compiled."""
+        return None
+
+    def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
         if function not in _reached:
             _reached.append(function)
         return _reached.index(function)
 
-    def call_kernel(address: int, packs: tuple[Any, ...]) -> int:
-        """Call a function of packs."""
-        return int(_reached[address](*packs))
+    def call_kernel(address: int, arguments: tuple[Any, ...]) -> int:
+        """Call a function."""
+        return int(_reached[address](*arguments))
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""
@@ -309,19 +321,20 @@ else:
         return function(t, x, p, z, out)
 
 
-_addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the forms of their packs
+_addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the types of what they are given
 
 
-def kernel_address(function: Callable[..., int], *packs: Any) -> int:
-    """Address of a kernel of packs that returns a whole number, for `call_kernel`; compiled if need be.
+def kernel_address(function: Callable[..., int], *given: Any) -> int:
+    """Address of a kernel that returns a whole number and is called with the like of what is given; see `call_kernel`.
 
-    A kernel that calls others is compiled together with them, again for each caller; large ones that are reached by
-    their address are compiled once. Without a compiler it is a number by which the function is found.
+    It is compiled if need be. A kernel that calls others is compiled together with them, again for each caller; large
+    ones that are reached by their address are compiled once. Of an array they can ask for elements, nothing else.
+    Without a compiler it is a number by which the function is found.
     """
-    key = (function, *(getattr(pack, "numba_type", None) for pack in packs))
-    if key not in _addresses:
-        _addresses[key] = _kernel_at(function, *packs)
-    return _addresses[key]
+    key = tuple(map(_type_by_address, given))
+    if (function, key) not in _addresses:
+        _addresses[function, key] = _kernel_at(function, key)
+    return _addresses[function, key]
 
 
 class Door:

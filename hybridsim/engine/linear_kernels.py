@@ -157,7 +157,7 @@ def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float
     return 1 if value > 0.0 else -1
 
 
-@inlined
+@kernel
 def linear_side(
     lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
 ) -> tuple[int, int, bool]:

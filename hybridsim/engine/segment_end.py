@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.accumulation import CLOSING_IN
-from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, NOBODY, SETTLE
+from hybridsim.engine.event_verdicts import interpreted_series
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, NOBODY, SERIES, SETTLE
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
@@ -107,7 +108,9 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
 
 
 def reach_settling(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
-    """Compile the kernel that settles events, if need be, and put its address where loops find it."""
+    """Compile the kernel that settles events and those it reaches, if need be; put addresses where loops find them."""
+    x = work.y
+    work.reached[SERIES] = kernel_address(interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work)
     work.reached[SETTLE] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
 
 

@@ -9,7 +9,7 @@ from hybridsim.engine.event_verdicts import UNKNOWN, cluster_of, goes_on, judge_
 from hybridsim.engine.event_work import called_by, located
 from hybridsim.engine.few import put
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, merged
+from hybridsim.engine.jit import call, call_apart, merged
 
 
 @merged
@@ -30,13 +30,17 @@ def decide_single(
     now, hold = z[c], automata.hold[c]
     if not goes_on(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
         trial[c] = now
-        verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
+        verdict = call_apart(
+            judge_candidate, (automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
+        )
         if verdict != LEAVES:
             return now if verdict == FINE else -1
     if now != hold:
         for mode in (hold, 3 - hold - now):
             trial[c] = mode
-            verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+            verdict = call_apart(
+                judge_candidate, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+            )
             if verdict == FINE:
                 z[c] = mode
                 return mode
@@ -48,7 +52,9 @@ def decide_single(
         if mode == hold:
             continue
         trial[c] = mode
-        verdict = judge_candidate(automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+        verdict = call_apart(
+            judge_candidate, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+        )
         if verdict == LEAVES:
             continue
         if verdict != FINE or found >= 0:
@@ -126,8 +132,9 @@ def decide_surface(
             is_current = rank >= (count + 1) * count
             if is_current and goes_on(automata, lin, k, z, fired, is_known, x, x_error, work):
                 continue
-            verdict = judge_candidate(
-                automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number
+            verdict = call_apart(
+                judge_candidate,
+                (automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number),
             )
             if verdict == UNKNOWN:
                 return -1

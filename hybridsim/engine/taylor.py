@@ -73,7 +73,7 @@ _TRIALS = 60  # halvings: down to nothing
 _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 
 
-@inlined
+@kernel
 def _inner(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=1}^{k-1} a_i b_{k-i}."""
     total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
@@ -87,10 +87,10 @@ def _product(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=0}^{k} a_i b_{k-i}."""
     if k == 0:
         return V[a, 0] * V[b, 0]
-    return _inner(V, a, b, k) + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
+    return call_apart(_inner, (V, a, b, k)) + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
 
 
-@inlined
+@kernel
 def _weighted(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=1}^{k-1} i a_i b_{k-i}."""
     total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
@@ -104,13 +104,13 @@ def _rise(V: Any, a: int, b: int, k: int) -> float:
     """Coefficient k of the integral of a' b; at high orders the newest product waits for nothing but its sum."""
     if k <= EXACTLY:
         return _slope(V, a, b, k) * (1.0 / k)
-    return _weighted(V, a, b, k) * (1.0 / k) + V[a, k] * V[b, 0]
+    return call_apart(_weighted, (V, a, b, k)) * (1.0 / k) + V[a, k] * V[b, 0]
 
 
 @inlined
 def _slope(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=1}^{k} i a_i b_{k-i}: coefficient k - 1 of a' b."""
-    return _weighted(V, a, b, k) + k * V[a, k] * V[b, 0]
+    return call_apart(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
 
 
 @kernel
@@ -157,7 +157,7 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
         w = _product(V, out, out, k)
         V[out + 1, k] = w if b == 0 else -w
     elif op == INTEGRAL and c != ANGLE:
-        V[out, k] = (V[b, k] - _weighted(V, out, a, k) * (1.0 / k)) / V[a, 0]
+        V[out, k] = (V[b, k] - call_apart(_weighted, (V, out, a, k)) * (1.0 / k)) / V[a, 0]
     elif op == INTEGRAL:
         total = _slope(V, b, a, k) - _slope(V, a, b, k)
         for j in range(1, k):
@@ -244,7 +244,7 @@ def advance(rows: Any, V: Any, k: int) -> None:
             if k == 0:
                 V[out, 0] = V[a, 0] / V[b, 0]
             else:
-                rest = V[a, k] - (_inner(V, out, b, k) + V[out, 0] * V[b, k])
+                rest = V[a, k] - (call_apart(_inner, (V, out, b, k)) + V[out, 0] * V[b, k])
                 V[out, k] = rest * (1.0 / V[b, 0])
         elif op == NEG:
             V[out, k] = -V[a, k]
@@ -252,7 +252,7 @@ def advance(rows: Any, V: Any, k: int) -> None:
             if k == 0:
                 V[out, 0] = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             else:
-                rest = 0.5 * (V[a, k] - _inner(V, out, out, k))
+                rest = 0.5 * (V[a, k] - call_apart(_inner, (V, out, out, k)))
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
         elif op >= INTEGRATE:
             if k + 1 < V.shape[1]:
