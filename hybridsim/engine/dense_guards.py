@@ -9,7 +9,7 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.hermite import fit_in_time
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
-from hybridsim.engine.leap import earliest_exit
+from hybridsim.engine.leap import earliest_exit, parts_for_exit
 from hybridsim.engine.steps_ahead import keeps_up, sum_at
 from hybridsim.engine.taylor import advance, reach, sum_sizes, tabulate
 
@@ -147,7 +147,16 @@ def first_linear_guard(
         for i in range(count):
             room.totals[i] = sum_sizes(V, watched[i], degree + 2, room.powers)
         outcome, g, at = earliest_exit(
-            tapes, k, degree + 2, d, V, watched, room.powers, room.totals, room, room.bernstein
+            tapes,
+            k,
+            degree + 2,
+            d,
+            V,
+            watched,
+            room.powers,
+            room.totals,
+            parts_for_exit(room),
+            room.bernstein,
         )
     if outcome == NEVER:
         begin_positive(sides, orders, floors)
@@ -201,11 +210,13 @@ def first_guard(
         series_along(along, rows, inputs, s + q, x, watched, room.V, room.W, U)
         left = d - q
         longest = min(left, likely_reach(U, everyone, order, rtol))
-        w = reach(0, U, none, U, everyone, order, rtol, atol, 1.0, longest, room.powers, room.totals)
+        w = call_apart(
+            reach, (0, U, none, U, everyone, order, rtol, atol, 1.0, longest, room.powers, room.totals)
+        )
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes, k, order, w, U, everyone, room.powers, room.totals, room, room.bernstein
+            tapes, k, order, w, U, everyone, room.powers, room.totals, parts_for_exit(room), room.bernstein
         )
         if outcome == OPEN:
             return OPEN, g, q + at

@@ -15,7 +15,7 @@ from hybridsim.engine.decide import (
 )
 from hybridsim.engine.event_work import SERIES, called_by, located
 from hybridsim.engine.jets import ORDER, run_series
-from hybridsim.engine.jit import call, call_apart, call_kernel, call_series, inlined, kernel, merged
+from hybridsim.engine.jit import array_at, call, call_apart, call_kernel, call_series, inlined, kernel, merged
 from hybridsim.engine.linear_kernels import linear_coefficient, linear_side
 from hybridsim.engine.modes_index import find_modes
 
@@ -29,7 +29,9 @@ def interpreted_series(
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
-    run_series(constant, rows, inputs, tapes.derivatives[k], s, s_error, x, x_error, p, V, E)
+    n, size = work.y.shape[0], work.p_after.shape[0]
+    state, bounds, vector = array_at(x, n), array_at(x_error, n), array_at(p, size)
+    run_series(constant, rows, inputs, tapes.derivatives[k], s, s_error, state, bounds, vector, V, E)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         r = tapes.guards[k, g]
@@ -112,7 +114,7 @@ def is_continuous(
     return True
 
 
-@inlined
+@kernel
 def judge_members(
     automata: Any,
     lin: Any,
@@ -213,7 +215,10 @@ def judge_candidate(
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
     continuous = is_continuous(called_by(work), automata, at, x, work.trial, cluster, fired, work.jumps)
     work.smooth[number] = continuous
-    return judge_members(
-        automata, lin, k, at, x, x_error, work.trial, cluster, fired, True, continuous, work,
-        work.all_sides[number], work.all_orders[number], work.all_floors[number],
+    return call_apart(
+        judge_members,
+        (
+            automata, lin, k, at, x, x_error, work.trial, cluster, fired, True, continuous, work,
+            work.all_sides[number], work.all_orders[number], work.all_floors[number],
+        ),
     )  # fmt: skip

@@ -55,9 +55,12 @@ def plain_start(
         return False
     at = Before(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
-    verdict = judge_members(
-        automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
-        state.floors,
+    verdict = call_apart(
+        judge_members,
+        (
+            automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
+            state.floors,
+        ),
     )  # fmt: skip
     return verdict == FINE
 

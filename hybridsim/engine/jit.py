@@ -37,6 +37,7 @@ if ENABLED:
     from numba import types
     from numba.core import cgutils, event
     from numba.extending import intrinsic
+    from numba.np.arrayobj import populate_array
 
     from hybridsim.engine.machine_code import compile_text, machine_name, ready
 
@@ -215,6 +216,19 @@ if ENABLED:
         return signature, generate
 
     @intrinsic
+    def array_at(typingctx: Any, elements: Any, size: Any) -> Any:
+        """The array (size,) whose elements a kernel was given that is reached by its address."""
+        kind = types.Array(elements.dtype, 1, "C")
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            array = context.make_array(kind)(context, builder)
+            step = context.get_constant(types.intp, context.get_abi_sizeof(array.data.type.pointee))
+            populate_array(array, data=args[0], shape=[args[1]], strides=[step], itemsize=step, meminfo=None)
+            return array._getvalue()
+
+        return kind(elements, types.intp), generate
+
+    @intrinsic
     def call_apart(typingctx: Any, kernel: Any, arguments: Any) -> Any:
         """Call a kernel with a tuple of arguments, and keep it out of its caller.
 
@@ -299,6 +313,10 @@ else:
         """Call a function."""
         return int(_reached[address](*arguments))
 
+    def array_at(elements: Any, size: int) -> Any:
+        """The array itself."""
+        return elements
+
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Guard the function as compiled code is: what raises in Python is NaN there."""
         function = getattr(module, name)
@@ -328,7 +346,7 @@ def kernel_address(function: Callable[..., int], *given: Any) -> int:
     """Address of a kernel that returns a whole number and is called with the like of what is given; see `call_kernel`.
 
     It is compiled if need be. A kernel that calls others is compiled together with them, again for each caller; large
-    ones that are reached by their address are compiled once. Of an array they can ask for elements, nothing else.
+    ones that are reached by their address are compiled once. Of an array they get the elements alone: see `array_at`.
     Without a compiler it is a number by which the function is found.
     """
     key = tuple(map(_type_by_address, given))

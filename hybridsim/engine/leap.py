@@ -123,16 +123,22 @@ def series_at(
             U[j, k] = V[watched[j], k]
 
 
+@inlined
+def parts_for_exit(room: Any) -> Any:
+    """What `earliest_exit` needs of a room: sides, orders and floors of all guards, and scratch arrays."""
+    return (room.sides, room.orders, room.floors), (room.a, room.b, room.stack)
+
+
 @kernel
 def earliest_exit(
-    tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, room: Any, bernstein: Any
+    tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, parts: Any, bernstein: Any
 ) -> tuple[int, int, float]:  # fmt: skip
     """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time).
 
-    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`. room:
-    sides, orders and floors of all guards, scratch arrays. bernstein: see `first_exit`, by the number of leading zeros.
+    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`. parts: see
+    `parts_for_exit`. bernstein: see `first_exit`, by the number of leading zeros.
     """
-    sides, orders, floors, a, b, stack = room.sides, room.orders, room.floors, room.a, room.b, room.stack
+    (sides, orders, floors), (a, b, stack) = parts
     found, best, begin = -1, 1.0, tapes.active_start[k]
     for i in range(watched.shape[0]):
         g = tapes.active[begin + i]
@@ -249,7 +255,16 @@ def leap(
             if not h > _SMALLEST * 2.0**-52 * s:
                 return STOPPED, first_step, n_segments
             outcome, g, d = earliest_exit(
-                tapes, k, order, h, guard_series, numbers, powers, totals, room, codes.bernstein
+                tapes,
+                k,
+                order,
+                h,
+                guard_series,
+                numbers,
+                powers,
+                totals,
+                parts_for_exit(room),
+                codes.bernstein,
             )
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments

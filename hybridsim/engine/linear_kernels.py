@@ -20,7 +20,7 @@ from hybridsim.engine.guard_polynomials import (
     zero_of_terms,
 )
 from hybridsim.engine.jets import ORDER, UNIT
-from hybridsim.engine.jit import allocating_kernel, inlined, kernel
+from hybridsim.engine.jit import allocating_kernel, call_apart, inlined, kernel
 from hybridsim.engine.linear_form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear_guards import FARTHEST, TERMS
 from hybridsim.engine.panels import LANES, dot, product, times
@@ -202,7 +202,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
                 angle = value.imag * d
                 out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
         else:
-            _move_block(lin, k, j, end, c, d, out)
+            call_apart(_move_block, (lin, k, j, end, c, d, out))
         j = end
     while j < out.shape[0]:  # what others left there
         few()

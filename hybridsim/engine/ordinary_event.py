@@ -31,7 +31,7 @@ from hybridsim.engine.event_work import (
 )
 from hybridsim.engine.few import fill, put
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, inlined, merged
+from hybridsim.engine.jit import call, call_apart, inlined, merged
 from hybridsim.engine.linear_kernels import errors_of_time, functions_of_time
 from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.surface_event import decide_surface
@@ -45,7 +45,7 @@ def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, wor
         if g == fired:
             continue
         value, bound = size_at(lin, k, g, x, x_error, work)
-        if not abs(value) > bound and guard_side(lin, k, g, 1, x, x_error, work)[0] < 0:
+        if not abs(value) > bound and call_apart(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
             return False
     return True
 
@@ -150,8 +150,9 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
         return False
     after = Before(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    verdict = judge_members(
-        automata, lin, k, at, x, x_error, z, work.everything, fired, is_on, continuous, work, sides, orders, floors
+    verdict = call_apart(
+        judge_members,
+        (automata, lin, k, at, x, x_error, z, work.everything, fired, is_on, continuous, work, sides, orders, floors),
     )  # fmt: skip
     return verdict == FINE
 

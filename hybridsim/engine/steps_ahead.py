@@ -45,7 +45,15 @@ def values_at(
     """Rates of the states and values of the watched functions at (s, x), by code at an address, if there is some."""
     if code != 0:
         call_series(code, s, 0.0, x, values, W, rates)
-        return
+    else:
+        call_apart(_interpreted_values, (rows, places, s, x, watched, W, values, rates))
+
+
+@kernel
+def _interpreted_values(
+    rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, values: Any, rates: Any
+) -> None:
+    """As `values_at`, by the interpreter of tapes."""
     time, states, derivatives = places
     if time >= 0:
         W[time, 0] = s
@@ -95,7 +103,7 @@ def look_ahead(
         ahead[order + 1 + 2 * n + i], ahead[order + 1 + 3 * n + i] = slope, change
     for j in range(count):
         sums[j] = sum_at(U, j, order, ahead)
-    values_at(0, rows, places, s + d, x, watched, W, values, rates)
+    call_apart(_interpreted_values, (rows, places, s + d, x, watched, W, values, rates))
 
 
 @inlined
