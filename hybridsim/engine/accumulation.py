@@ -13,16 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.checkpoint import BEGINNING, Pace
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import inlined, kernel
 from hybridsim.engine.system import Automaton
 from hybridsim.engine.timepair import Instant
 
 # So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
 _TERMS = 10
-_MOST = 4  # events of one turn
+MOST = 4  # events of one turn
 _SEVERAL = 32  # components among whose events each one is followed
 NOBODY = -1  # as the component of events that are of none: resets of monitors
-_KEPT = _TERMS + 2 * _MOST  # intervals
+_KEPT = _TERMS + 2 * MOST  # intervals
 _AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
 _FEW = 2  # intervals more than two turns after which one may be on its way
 # How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
@@ -36,6 +36,33 @@ _ULPS = 16.0
 # A series with so few ulps of the time to go has come to its end: states that rounding moves decide what follows.
 _END = 1024.0
 _NO_INTERVALS = np.empty(0)
+
+
+@inlined
+def _follow(
+    gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
+) -> bool:
+    """Take the i-th interval, which ends now; whether the series may have come to its end. See `may_end`."""
+    before, falls, ended = work[0], work[1], False
+    is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
+    end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
+    for turn in range(min(i + 1, MOST)):
+        earlier = before[(i - turn - 1) % MOST]
+        is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * earlier
+        falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
+        if falls[turn] >= _TERMS and i >= known:
+            ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
+    before[i % MOST] = gap
+    return ended
+
+
+@inlined
+def _goes_on(work: Any) -> bool:
+    """Whether the last intervals are in a series."""
+    for turn in range(MOST):
+        if work[1, turn] >= _TERMS:
+            return True
+    return False
 
 
 @kernel
@@ -61,8 +88,10 @@ def may_end(
     """
     longest, known, ended, i = 0.0, gaps.shape[0], False, 0
     high, low = at[0], at[1]
-    before, falls = work[0], work[1]  # the last intervals; falls in a row, for turns of 1, 2, ... events
-    before[:], falls[:] = math.inf, 0.0
+    work[0, :], work[1, :] = (
+        math.inf,
+        0.0,
+    )  # the last intervals; falls in a row, for turns of 1, 2, ... events
     for e in range(-known, instants.shape[0]):
         if e < 0:
             gap = gaps[e + known]
@@ -75,20 +104,40 @@ def may_end(
                 is_begun = True
                 continue
         longest = max(longest, gap)
-        is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(high))
-        end = max(resolution, _END * 2.0**-52 * abs(high), _FAR_DOWN * longest)
-        for turn in range(min(i + 1, _MOST)):
-            earlier = before[(i - turn - 1) % _MOST]
-            is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * earlier
-            falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
-            if falls[turn] >= _TERMS and i >= known:
-                ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
-        before[i % _MOST] = last[i % last.shape[0]] = gap
+        ended = _follow(gap, high, i, known, longest, shortest, resolution, work) or ended
+        last[i % last.shape[0]] = gap
         i += 1
     at[0], at[1] = high, low
-    for turn in range(_MOST):
-        ended = ended or falls[turn] >= _TERMS
-    return ended, i
+    return ended or _goes_on(work), i
+
+
+@kernel
+def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: Any) -> bool:
+    """Whether the first events of a run, at instants (E, 2), certainly have no limit, of whatever component they are.
+
+    fires (E,): the guards, owner: of each its component. work (2, events of a turn at most) is written to. Where it is
+    not certain, `Accumulation.limit_of_all` finds out.
+    """
+    count = instants.shape[0]
+    if count <= _TERMS:  # a series has more
+        return True
+    if count <= _KEPT + 1 or components > _SEVERAL:
+        return False
+    for c in range(components):
+        work[0, :], work[1, :] = math.inf, 0.0
+        longest, i, last = 0.0, -1, 0
+        for e in range(count):
+            if owner[fires[e]] != c:
+                continue
+            if i >= 0:
+                gap = abs((instants[e, 0] - instants[last, 0]) + (instants[e, 1] - instants[last, 1]))
+                longest = max(longest, gap)
+                if _follow(gap, instants[e, 0], i, 0, longest, 0.0, 0.0, work):
+                    return False
+            last, i = e, i + 1
+        if _goes_on(work):
+            return False
+    return True
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
@@ -96,7 +145,7 @@ def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]
 
     same : how well the factor must repeat.
     """
-    for turn in range(1, _MOST + 1):
+    for turn in range(1, MOST + 1):
         terms = count + turn - 1  # of every event of the turn
         if len(gaps) < terms + turn:
             break
@@ -157,7 +206,7 @@ class Accumulation:
         """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
         if not self.is_under_way(now):
             return math.inf
-        return min(_AHEAD * max(self.paces[c].intervals[-_MOST:]) for c in self._under_way)
+        return min(_AHEAD * max(self.paces[c].intervals[-MOST:]) for c in self._under_way)
 
     def go_on(self, paces: dict[int, Pace]) -> None:
         """Take up what was known."""
@@ -197,7 +246,7 @@ class Accumulation:
         """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
-        at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, _MOST)), np.empty(_KEPT)
+        at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, MOST)), np.empty(_KEPT)
         ended, count = may_end(
             known, at, pace.last is not None, instants, owners, component, self.shortest, self.resolution, work, last
         )  # fmt: skip

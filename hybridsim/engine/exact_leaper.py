@@ -7,17 +7,15 @@ from time import perf_counter
 import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
-from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import work_space
 from hybridsim.engine.exact_leap import Record, leap_at_address, reach_leap, room_for
 from hybridsim.engine.jit import Door
-from hybridsim.engine.leap import AT_TARGET, FULL
+from hybridsim.engine.leapt import Leapt
 from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import Sheet
-from hybridsim.engine.pieces import end_point
 from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -25,6 +23,7 @@ from hybridsim.engine.trajectory import Trajectory
 
 _SEGMENTS = 1024  # room for one call
 _NONE = np.zeros(0, dtype=np.int64)
+_OF_SEGMENTS = dict.fromkeys(("ends", "rows", "vectors", "coordinates"))  # arrays of a record
 
 _leap = Door(leap_at_address)
 
@@ -40,6 +39,7 @@ class ExactLeaper:
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # those that the sheet is for
         self.sheet: Sheet
+        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
 
     def anew(self) -> ExactLeaper:
         """The same for another run."""
@@ -68,17 +68,16 @@ class ExactLeaper:
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]
 
-    def leap(
-        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> Landing:
-        """As far as ordinary events and the room for them go."""
+    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt | None:
+        """Call the kernel; None where there are no tables."""
         system, shelf = self.system, self.shelf
         shelf.surround(outcome.z)
         tapes, inputs = shelf.tapes, system.registers.inputs
-        self.horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(system, tapes.modes, p, self.horizon)
+        horizon = max(self.horizon, min(target.minus(origin), self.longest))
+        found = tables_of(system, tapes.modes, p, horizon)
         if found is None:
-            return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+            self.horizon = horizon
+            return None
         tables, spare = found
         if tables is not self.tables:
             self.tables, self.sheet = tables, self._sheet(tables)
@@ -98,16 +97,38 @@ class ExactLeaper:
         hints[:known], hints[known:] = self.hints, 0.0
         began = perf_counter()
         code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
-        record.counters.kernel_time += perf_counter() - began
+        seconds = perf_counter() - began
         z, after = desk.leave()
-        clock, count = room.times[2:].tolist(), int(room.committed[0])
-        self.hints = hints.copy()
+        clock, count, beside = (
+            room.times[2:].tolist(),
+            int(room.committed[0]),
+            (tables, horizon, hints.copy()),
+        )
         spare.append(desk)
-        instants, owners = self._commit(tables, self.sheet.rows(memory), count, z, clock, record)
         shelf.surround(z)
-        goes_on = code == FULL or (count > 0 and len(shelf.tapes.modes) != len(tapes.modes))
-        end = ARRIVED if code == AT_TARGET else (PAUSED if goes_on else BEFORE_SOMETHING)
-        return Landing(Instant(*clock), after, end, instants, owners)
+        has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
+        return Leapt(
+            system, self.sheet.rows(memory), 0, code, count, count, z, clock, after, has_news, seconds, beside
+        )
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        leapt, self.leapt = self.leapt or self.go(origin, outcome, p, target), None
+        if leapt is None:
+            return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+        tables, self.horizon, self.hints = leapt.beside
+        record.counters.kernel_time += leapt.seconds
+        if leapt.count:
+            self._commit(tables, leapt, record)
+        goes_on = leapt.is_full or leapt.has_news
+        end = ARRIVED if leapt.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
+        return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
+
+    def forget_segments(self, leapt: Leapt) -> None:
+        """Let go of all segments but the end of the last one."""
+        leapt.forget_segments(_OF_SEGMENTS)
 
     def _sheet(self, tables: LinearTables) -> Sheet:
         """What the kernel writes to; the trajectory keeps it, events longer than segments."""
@@ -132,28 +153,16 @@ class ExactLeaper:
         sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
         return sheet
 
-    def _commit(
-        self,
-        tables: LinearTables,
-        rows: Record,
-        count: int,
-        z_after: np.ndarray,
-        clock: list[float],
-        record: Trajectory,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Leave so many segments to the trajectory; the instants (E, 2) of their events, and whose they are."""
-        ends, origins, numbers, modes, vectors, coordinates, fired, jumps = rows
-        if not count:
-            return np.empty((0, 2)), _NONE
-        system, counters, begun = self.system, record.counters, slice(0, count)
-        origins[count], modes[count] = clock, z_after
+    def _commit(self, tables: LinearTables, leapt: Leapt, record: Trajectory) -> None:
+        """Leave the segments to the trajectory, and the events."""
+        counters, begun, crossings = record.counters, slice(0, leapt.count), leapt.crossings
         if record.segments.is_end_alone:
-            last = count - 1
-            record.segments.keep_only(end_point(Instant(*clock), modes[last], vectors[last], jumps[last, 1]))
+            record.segments.keep_only(leapt.last_end)
         else:
+            ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
             record.segments.add(
                 ClosedFormBlock(
-                    system,
+                    self.system,
                     tables,
                     numbers[begun],
                     ends[begun],
@@ -164,14 +173,8 @@ class ExactLeaper:
                     jumps[begun],
                 )
             )
-        counters.steps += count
-        counters.restarts += count
-        events = count if fired[count - 1] >= 0 else count - 1
-        instants, ended, after = origins[1 : events + 1], slice(0, events), slice(1, events + 1)
-        if events:
-            crossings = Crossings(
-                system, instants, fired[ended], modes[ended], modes[after], jumps[ended, 1:]
-            )
+        counters.steps += leapt.count
+        counters.restarts += leapt.count
+        if crossings is not None:
             counters.events += len(crossings)
             record.occurrences.add(crossings)
-        return instants, system.owner[fired[ended]]

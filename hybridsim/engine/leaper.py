@@ -13,16 +13,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from hybridsim.engine.blocks import SegmentBlock
-from hybridsim.engine.crossings import Crossings
 from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.jit import Door
-from hybridsim.engine.leap import AT_TARGET, FULL, Record, Room, leap
+from hybridsim.engine.leap import Record, Room, leap
+from hybridsim.engine.leapt import Leapt
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import ALIGNED, LARGEST, Sheet, packed
-from hybridsim.engine.pieces import end_point
 from hybridsim.engine.segment_end import reach_settling
 from hybridsim.engine.series import series_order
 from hybridsim.engine.series_block import SeriesBlock
@@ -47,6 +46,7 @@ _SEGMENTS = 1024  # room for one call
 _ROOM, _FEWEST = LARGEST // 8, 64
 _GROWTH, _LONGEST = 8, 1 << 23  # of that room, for a segment that is longer
 _NONE = np.zeros(0, dtype=np.int64)
+_OF_SEGMENTS = dict.fromkeys(("steps", "series", "segments", "vectors"))  # arrays of a record
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
 
@@ -108,6 +108,7 @@ class Leaper(ABC):
             layout.phases_at,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
+        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         self.steps = max((_ROOM - beside) // (system.n * columns + 2), _FEWEST)  # that there is room for
         self._renew()
@@ -135,7 +136,11 @@ class Leaper(ABC):
         """Run the kernel, which writes to rows of the record: why it ended, how many steps and segments there are."""
 
     @abstractmethod
-    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+    def _cost(self, room: Any) -> Any:
+        """What a call has cost beyond its steps."""
+
+    @abstractmethod
+    def _count(self, counters: Counters, steps: int, cost: Any) -> None:
         """Count what so many steps have cost, beside themselves."""
 
     def _block(self, *arrays: np.ndarray) -> SegmentBlock:
@@ -184,12 +189,10 @@ class Leaper(ABC):
             self._renew()
         self.used = (rows, segments)
 
-    def leap(
-        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> Landing:
-        """As far as ordinary events and the room for them go."""
+    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt:
+        """Call the kernel."""
         self.shelf.surround(outcome.z)
-        clock, to, n = np.array(origin), np.array(target), self.system.n
+        clock, to = np.array(origin), np.array(target)
         try:
             desk = self.spare.pop()
         except IndexError:
@@ -198,37 +201,72 @@ class Leaper(ABC):
                 self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, desk.as_packed, desk.work
             )
         desk.take_up(outcome, p)
-        as_packed, z, work, room = desk.as_packed, desk.state.z, desk.work, desk.room
+        # before the leap: another thread may put the very modes on the shelf that this one lacks
+        known = len(self.shelf.tapes.modes)
+        rows, began = self._rows(), perf_counter()
+        code, steps, count = self._go(to, clock, desk.as_packed, desk.work, desk.room, rows)
+        seconds = perf_counter() - began
+        self.shelf.look()
+        cost = self._cost(desk.room)
+        z, after = desk.leave()
+        self.spare.append(desk)
+        self.shelf.surround(z)
+        has_news = len(self.shelf.tapes.modes) != known
+        assert self.memory is not None
+        rows, beside = self.sheet.rows(self.memory), (self.memory, self.used[0], cost)
+        return Leapt(
+            self.system,
+            rows,
+            self.used[1],
+            code,
+            steps,
+            count,
+            z,
+            clock.tolist(),
+            after,
+            has_news,
+            seconds,
+            beside,
+        )
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        leapt, self.leapt = self.leapt or self.go(origin, outcome, p, target), None
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
         while True:
-            # before the leap: another thread may put the very modes on the shelf that this one lacks
-            known = len(self.shelf.tapes.modes)
-            rows, began = self._rows(), perf_counter()
-            code, steps, count = self._go(to, clock, as_packed, work, room, rows)
-            record.counters.kernel_time += perf_counter() - began
-            self.shelf.look()
-            self._count(record.counters, steps, room)
-            is_too_long = code == FULL and count == 0 and self.used == (0, 0)  # a single segment
-            if is_too_long and self.steps * _GROWTH * n * self.columns <= _LONGEST:
+            self.memory, _, cost = leapt.beside
+            record.counters.kernel_time += leapt.seconds
+            self._count(record.counters, leapt.steps, cost)
+            is_too_long = leapt.is_full and leapt.count == 0 and self.used == (0, 0)  # a single segment
+            if is_too_long and self.steps * _GROWTH * self.system.n * self.columns <= _LONGEST:
                 self.steps, is_too_long = self.steps * _GROWTH, False
-            is_full = code == FULL and not is_too_long
-            if count:
-                found = self._commit(steps, count, z, clock, record)
-                instants.append(found[0])
-                owners.append(found[1])
+            is_full = leapt.is_full and not is_too_long
+            if leapt.count:
+                self._commit(leapt, record)
+                instants.append(leapt.instants)
+                owners.append(leapt.owners)
             if is_full:
                 self._renew()
-            self.shelf.surround(z)
-            if is_full or len(self.shelf.tapes.modes) == known:
+            if is_full or not leapt.has_news:
                 break
-        _, after = desk.leave()
-        self.spare.append(desk)
-        end = PAUSED if is_full else (ARRIVED if code == AT_TARGET else BEFORE_SOMETHING)
+            outcome = leapt.after()
+            leapt = self.go(Instant(*leapt.clock), outcome, outcome.p, target)
+        end = PAUSED if is_full else (ARRIVED if leapt.is_at_target else BEFORE_SOMETHING)
         if len(instants) == 1:
-            return Landing(Instant(*clock.tolist()), after, end, instants[0], owners[0])
+            return Landing(Instant(*leapt.clock), leapt.after, end, instants[0], owners[0])
         all_instants = np.concatenate([np.empty((0, 2)), *instants])
-        return Landing(Instant(*clock.tolist()), after, end, all_instants, np.concatenate([_NONE, *owners]))
+        return Landing(
+            Instant(*leapt.clock), leapt.after, end, all_instants, np.concatenate([_NONE, *owners])
+        )
+
+    def forget_segments(self, leapt: Leapt) -> None:
+        """Let go of all segments but the end of the last one, unless their steps are looked at."""
+        if not self.is_looked_at:
+            leapt.forget_segments(_OF_SEGMENTS)
+            leapt.beside = (None, *leapt.beside[1:])
 
     def _rows(self) -> Any:
         """The rows that the next call writes to."""
@@ -237,24 +275,16 @@ class Leaper(ABC):
             self.memory = self.sheet.blank()
         return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
-    def _commit(
-        self, steps: int, count: int, z: np.ndarray, clock: np.ndarray, record: Trajectory
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Leave what one call has written to the trajectory; the instants (E, 2) of its events, and whose they are.
-
-        z and clock hold after the last segment, the E-th where an event ended it.
-        """
-        first_step, first = self.used
-        last_step, last = self.used = (first_step + steps, first + count + 1)
-        assert self.memory is not None
-        lengths, series, ends, origins, modes, vectors, fired, jumps = self.sheet.rows(self.memory)
-        ends[first], origins[last - 1], modes[last - 1] = 0, clock, z
-        begun, k = slice(first, last - 1), last - 2
-        system, counters = self.system, record.counters
+    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
+        """Leave what one call has written to the trajectory: its segments and events."""
+        first_step, first = leapt.beside[1], leapt.first
+        last_step, last = self.used = (first_step + leapt.steps, first + leapt.count + 1)
+        begun, counters, crossings = slice(first, last - 1), record.counters, leapt.crossings
         if record.segments.is_end_alone and not self.is_looked_at:
-            end = Instant(*origins[last - 1].tolist())
-            record.segments.keep_only(end_point(end, modes[k], vectors[k], jumps[k, 0]))
+            record.segments.keep_only(leapt.last_end)
         else:
+            lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
+            ends[first] = 0
             record.segments.add(
                 self._block(
                     ends[first:last],
@@ -266,16 +296,11 @@ class Leaper(ABC):
                     jumps[begun],
                 )
             )
-        counters.steps += steps
-        counters.restarts += count
-        events = count if fired[last - 2] >= 0 else count - 1
-        ended, after = slice(first, first + events), slice(first + 1, first + events + 1)
-        instants = origins[after]
-        if events:
-            crossings = Crossings(system, instants, fired[ended], modes[ended], modes[after], jumps[ended])
+        counters.steps += leapt.steps
+        counters.restarts += leapt.count
+        if crossings is not None:
             counters.events += len(crossings)
             record.occurrences.add(crossings)
-        return instants, system.owner[fired[ended]]
 
 
 _leap = Door(leap)
@@ -334,5 +359,8 @@ class TaylorLeaper(Leaper):
         self.codes.look(tapes, codes)
         return code, steps, count
 
-    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+    def _cost(self, room: Any) -> None:
+        """Nothing."""
+
+    def _count(self, counters: Counters, steps: int, cost: None) -> None:
         counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end

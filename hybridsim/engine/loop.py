@@ -32,10 +32,15 @@ from hybridsim.engine.trajectory import Task, Trajectory
 
 
 class ModeLoop:
-    """One run of a system with one stepping method."""
+    """One run of a system with one stepping method; leaper: a compiled loop that has been called ahead."""
 
     def __init__(
-        self, system: System, method: Method, task: Task, progress: Callable[[float], None] | None = None
+        self,
+        system: System,
+        method: Method,
+        task: Task,
+        progress: Callable[[float], None] | None = None,
+        leaper: Leaps | None = None,
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
@@ -51,7 +56,7 @@ class ModeLoop:
         self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # by component
         self.notices = Notices(system, method, task, self.record)
-        self.leaper = plan.leaper()
+        self.leaper = leaper or plan.leaper()
         self._told = progress
 
     @property

@@ -43,6 +43,16 @@ class Plan:
         """A compiled loop for one run; None where there is none."""
         return None if self._pattern is None else self._pattern.anew()
 
+    @property
+    def silent_start(self) -> tuple[Outcome, np.ndarray] | None:
+        """What holds at the start, with the run-time vector there, and nobody may change; known from the second run on.
+
+        None where something is to be recorded there, or at times known beforehand, or where there is no compiled loop.
+        """
+        system = self.system
+        is_free = self._pattern is not None and not system.model.schedules and not system.signals
+        return self._start if is_free and self.begins_silently else None
+
     def start(self, due: tuple[int, ...]) -> Standing:
         """What holds just after the start, the schedules due then applied."""
         system, forward = self.system, self._task.forward

@@ -168,8 +168,12 @@ class RungeKuttaLeaper(Leaper):
         self.codes.look(tapes, codes)
         return code, steps, count
 
-    def _count(self, counters: Counters, steps: int, room: Any) -> None:
+    def _cost(self, room: Any) -> tuple[int, int]:
         tries, rejected = room.counts.tolist()
+        return tries, rejected
+
+    def _count(self, counters: Counters, steps: int, cost: tuple[int, int]) -> None:
+        tries, rejected = cost
         counters.rejected += rejected
         # the slope comes with the series
         counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + steps

@@ -12,6 +12,7 @@ from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.system import System
 
 if TYPE_CHECKING:
+    from hybridsim.engine.leapt import Leapt
     from hybridsim.engine.outcome import Outcome
     from hybridsim.engine.timepair import Instant
     from hybridsim.engine.trajectory import Trajectory
@@ -203,7 +204,10 @@ class Leaps(Protocol):
     """A compiled mode loop of one run: whole segments and their ordinary events at once.
 
     It adds what it went over to the record as blocks (`hybridsim.engine.blocks`) and counts in its counters.
+    leapt: a call of the kernel that `go` made ahead, for the next leap to begin with.
     """
+
+    leapt: Leapt | None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -220,6 +224,12 @@ class Leaps(Protocol):
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
+
+    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt | None:
+        """Call the kernel, and leave it at that; None where it cannot be called."""
+
+    def forget_segments(self, leapt: Leapt) -> None:
+        """Let go of the memory that is for segments, as far as it is not needed where the end alone is kept."""
 
 
 class Method(Protocol):

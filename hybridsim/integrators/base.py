@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.loop import ModeLoop
+from hybridsim.engine.at_once import carried_out
 from hybridsim.engine.stepping import Flow, Leaps, Stepper, Tolerances, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
@@ -99,4 +99,4 @@ class Integrator(ABC):
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task; by default step by step through the engine's mode loop."""
-        return ModeLoop(system, self, task, progress).run()
+        return carried_out(system, self, task, progress)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.at_once import AtOnce
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.model.hygiene import jumps_of
 from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
-    from hybridsim.engine.trajectory import Task
+    from hybridsim.engine.trajectory import Task, Trajectory
     from hybridsim.integrators.base import Integrator
     from hybridsim.model import Model
 
@@ -52,13 +53,20 @@ class Run:
         began = time.perf_counter()
         trajectory = self.method.run(self.system, self.task, progress)
         wall_time = time.perf_counter() - began
-        if isinstance(self.system.code, PythonCode):
-            self.system.code.report(trajectory)
-        for caution in jumps_of(self.model):
-            trajectory.warnings[caution.sentence] = 1
-        trajectory.close(self.task.keep)
+        if isinstance(trajectory, AtOnce):
+            trajectory.then(self._close)
+        else:
+            self._close(trajectory)
         run = self
         # a solution holds on to what the run left, not to what it began with
         if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
         return Solution(run, trajectory, before + wall_time, compile_time)
+
+    def _close(self, trajectory: Trajectory) -> None:
+        """Add what is to be said of the run, and let go of what is not to be kept."""
+        if isinstance(self.system.code, PythonCode):
+            self.system.code.report(trajectory)
+        for caution in jumps_of(self.model):
+            trajectory.warnings[caution.sentence] = 1
+        trajectory.close(self.task.keep)

@@ -1,0 +1,126 @@
+"""A run that one call of its compiled loop takes from start to end: what it leaves behind is made when it is asked for.
+
+A short run takes no longer in compiled code than Python takes to lay out what happened, and a program that runs the
+same again and again looks at little of it. So the times of events are read from what the loop wrote; whoever asks for
+more gets the record that the mode loop makes of that very call.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from hybridsim.engine.accumulation import MOST, leads_nowhere
+from hybridsim.engine.blocks import OccurrenceList
+from hybridsim.engine.chain import Chain
+from hybridsim.engine.jit import Door
+from hybridsim.engine.limits import UNLIMITED
+from hybridsim.engine.loop import ModeLoop
+from hybridsim.engine.plan import plan_of
+from hybridsim.engine.stepping import Leaps, Method, StepFailure
+from hybridsim.engine.system import System
+from hybridsim.engine.trajectory import Task, Trajectory
+
+if TYPE_CHECKING:
+    from hybridsim.engine.crossings import Crossings
+    from hybridsim.engine.leapt import Leapt
+
+
+class AtOnce(Trajectory):
+    """The record of a finished run; all but the times of its events is made when somebody asks for it.
+
+    Parameters
+    ----------
+    crossings : makes the occurrences; None where they are not kept.
+    make : makes the whole record.
+    """
+
+    def __init__(
+        self, crossings: Callable[[], Crossings | None] | None, make: Callable[[], Trajectory]
+    ) -> None:
+        self.status, self.message = "finished", ""
+        self._crossings, self._make = crossings, make
+
+    def then(self, last: Callable[[Trajectory], None]) -> None:
+        """What is to be done with the whole record, once it is made."""
+        first = self._make
+
+        def make() -> Trajectory:
+            record = first()
+            last(record)
+            return record
+
+        self._make = make
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if name == "occurrences" and self._crossings is not None:
+            happened, found = self._crossings(), Chain(OccurrenceList)
+            if happened is not None:
+                found.add(happened)
+            self.occurrences = found  # once it is whole: another thread may ask as well
+        else:
+            vars(self).update(vars(self._make()))
+        return getattr(self, name)
+
+
+class _BrokenOff:
+    """In place of a compiled loop whose first call raised an error, for the mode loop to deal with it."""
+
+    leapt = None
+
+    def __init__(self, place: tuple[np.ndarray, ...], error: BaseException) -> None:
+        self.place, self._error = place, error
+
+    def leap(self, *_: Any) -> Any:
+        """Raise it."""
+        raise self._error
+
+
+_leads_nowhere = Door(leads_nowhere)
+
+
+def _is_over(system: System, leapt: Leapt) -> bool:
+    """Whether the call is all of the run for certain: its events have no limit, and hide no bounces."""
+    if not leapt.is_at_target or leapt.has_news:
+        return False
+    if leapt.events == 0:
+        return True
+    fires = leapt.rows.fires[leapt.first : leapt.first + leapt.events]
+    if not system.has_surface[system.owner[fires[-1]]]:
+        return False
+    work = np.empty((2, MOST))
+    return bool(_leads_nowhere(leapt.instants, fires, system.owner, len(system.automata), work))
+
+
+def carried_out(
+    system: System, method: Method, task: Task, progress: Callable[[float], None] | None
+) -> Trajectory:
+    """Run a task: its compiled loop goes first, if it can, and where that is not all of it the mode loop goes on."""
+    plan, keep = plan_of(system, method, task), task.keep
+    start = plan.silent_start
+    is_plain = progress is None and task.record is None and task.limits is UNLIMITED
+    if start is None or not is_plain or not {keep.segments, keep.events} <= {None, math.inf}:
+        return ModeLoop(system, method, task, progress).run()
+    leaper = plan.leaper()
+    assert leaper is not None
+    try:
+        leapt = leaper.leapt = leaper.go(plan.origin, *start, plan.end)
+    except (KeyboardInterrupt, StepFailure) as error:
+        return ModeLoop(system, method, task, None, cast("Leaps", _BrokenOff(leaper.place, error))).run()
+    if leapt is None or not _is_over(system, leapt):
+        return ModeLoop(system, method, task, None, leaper).run()
+    if keep.segments is None:
+        leaper.forget_segments(leapt)
+
+    def made() -> Trajectory:
+        again = plan.leaper()
+        assert again is not None
+        again.leapt = leapt
+        return ModeLoop(system, method, task, None, again).run()
+
+    return AtOnce(None if keep.events is None else lambda: leapt.crossings, made)

@@ -1,0 +1,111 @@
+"""What one call of a compiled loop has left behind: what it wrote, why it ended, and what holds there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.crossings import Crossings
+from hybridsim.engine.leap import AT_TARGET, FULL
+from hybridsim.engine.pieces import Segment, end_point
+from hybridsim.engine.timepair import Instant
+
+if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Outcome
+    from hybridsim.engine.system import System
+
+
+@dataclass(eq=False)
+class Leapt:
+    """One call, before it is committed to a trajectory.
+
+    Parameters
+    ----------
+    rows : arrays of the record, a named tuple; of its segments those from `first` on were written.
+    code, steps, count : what the kernel returned: why it ended, and how many steps and segments there are.
+    z, clock : the modes and the instant (high, low) where it ended.
+    after : makes what holds there.
+    has_news : modes have been met on the way that were not known before, so that it may go on.
+    seconds : in compiled code.
+    beside : what else its leaper keeps of it.
+    vector : the last run-time vector, where the rows have nothing but the events any more.
+    """
+
+    system: System
+    rows: Any
+    first: int
+    code: int
+    steps: int
+    count: int
+    z: np.ndarray
+    clock: list[float]
+    after: Callable[[], Outcome]
+    has_news: bool
+    seconds: float
+    beside: Any
+    vector: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        last = self.first + self.count  # where a segment ends is written where the next one would begin
+        self.rows.clocks[last], self.rows.modes[last] = self.clock, self.z
+
+    @property
+    def is_at_target(self) -> bool:
+        """Whether it came to where it was to go."""
+        return self.code == AT_TARGET
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it ended for want of room."""
+        return self.code == FULL
+
+    @cached_property
+    def events(self) -> int:
+        """How many of the segments an event ended: all but the last one in any case."""
+        last = self.first + self.count - 1
+        return self.count if self.count and self.rows.fires[last] >= 0 else max(self.count - 1, 0)
+
+    @cached_property
+    def instants(self) -> np.ndarray:
+        """Instants of the events (E, 2)."""
+        return self.rows.clocks[self.first + 1 : self.first + 1 + self.events]
+
+    @property
+    def owners(self) -> np.ndarray:
+        """Components whose guards these events are (E,)."""
+        return self.system.owner[self.rows.fires[self._ended]]
+
+    @cached_property
+    def crossings(self) -> Crossings | None:
+        """The events; None if there are none."""
+        if not self.events:
+            return None
+        rows, after = self.rows, slice(self.first + 1, self.first + 1 + self.events)
+        sides = rows.jumps[self._ended][
+            :, -2:
+        ]  # of the states at its end; more begins with that at its start
+        instants = self.instants
+        ended = self._ended
+        return Crossings(
+            self.system, instants, rows.fires[ended], rows.modes[ended], rows.modes[after], sides
+        )
+
+    @property
+    def last_end(self) -> Segment:
+        """The end of the last segment."""
+        rows, last = self.rows, self.first + self.count - 1
+        vector = rows.vectors[last] if self.vector is None else self.vector
+        return end_point(Instant(*self.clock), rows.modes[last], vector, rows.jumps[last, -2])
+
+    def forget_segments(self, names: dict[str, None]) -> None:
+        """Let go of the arrays of these names; of the segments there is the end alone then."""
+        self.vector = self.rows.vectors[self.first + self.count - 1].copy()
+        self.rows = self.rows._replace(**names)
+
+    @property
+    def _ended(self) -> slice:
+        return slice(self.first, self.first + self.events)

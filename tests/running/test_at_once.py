@@ -1,0 +1,126 @@
+"""What a run leaves behind that its compiled loop did in one call is made on demand, and is what it is otherwise."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridsim as hs
+from hybridsim.engine.at_once import AtOnce
+from hybridsim.engine.exact_leaper import ExactLeaper
+from hybridsim.engine.leaper import Leaper
+from hybridsim.engine.stepping import StepFailure
+
+ENGINES = ["exact", "taylor", "dop853", "tsit5"]
+ENOUGH = {"seconds": 1e6}  # a run with limits goes through the mode loop from the first call on
+
+
+def pair() -> hs.Model:
+    """Two bodies on a moving belt, whose events are of two components."""
+    states = [
+        hs.State("x1", 0.0, "v1"),
+        hs.State("v1", 0.0, "0.8*sin(1.3*t) - 0.7*(x1 - x2) - x1 - f1"),
+        hs.State("x2", 0.0, "v2"),
+        hs.State("v2", 0.0, "0.7*(x1 - x2) - x2 - f2"),
+    ]
+    contacts = [
+        hs.Contact(name, velocity=f"{v} - 0.1", normal=1, law="coulomb", arguments={"mu": 0.3})
+        for name, v in (("f1", "v1"), ("f2", "v2"))
+    ]
+    return hs.Model("pair", states, contacts=contacts)
+
+
+def bouncing() -> hs.Model:
+    """A ball whose bounces accumulate."""
+    return hs.load("bouncing-ball")
+
+
+def content(sol: hs.Solution, save: str) -> list[Any]:
+    """All that a run found, to the last bit."""
+    cost = {name: value for name, value in sol.stats.items() if "time" not in name}
+    found: list[Any] = [sol.status, sol.warnings, cost]
+    if save != "nothing":
+        found += [
+            [(e.t, e.component, e.guard, e.source, e.target, *e.x_minus, *e.x_plus) for e in sol.events]
+        ]
+        found += [sol.modes]
+    return [*found, sol.t.tolist(), sol.y.tolist()]
+
+
+def is_at_once(sol: hs.Solution) -> bool:
+    """Whether most of the record has still to be made."""
+    record = sol._trajectory
+    return isinstance(record, AtOnce) and "segments" not in vars(record)
+
+
+@pytest.mark.parametrize("save", ["all", "events", "nothing"])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_is_made_later_is_what_was_made_at_once(engine: str, save: str) -> None:
+    for model, end in ((hs.load("dfcs"), 0.5), (pair(), 60.0)):
+        options: dict[str, Any] = {"integrator": engine, "save": save}
+        wanted = content(hs.simulate(model, (0, end), limits=ENOUGH, **options), save)
+        hs.simulate(model, (0, end), **options)
+        sol = hs.simulate(model, (0, end), **options)
+        assert is_at_once(sol)
+        assert content(sol, save) == wanted
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_times_of_events_alone_make_no_record(engine: str) -> None:
+    model = pair()
+    whole = hs.simulate(model, (0, 60), limits=ENOUGH, integrator=engine)
+    hs.simulate(model, (0, 60), integrator=engine)
+    sol = hs.simulate(model, (0, 60), integrator=engine)
+    for name in ("f1", "f2"):
+        assert sol.event_times(name).tolist() == [e.t for e in whole.events if e.component == name] != []
+    assert is_at_once(sol)
+    assert len(sol.events) == len(whole.events)
+    assert np.array_equal(sol(30.0), whole(30.0))
+    assert not is_at_once(sol)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_later_runs_leave_an_earlier_one_as_it_was(engine: str) -> None:
+    model = pair()
+    sols = [hs.simulate(model, (0, 60), integrator=engine) for _ in range(4)]
+    again = content(sols[0], "all")
+    for sol in reversed(sols[1:]):
+        assert content(sol, "all") == again
+
+
+@pytest.mark.parametrize("engine", ["taylor", "dop853"])
+def test_events_that_accumulate_are_not_put_off(engine: str) -> None:
+    model = bouncing()
+    sols = [hs.simulate(model, (0, 5.0), integrator=engine) for _ in range(3)]
+    assert not any(map(is_at_once, sols))
+    assert content(sols[2], "all") == content(sols[0], "all")
+    assert sols[2].modes["mode"][-1].mode == "rest"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_run_is_stored_and_resumed_before_it_is_looked_at(engine: str) -> None:
+    model = pair()
+    hs.simulate(model, (0, 60), integrator=engine)
+    sol, other = (hs.simulate(model, (0, 60), integrator=engine) for _ in range(2))
+    assert is_at_once(sol)
+    assert content(pickle.loads(pickle.dumps(sol)), "all") == content(other, "all")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("error", "status"), [(KeyboardInterrupt(), "interrupted"), (StepFailure("no step"), "step-failure")]
+)
+def test_an_error_of_the_first_call_ends_the_run_as_ever(
+    engine: str, error: BaseException, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = pair()
+    hs.simulate(model, (0, 60), integrator=engine)
+
+    def broken(*_: Any) -> Any:
+        raise error
+
+    monkeypatch.setattr(ExactLeaper if engine == "exact" else Leaper, "go", broken)
+    assert hs.simulate(model, (0, 60), integrator=engine).status == status
