@@ -20,29 +20,34 @@ from hybridsim.engine.jit import Door
 from hybridsim.engine.limits import UNLIMITED
 from hybridsim.engine.loop import ModeLoop
 from hybridsim.engine.plan import plan_of
-from hybridsim.engine.stepping import Leaps, Method, StepFailure
+from hybridsim.engine.stepping import Counters, Leaps, Method, StepFailure
 from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 
 if TYPE_CHECKING:
     from hybridsim.engine.crossings import Crossings
     from hybridsim.engine.leapt import Leapt
+    from hybridsim.engine.pieces import Occurrence
 
 
 class AtOnce(Trajectory):
-    """The record of a finished run; all but the times of its events is made when somebody asks for it.
+    """The record of a finished run; all but the times of its events and its cost is made when somebody asks for it.
 
     Parameters
     ----------
     crossings : makes the occurrences; None where they are not kept.
+    count : makes the counters.
     make : makes the whole record.
     """
 
     def __init__(
-        self, crossings: Callable[[], Crossings | None] | None, make: Callable[[], Trajectory]
+        self,
+        crossings: Callable[[], Crossings | None] | None,
+        count: Callable[[], Counters],
+        make: Callable[[], Trajectory],
     ) -> None:
         self.status, self.message = "finished", ""
-        self._crossings, self._make = crossings, make
+        self._crossings, self._count, self._make = crossings, count, make
 
     def then(self, last: Callable[[Trajectory], None]) -> None:
         """What is to be done with the whole record, once it is made."""
@@ -58,8 +63,11 @@ class AtOnce(Trajectory):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        if name == "occurrences" and self._crossings is not None:
-            happened, found = self._crossings(), Chain(OccurrenceList)
+        if name == "counters":
+            self.counters = self._count()
+        elif name == "occurrences" and self._crossings is not None:
+            happened = self._crossings()
+            found: Chain[Occurrence] = Chain(OccurrenceList)
             if happened is not None:
                 found.add(happened)
             self.occurrences = found  # once it is whole: another thread may ask as well
@@ -123,4 +131,9 @@ def carried_out(
         again.leapt = leapt
         return ModeLoop(system, method, task, None, again).run()
 
-    return AtOnce(None if keep.events is None else lambda: leapt.crossings, made)
+    def counted() -> Counters:
+        counters = Counters()
+        leaper.count(leapt, counters)
+        return counters
+
+    return AtOnce(None if keep.events is None else lambda: leapt.crossings, counted, made)

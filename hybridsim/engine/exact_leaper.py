@@ -16,7 +16,7 @@ from hybridsim.engine.linear_tables import LinearTables, tables_of
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import Sheet
-from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Tolerances
+from hybridsim.engine.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Counters, Landing, Tolerances
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
@@ -119,12 +119,16 @@ class ExactLeaper:
         if leapt is None:
             return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         tables, self.horizon, self.hints = leapt.beside
-        record.counters.kernel_time += leapt.seconds
+        self.count(leapt, record.counters)
         if leapt.count:
             self._commit(tables, leapt, record)
         goes_on = leapt.is_full or leapt.has_news
         end = ARRIVED if leapt.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
         return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
+
+    def count(self, leapt: Leapt, counters: Counters) -> None:
+        """Add what a call has cost."""
+        leapt.count_in(counters)
 
     def forget_segments(self, leapt: Leapt) -> None:
         """Let go of all segments but the end of the last one."""
@@ -155,7 +159,7 @@ class ExactLeaper:
 
     def _commit(self, tables: LinearTables, leapt: Leapt, record: Trajectory) -> None:
         """Leave the segments to the trajectory, and the events."""
-        counters, begun, crossings = record.counters, slice(0, leapt.count), leapt.crossings
+        begun, crossings = slice(0, leapt.count), leapt.crossings
         if record.segments.is_end_alone:
             record.segments.keep_only(leapt.last_end)
         else:
@@ -173,8 +177,5 @@ class ExactLeaper:
                     jumps[begun],
                 )
             )
-        counters.steps += leapt.count
-        counters.restarts += leapt.count
         if crossings is not None:
-            counters.events += len(crossings)
             record.occurrences.add(crossings)

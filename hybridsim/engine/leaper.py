@@ -237,9 +237,8 @@ class Leaper(ABC):
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
         while True:
-            self.memory, _, cost = leapt.beside
-            record.counters.kernel_time += leapt.seconds
-            self._count(record.counters, leapt.steps, cost)
+            self.memory = leapt.beside[0]
+            self.count(leapt, record.counters)
             is_too_long = leapt.is_full and leapt.count == 0 and self.used == (0, 0)  # a single segment
             if is_too_long and self.steps * _GROWTH * self.system.n * self.columns <= _LONGEST:
                 self.steps, is_too_long = self.steps * _GROWTH, False
@@ -262,6 +261,11 @@ class Leaper(ABC):
             Instant(*leapt.clock), leapt.after, end, all_instants, np.concatenate([_NONE, *owners])
         )
 
+    def count(self, leapt: Leapt, counters: Counters) -> None:
+        """Add what a call has cost."""
+        leapt.count_in(counters)
+        self._count(counters, leapt.steps, leapt.beside[2])
+
     def forget_segments(self, leapt: Leapt) -> None:
         """Let go of all segments but the end of the last one, unless their steps are looked at."""
         if not self.is_looked_at:
@@ -279,7 +283,7 @@ class Leaper(ABC):
         """Leave what one call has written to the trajectory: its segments and events."""
         first_step, first = leapt.beside[1], leapt.first
         last_step, last = self.used = (first_step + leapt.steps, first + leapt.count + 1)
-        begun, counters, crossings = slice(first, last - 1), record.counters, leapt.crossings
+        begun, crossings = slice(first, last - 1), leapt.crossings
         if record.segments.is_end_alone and not self.is_looked_at:
             record.segments.keep_only(leapt.last_end)
         else:
@@ -296,10 +300,7 @@ class Leaper(ABC):
                     jumps[begun],
                 )
             )
-        counters.steps += leapt.steps
-        counters.restarts += leapt.count
         if crossings is not None:
-            counters.events += len(crossings)
             record.occurrences.add(crossings)
 
 

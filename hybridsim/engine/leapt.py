@@ -16,6 +16,7 @@ from hybridsim.engine.timepair import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.outcome import Outcome
+    from hybridsim.engine.stepping import Counters
     from hybridsim.engine.system import System
 
 
@@ -93,6 +94,13 @@ class Leapt:
         return Crossings(
             self.system, instants, rows.fires[ended], rows.modes[ended], rows.modes[after], sides
         )
+
+    def count_in(self, counters: Counters) -> None:
+        """Add what every call costs."""
+        counters.kernel_time += self.seconds
+        counters.steps += self.steps
+        counters.restarts += self.count
+        counters.events += len(self.crossings or ())
 
     @property
     def last_end(self) -> Segment:

@@ -228,6 +228,9 @@ class Leaps(Protocol):
     def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt | None:
         """Call the kernel, and leave it at that; None where it cannot be called."""
 
+    def count(self, leapt: Leapt, counters: Counters) -> None:
+        """Add what a call has cost."""
+
     def forget_segments(self, leapt: Leapt) -> None:
         """Let go of the memory that is for segments, as far as it is not needed where the end alone is kept."""
 

@@ -76,6 +76,8 @@ def test_times_of_events_alone_make_no_record(engine: str) -> None:
     sol = hs.simulate(model, (0, 60), integrator=engine)
     for name in ("f1", "f2"):
         assert sol.event_times(name).tolist() == [e.t for e in whole.events if e.component == name] != []
+    cost = {name: value for name, value in sol.stats.items() if "time" not in name}
+    assert cost == {name: whole.stats[name] for name in cost}
     assert is_at_once(sol)
     assert len(sol.events) == len(whole.events)
     assert np.array_equal(sol(30.0), whole(30.0))
