@@ -88,10 +88,8 @@ def may_end(
     """
     longest, known, ended, i = 0.0, gaps.shape[0], False, 0
     high, low = at[0], at[1]
-    work[0, :], work[1, :] = (
-        math.inf,
-        0.0,
-    )  # the last intervals; falls in a row, for turns of 1, 2, ... events
+    # the last intervals; falls in a row, for turns of 1, 2, ... events
+    work[0, :], work[1, :] = math.inf, 0.0
     for e in range(-known, instants.shape[0]):
         if e < 0:
             gap = gaps[e + known]

@@ -35,14 +35,14 @@ class AtOnce(Trajectory):
 
     Parameters
     ----------
-    crossings : makes the occurrences; None where they are not kept.
+    crossings : makes the occurrences.
     count : makes the counters.
     make : makes the whole record.
     """
 
     def __init__(
         self,
-        crossings: Callable[[], Crossings | None] | None,
+        crossings: Callable[[], Crossings | None],
         count: Callable[[], Counters],
         make: Callable[[], Trajectory],
     ) -> None:
@@ -65,7 +65,7 @@ class AtOnce(Trajectory):
             raise AttributeError(name)
         if name == "counters":
             self.counters = self._count()
-        elif name == "occurrences" and self._crossings is not None:
+        elif name == "occurrences":
             happened = self._crossings()
             found: Chain[Occurrence] = Chain(OccurrenceList)
             if happened is not None:
@@ -112,7 +112,9 @@ def carried_out(
     plan, keep = plan_of(system, method, task), task.keep
     start = plan.silent_start
     is_plain = progress is None and task.record is None and task.limits is UNLIMITED
-    if start is None or not is_plain or not {keep.segments, keep.events} <= {None, math.inf}:
+    # where little is kept the record is small, and what the loop wrote is not
+    is_kept = keep.events == math.inf and keep.segments in (None, math.inf)
+    if start is None or not is_plain or not is_kept:
         return ModeLoop(system, method, task, progress).run()
     leaper = plan.leaper()
     assert leaper is not None
@@ -120,20 +122,21 @@ def carried_out(
         leapt = leaper.leapt = leaper.go(plan.origin, *start, plan.end)
     except (KeyboardInterrupt, StepFailure) as error:
         return ModeLoop(system, method, task, None, cast("Leaps", _BrokenOff(leaper.place, error))).run()
-    if leapt is None or not _is_over(system, leapt):
+    if leapt is None or not _is_over(system, leapt) or not (keep.segments or leaper.forget_segments(leapt)):
         return ModeLoop(system, method, task, None, leaper).run()
-    if keep.segments is None:
-        leaper.forget_segments(leapt)
 
     def made() -> Trajectory:
         again = plan.leaper()
         assert again is not None
         again.leapt = leapt
-        return ModeLoop(system, method, task, None, again).run()
+        record = ModeLoop(system, method, task, None, again).run()
+        if record.status == "interrupted":  # the run is over all the same: it is whoever asks that stops
+            raise KeyboardInterrupt
+        return record
 
     def counted() -> Counters:
         counters = Counters()
         leaper.count(leapt, counters)
         return counters
 
-    return AtOnce(None if keep.events is None else lambda: leapt.crossings, counted, made)
+    return AtOnce(lambda: leapt.crossings, counted, made)

@@ -130,9 +130,10 @@ class ExactLeaper:
         """Add what a call has cost."""
         leapt.count_in(counters)
 
-    def forget_segments(self, leapt: Leapt) -> None:
+    def forget_segments(self, leapt: Leapt) -> bool:
         """Let go of all segments but the end of the last one."""
         leapt.forget_segments(_OF_SEGMENTS)
+        return True
 
     def _sheet(self, tables: LinearTables) -> Sheet:
         """What the kernel writes to; the trajectory keeps it, events longer than segments."""

@@ -266,11 +266,13 @@ class Leaper(ABC):
         leapt.count_in(counters)
         self._count(counters, leapt.steps, leapt.beside[2])
 
-    def forget_segments(self, leapt: Leapt) -> None:
+    def forget_segments(self, leapt: Leapt) -> bool:
         """Let go of all segments but the end of the last one, unless their steps are looked at."""
-        if not self.is_looked_at:
-            leapt.forget_segments(_OF_SEGMENTS)
-            leapt.beside = (None, *leapt.beside[1:])
+        if self.is_looked_at:
+            return False
+        leapt.forget_segments(_OF_SEGMENTS)
+        leapt.beside, self.memory = (None, *leapt.beside[1:]), None
+        return True
 
     def _rows(self) -> Any:
         """The rows that the next call writes to."""

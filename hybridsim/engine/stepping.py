@@ -231,8 +231,11 @@ class Leaps(Protocol):
     def count(self, leapt: Leapt, counters: Counters) -> None:
         """Add what a call has cost."""
 
-    def forget_segments(self, leapt: Leapt) -> None:
-        """Let go of the memory that is for segments, as far as it is not needed where the end alone is kept."""
+    def forget_segments(self, leapt: Leapt) -> bool:
+        """Let go of the memory that is for segments but for the end of the last one, unless it is needed: then False.
+
+        No leap follows.
+        """
 
 
 class Method(Protocol):
