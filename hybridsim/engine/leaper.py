@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import functions_of, work_space
@@ -81,6 +82,7 @@ def compile_leaps(system: System, make: Maker) -> None:
     # such as a rate without a value; it is for the run to tell, and compiles by itself
     with suppress(StepFailure):
         leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
+        leads_nowhere(np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MOST)))
         _compiled.append(make)
 
 
