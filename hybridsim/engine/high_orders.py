@@ -28,6 +28,9 @@ from hybridsim.engine.tape import ADD, DIV, NEG, SQRT, SUB
 # Operations at orders k > 0 alone, each with flags: out_k = a_k f, and a_{k+1} of a state out, a_k f / (k + 1), where
 # f is the product of the constants b and c, or of their reciprocals, and a sign.
 FACTOR, INTEGRATE = 64, 96
+# And out_k of a constant over b, where b_k = a_k c or a_k / c or a_k, and a sign: -(sum_{0<i<k} out_i b_{k-i} + out_0 b_k)
+# / b_0, in which a_k waits for one product and one difference.
+RECIPROCAL = 128
 HAS_B, OVER_B, HAS_C, OVER_C, NEGATIVE = 1, 2, 4, 8, 16
 
 Row = tuple[int, ...]
@@ -75,6 +78,7 @@ class _Rewriting:
     ) -> None:
         self.watched = watched
         self._of = {row[4]: row for row in rows}
+        self._states = set(states)
         self._kept = set(needed_rows(list(rows), watched))
         self._readers = Counter([*(a for row in rows for a in arguments_of(row)), *rates])
         self._forms: dict[int, _Scaled] = {}
@@ -118,8 +122,20 @@ class _Rewriting:
             self.rows.append(row if row in self._kept else form.row(FACTOR, out))
         elif out in self._sums:
             self._sum(out, *self._sums[out])
+        elif op == DIV and row not in self._kept and a not in self._of and a not in self._states:
+            self.rows.append(self._reciprocal(b, out))
         elif out not in self._lent:
             self.rows.append(row)
+
+    def _reciprocal(self, b: int, out: int) -> Row:
+        """What does not change over a register."""
+        form = self.scaled(b)
+        if len(form.constants) > 1:
+            form = _Scaled(b)
+        flags, register = NEGATIVE if form.is_negative else 0, 0
+        for constant, divides in form.constants:
+            flags, register = flags | HAS_C | (OVER_C if divides else 0), constant
+        return (RECIPROCAL + flags, form.base, b, register, out)
 
     def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
         """A sum that takes last what comes last; the sums it is made of lend their registers."""

@@ -51,8 +51,9 @@ class Leapt:
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        last = self.first + self.count  # where a segment ends is written where the next one would begin
-        self.rows.clocks[last], self.rows.modes[last] = self.clock, self.z
+        if self.count:  # else there may be no row left
+            last = self.first + self.count  # where a segment ends is written where the next one would begin
+            self.rows.clocks[last], self.rows.modes[last] = self.clock, self.z
 
     @property
     def is_at_target(self) -> bool:

@@ -19,7 +19,16 @@ import struct
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from hybridsim.engine.high_orders import FACTOR, HAS_B, HAS_C, INTEGRATE, NEGATIVE, OVER_B, OVER_C
+from hybridsim.engine.high_orders import (
+    FACTOR,
+    HAS_B,
+    HAS_C,
+    INTEGRATE,
+    NEGATIVE,
+    OVER_B,
+    OVER_C,
+    RECIPROCAL,
+)
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -123,6 +132,20 @@ class Lines:
         place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
         self.put(f"  store double {value}, ptr {place}")
 
+    def powers(self, a: str, order: int) -> list[str]:
+        """a**k for k = 0..order, as `tabulate` of `hybridsim.engine.taylor` makes them."""
+        found = [ONE, a]
+        for k in range(2, order + 1):
+            found.append(self.op("fmul", found[k // 2], found[k - k // 2]))
+        return found
+
+    def in_two_lines(self, terms: list[str]) -> str:
+        """The sum of two terms or more: every other one, and the rest, beside each other."""
+        sums = terms[:2]
+        for k, term in enumerate(terms[2:]):
+            sums[k % 2] = self.op("fadd", sums[k % 2], term)
+        return self.op("fadd", *sums)
+
     def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
         """One of two values, by a comparison of a and b."""
         is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
@@ -219,16 +242,25 @@ class _Expansion(Lines):
         last = self.op("fmul", self.at(a, k), self.at(b, 0))
         return self.op("fadd", self.op("fmul", self._inner(a, b, k, True), part), last)
 
-    def _scaled(self, a: str, flags: int, b: int, c: int, part: str) -> str:
-        """A coefficient times a factor; see `hybridsim.engine.high_orders`."""
+    def _factor(self, flags: int, b: int, c: int) -> str:
+        """What flags make of two constants; see `hybridsim.engine.high_orders`."""
         f = ONE
         for has, over, r in ((HAS_B, OVER_B, b), (HAS_C, OVER_C, c)):
             if flags & has:
                 g = self.op("fdiv", ONE, self.at(r, 0)) if flags & over else self.at(r, 0)
                 f = g if f == ONE else self.op("fmul", f, g)
-        if flags & NEGATIVE:
-            f = self.negative(f)
+        return self.negative(f) if flags & NEGATIVE else f
+
+    def _scaled(self, a: str, flags: int, b: int, c: int, part: str) -> str:
+        """A coefficient times a factor."""
+        f = self._factor(flags, b, c)
         return self.op("fmul", a, part if f == ONE else f if part == ONE else self.op("fmul", f, part))
+
+    def _reciprocal(self, a: str, flags: int, b: int, c: int, out: int, k: int) -> str:
+        """Coefficient k of a constant over b."""
+        part = self.op("fdiv", ONE, self.at(b, 0))
+        factor = self.op("fmul", self.op("fmul", self.at(out, 0), part), self._factor(flags ^ NEGATIVE, 0, c))
+        return self.op("fsub", self.op("fmul", a, factor), self.op("fmul", self._inner(out, b, k), part))
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
         """Coefficient k of an operation, and of its companion."""
@@ -251,6 +283,8 @@ class _Expansion(Lines):
             return (self.op("fsub", self.at(b, 0), u) if k == 0 else self.negative(u),)
         if op == SCALE:
             return (self.op("fmul", u, self.at(b, 0)),)
+        if op >= RECIPROCAL:
+            return (self._reciprocal(u, op - RECIPROCAL, b, c, out, k),)
         if op >= FACTOR:
             part, kind = (number(1.0 / (k + 1)), INTEGRATE) if op >= INTEGRATE else (ONE, FACTOR)
             return (self._scaled(u, op - kind, b, c, part),)
@@ -348,30 +382,22 @@ class _Ahead(_Expansion):
         Lines.__init__(self, "u")
         self.tape, self.order, self.stride, self.is_known = tape, 0, order + 1, False
         n, count, size = len(tape.states), len(tape.guards), order + 1
-        powers, square = [ONE, "%e"], self.op("fmul", "%e", "%e")
-        for k in range(2, size):
-            powers.append(square if k == 2 else self.op("fmul", powers[k - 2], square))
+        powers = self.powers("%e", order)
         x, slopes, changes = [], [], []
         for i in range(n):
             c = [self.load("%x", i * size + k) for k in range(size)]
-            change = self.op("fmul", c[order], powers[order])
-            for k in range(order - 1, 0, -1):
-                change = self.op("fadd", change, self.op("fmul", c[k], powers[k]))
-            x.append(self.op("fadd", c[0], change))
-            slope, change = c[1], self.call("llvm.fabs.f64", c[1])
-            for k in range(2, size):
-                term = self.op("fmul", c[k], powers[k - 1])
-                slope = self.op("fadd", slope, self.op("fmul", number(k), term))
-                change = self.op("fadd", change, self.call("llvm.fabs.f64", term))
-            slopes.append(slope)
-            changes.append(change)
+            terms = [self.op("fmul", c[k], powers[k]) for k in range(order, 0, -1)]
+            x.append(self.op("fadd", c[0], self.in_two_lines(terms)))
+            terms = [c[1], *(self.op("fmul", c[k], powers[k - 1]) for k in range(2, size))]
+            slopes.append(
+                self.in_two_lines([c[1], *(self.op("fmul", number(k), terms[k - 1]) for k in range(2, size))])
+            )
+            changes.append(self.in_two_lines([self.call("llvm.fabs.f64", term) for term in terms]))
         self.expand(self.op("fadd", "%s", "%e"), x)
         sums = []
         for j in range(count):
-            total = self.load("%g", j * size)
-            for k in range(1, size):
-                total = self.op("fadd", total, self.op("fmul", self.load("%g", j * size + k), powers[k]))
-            sums.append(total)
+            terms = [self.op("fmul", self.load("%g", j * size + k), powers[k]) for k in range(1, size)]
+            sums.append(self.in_two_lines([self.load("%g", j * size), *terms]))
         values = [self.at(r, 0) for r in tape.guards]
         rates = [self.at(r, 0) for r in tape.rates]
         for i, value in enumerate((*powers, *x, *rates, *slopes, *changes, *values, *sums)):
@@ -411,17 +437,15 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
 def sizes_function(name: str, guards: int, order: int) -> str:
     """The function of h that writes its powers, and for each guard sum_k |c_k| h**k: even and odd terms apart."""
     code, size = Lines(), order + 1
-    powers, square = [ONE, "%s"], code.op("fmul", "%s", "%s")
-    for k in range(2, size):
-        powers.append(square if k == 2 else code.op("fmul", powers[k - 2], square))
+    powers = code.powers("%s", order)
     for k, power in enumerate(powers):
         code.store(power, "%out", k)
     for j in range(guards):
-        sums = ["", ""]
-        for k, power in enumerate(powers):
-            term = code.op("fmul", code.call("llvm.fabs.f64", code.load("%g", j * size + k)), power)
-            sums[k % 2] = code.op("fadd", sums[k % 2], term) if sums[k % 2] else term
-        code.store(code.op("fadd", *sums), "%out", size + j)
+        terms = [
+            code.op("fmul", code.call("llvm.fabs.f64", code.load("%g", j * size + k)), power)
+            for k, power in enumerate(powers)
+        ]
+        code.store(code.in_two_lines(terms), "%out", size + j)
     return function(name, code.lines)
 
 

@@ -31,11 +31,14 @@ def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any,
 
 @inlined
 def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
-    """Value of the series in a row of U, for the powers of a distance."""
-    total = U[r, 0]
-    for k in range(1, order + 1):
-        total += U[r, k] * powers[k]
-    return total
+    """Value of the series in a row of U, for the powers of a distance, order >= 1; even and odd terms side by side."""
+    even, odd = U[r, 0], U[r, 1] * powers[1]
+    for k in range(2, order, 2):
+        even += U[r, k] * powers[k]
+        odd += U[r, k + 1] * powers[k + 1]
+    if order % 2 == 0:
+        even += U[r, order] * powers[order]
+    return even + odd
 
 
 @inlined
@@ -91,16 +94,27 @@ def look_ahead(
     tabulate(d, order, ahead)
     x, rates, values, sums = parts_of(ahead, order, n, count)
     for i in range(n):
+        # each sum in two lines, which do not wait for each other; what is least comes first
         change = series[i, order] * ahead[order]
-        for k in range(order - 1, 0, -1):
+        other = series[i, order - 1] * ahead[order - 1]
+        for k in range(order - 2, 0, -2):
             change += series[i, k] * ahead[k]
-        x[i] = series[i, 0] + change
-        slope, change = series[i, 1], abs(series[i, 1])
-        for k in range(2, order + 1):
+            if k > 1:
+                other += series[i, k - 1] * ahead[k - 1]
+        x[i] = series[i, 0] + (change + other)
+        term = series[i, 2] * ahead[1]
+        slope, other_slope = series[i, 1], 2.0 * term
+        change, other = abs(series[i, 1]), abs(term)
+        for k in range(3, order + 1, 2):
             term = series[i, k] * ahead[k - 1]
             slope += k * term
             change += abs(term)
-        ahead[order + 1 + 2 * n + i], ahead[order + 1 + 3 * n + i] = slope, change
+            if k < order:
+                term = series[i, k + 1] * ahead[k]
+                other_slope += (k + 1) * term
+                other += abs(term)
+        ahead[order + 1 + 2 * n + i] = slope + other_slope
+        ahead[order + 1 + 3 * n + i] = change + other
     for j in range(count):
         sums[j] = sum_at(U, j, order, ahead)
     call_apart(_interpreted_values, (rows, places, s + d, x, watched, W, values, rates))

@@ -23,6 +23,7 @@ from hybridsim.engine.high_orders import (
     NEGATIVE,
     OVER_B,
     OVER_C,
+    RECIPROCAL,
 )
 from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.lean_tape import (
@@ -254,6 +255,10 @@ def advance(rows: Any, V: Any, k: int) -> None:
             else:
                 rest = 0.5 * (V[a, k] - call_apart(_inner, (V, out, out, k)))
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
+        elif op >= RECIPROCAL:
+            part = 1.0 / V[b, 0]
+            newest = V[a, k] * (V[out, 0] * part * _factor((op - RECIPROCAL) ^ NEGATIVE, V, 0, c))
+            V[out, k] = newest - call_apart(_inner, (V, out, b, k)) * part
         elif op >= INTEGRATE:
             if k + 1 < V.shape[1]:
                 V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
@@ -292,13 +297,10 @@ def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: A
 
 @inlined
 def tabulate(h: float, order: int, powers: Any) -> None:
-    """powers[k] = h**k for k = 0..order; even and odd ones side by side, so that they need not wait for each other."""
-    even, odd, square = 1.0, h, h * h
-    for k in range(0, order, 2):
-        powers[k], powers[k + 1] = even, odd
-        even, odd = even * square, odd * square
-    if order % 2 == 0:
-        powers[order] = even
+    """powers[k] = h**k for k = 0..order, order >= 1; each of its halves, so that the last waits for few."""
+    powers[0], powers[1] = 1.0, h
+    for k in range(2, order + 1):
+        powers[k] = powers[k // 2] * powers[k - k // 2]
 
 
 @inlined
@@ -335,18 +337,18 @@ def _root(x: float, n: int) -> float:
 
 
 @inlined
-def rough_root(x: float, n: int) -> float:
-    """x**(1/n) for x >= 0, to three digits: cheaper than a power.
+def rough_inverse_root(x: float, n: int) -> float:
+    """x**(-1/n) for x >= 0, to three digits: cheaper than a power.
 
     Exponent and mantissa are taken apart in the bits of a double; between powers of two the logarithm and the
     exponential are cubics, good to 8e-4 / n and 1e-4.
     """
     if not _LEAST <= x < math.inf:
-        return _root(x, n)
+        return math.inf if x == 0.0 else 1.0 / _root(x, n)
     bits = np.float64(x).view(np.int64)
     f = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) - 1.0
     log = ((0.152700285 * f - 0.568704053) * f + 1.41565319) * f + 8.25462823e-4
-    log = (((bits >> 52) - 1023) + log) / n
+    log = (((bits >> 52) - 1023) + log) * (-1.0 / n)
     whole = math.floor(log)
     f = log - whole
     power = ((0.07896726 * f + 0.22469316) * f + 0.69632477) * f + 0.99990029
@@ -376,7 +378,7 @@ def reach(
     each state are below atol + rtol |x|; those of each function below rtol of its largest term, times the slack. NaN
     where a coefficient is no number.
     """
-    h, first, last = longest, math.inf, math.inf
+    h, first, last = longest, 0.0, 0.0  # the last two terms over the tolerance, without the powers of h
     for i in range(states.shape[0]):
         r = states[i]
         one, two = abs(V[r, order - 1]), abs(V[r, order])
@@ -385,11 +387,8 @@ def reach(
         scale = atol[i] + rtol * abs(V[r, 0])
         if scale == 0.0:
             scale = rtol * max(abs(V[r, 1]) * h, 1e-300)
-        if one > 0.0 and one * first > scale:
-            first = scale / one
-        if two > 0.0 and two * last > scale:
-            last = scale / two
-    h = min(h, rough_root(first, order - 1), rough_root(last, order))
+        first, last = max(first, one / scale), max(last, two / scale)
+    h = min(h, rough_inverse_root(first, order - 1), rough_inverse_root(last, order))
     measure(code, U, watched, order, h, powers, totals)
     for j in range(watched.shape[0]):
         r = watched[j]
@@ -400,8 +399,13 @@ def reach(
             largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
             if term <= slack * rtol * largest or term == 0.0:
                 break
-            for k in range(2, order - 1):
+            other = 0.0
+            for k in range(2, order - 2, 2):
                 largest = max(largest, abs(U[r, k]) * powers[k])
+                other = max(other, abs(U[r, k + 1]) * powers[k + 1])
+            if order % 2 == 0:
+                largest = max(largest, abs(U[r, order - 2]) * powers[order - 2])
+            largest = max(largest, other)
             if term <= slack * rtol * largest:
                 break
             h *= max(_SHORTER, 0.9 * _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER

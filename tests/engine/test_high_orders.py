@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.high_orders import FACTOR, HAS_B, HAS_C, INTEGRATE, NEGATIVE, OVER_B, high_rows
+from hybridsim.engine.high_orders import (
+    FACTOR,
+    HAS_B,
+    HAS_C,
+    INTEGRATE,
+    NEGATIVE,
+    OVER_B,
+    OVER_C,
+    RECIPROCAL,
+    high_rows,
+)
 from hybridsim.engine.lean_tape import ADD_CONSTANT, DIVIDE_BY, SCALE
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Tolerances
 from hybridsim.engine.system import System
-from hybridsim.engine.tape import ADD, EXP, MUL, NEG, SUB
+from hybridsim.engine.tape import ADD, DIV, EXP, MUL, NEG, SUB
 from hybridsim.engine.taylor import expand
 from hybridsim.engine.timepair import Instant
 
@@ -51,6 +61,25 @@ def test_constants_and_signs_are_one_factor() -> None:
         (EXP, 12, 0, 0, 13),
         (INTEGRATE, V, 0, 0, X),
         (INTEGRATE + HAS_B + HAS_C, 13, B, C, V),
+    ]
+
+
+def test_a_constant_over_what_changes_is_worked_out_from_what_that_is_a_multiple_of() -> None:
+    rows = [
+        (NEG, V, 0, 0, 10),
+        (DIVIDE_BY, 10, B, 0, 11),
+        (ADD_CONSTANT, 11, C, 0, 12),
+        (DIV, C, 12, 0, 13),
+        (DIV, X, 12, 0, 14),
+        (ADD, 13, 14, 0, 15),
+    ]
+    assert high_rows(rows, [X, V], [V, 15], []) == [
+        (FACTOR + NEGATIVE + HAS_B + OVER_B, V, B, 0, 12),
+        (RECIPROCAL + NEGATIVE + HAS_C + OVER_C, V, 12, B, 13),
+        (DIV, X, 12, 0, 14),
+        (ADD, 13, 14, 0, 15),
+        (INTEGRATE, V, 0, 0, X),
+        (INTEGRATE, 15, 0, 0, V),
     ]
 
 

@@ -38,6 +38,7 @@ SCENES = ("dfcs", "dfcs-stribeck", "belt", "square-wave", "bouncing-ball", "stat
 RATES = {
     "exp": "exp(-x*x)",
     "quotient": "x/(1 + x*x) - 2/(3 + sin(t))",
+    "reciprocals": "1/(2 - x/a) + a/(3 + x/2) - 1/(2 + x*x) + 1/(2 + t)",
     "root": "sqrt(2 + x) + sqrt(t + 1)",
     "sines": "sin(x)*cos(3*t)",
     "tan": "tan(x/2) + 0.1*tanh(3*x)",
