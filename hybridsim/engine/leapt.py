@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,9 +50,13 @@ class Leapt:
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        if self.count:  # else there may be no row left
-            last = self.first + self.count  # where a segment ends is written where the next one would begin
-            self.rows.clocks[last], self.rows.modes[last] = self.clock, self.z
+        rows, first, count = self.rows, self.first, self.count
+        self.events = 0  # how many of the segments an event ended: all but the last one in any case
+        if count:  # else there may be no row left
+            last = first + count  # where a segment ends is written where the next one would begin
+            rows.clocks[last], rows.modes[last] = self.clock, self.z
+            self.events = count if rows.fires[last - 1] >= 0 else count - 1
+        self._crossings: Crossings | None = None
 
     @property
     def is_at_target(self) -> bool:
@@ -65,13 +68,7 @@ class Leapt:
         """Whether it ended for want of room."""
         return self.code == FULL
 
-    @cached_property
-    def events(self) -> int:
-        """How many of the segments an event ended: all but the last one in any case."""
-        last = self.first + self.count - 1
-        return self.count if self.count and self.rows.fires[last] >= 0 else max(self.count - 1, 0)
-
-    @cached_property
+    @property
     def instants(self) -> np.ndarray:
         """Instants of the events (E, 2)."""
         return self.rows.clocks[self.first + 1 : self.first + 1 + self.events]
@@ -81,20 +78,21 @@ class Leapt:
         """Components whose guards these events are (E,)."""
         return self.system.owner[self.rows.fires[self._ended]]
 
-    @cached_property
+    @property
     def crossings(self) -> Crossings | None:
         """The events; None if there are none."""
-        if not self.events:
-            return None
-        rows, after = self.rows, slice(self.first + 1, self.first + 1 + self.events)
-        sides = rows.jumps[self._ended][
-            :, -2:
-        ]  # of the states at its end; more begins with that at its start
-        instants = self.instants
-        ended = self._ended
-        return Crossings(
-            self.system, instants, rows.fires[ended], rows.modes[ended], rows.modes[after], sides
-        )
+        if self._crossings is None and self.events:
+            rows, ended = self.rows, self._ended
+            after = slice(ended.start + 1, ended.stop + 1)
+            self._crossings = Crossings(
+                self.system,
+                rows.clocks[after],
+                rows.fires[ended],
+                rows.modes[ended],
+                rows.modes[after],
+                rows.jumps[ended, -2:],  # the states at its end; more begins with that at its start
+            )
+        return self._crossings
 
     def count_in(self, counters: Counters) -> None:
         """Add what every call costs."""
