@@ -122,3 +122,19 @@ def test_a_square_wave_switches_at_multiples_of_its_period() -> None:
         errors[first] = max(abs(a - b) / abs(b) for a, b in zip(found, truth, strict=True))
     assert errors[0] < 1e-10
     assert errors[10**4] < 1e-10
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5"])
+def test_more_ticks_of_a_clock_than_a_call_has_room_for_segments(integrator: str) -> None:
+    """m v' = t - f sticks until t = mu N; the one release shifts the rows by one, so that they end within a tick."""
+    model = hs.Model(
+        "tick",
+        [hs.State("x", 0, "v"), hs.State("v", 0, "t - f")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 0.0015})],
+        schedules=[hs.Schedule("clock", period=0.001)],
+    )
+    for _ in range(2):
+        sol = hs.simulate(model, (0, 2), integrator=integrator)
+        assert sol.success and len(sol.event_times("clock")) == 2001
+        assert sol.event_times("f") == pytest.approx([0.0015], abs=1e-15)
+        assert sol(2.0) == pytest.approx([(2 - 0.0015) ** 3 / 6, (2 - 0.0015) ** 2 / 2], rel=1e-12)
