@@ -11,6 +11,10 @@ from collections.abc import Callable, Sequence
 ENOUGH = 2.0
 # A run that is shorter than this has several calls in each of its turns, as many as fill the time but at most five.
 _TURN, _MOST_CALLS = 0.05, 5
+_LONG = 0.5  # a run whose first call took longer is not called once more before it is timed
+_MOST_BEFORE = (
+    30  # calls of a short run that are not timed: what it takes again and again is compiled in one of them
+)
 
 
 def timed_in_turns(
@@ -22,8 +26,9 @@ def timed_in_turns(
 ) -> list[tuple[float, ...]]:
     """Seconds of each call of each run, round by round: a call in each of `repeat` rounds, fewer of long runs.
 
-    The runs have been warmed up before. The collection of garbage is left out, as `timeit` does: it strikes whom
-    it happens to strike. What is alive at the start is left alone, so that the collections in between cost little.
+    The runs have been called once before; short ones are called for a while more before the first round. The collection
+    of garbage is left out, as `timeit` does: it strikes whom it happens to strike. What is alive at the start is left
+    alone, so that the collections in between cost little.
 
     Parameters
     ----------
@@ -38,6 +43,8 @@ def timed_in_turns(
     gc.collect()
     gc.freeze()
     try:
+        if expected is not None:
+            likely = [_warmed_up(run, seconds, until) for run, seconds in zip(runs, expected, strict=True)]
         for _ in range(repeat):
             turn = set(_fitting([max(seconds, _TURN) for seconds in likely], until - time.monotonic()))
             for i, run in enumerate(runs):
@@ -58,6 +65,19 @@ def timed_in_turns(
         if collecting:
             gc.enable()
     return [tuple(spent) for spent in times]
+
+
+def _warmed_up(run: Callable[[], object], expected: float, until: float) -> float:
+    """Seconds that a call is likely to take, once what is done only in the first ones is over."""
+    calls, spent, likely = 0, 0.0, expected
+    while likely < (_TURN if calls else _LONG) and spent < _TURN and calls < _MOST_BEFORE:
+        if time.monotonic() + likely > until:
+            break
+        start = time.perf_counter()
+        run()
+        took = time.perf_counter() - start
+        calls, spent, likely = calls + 1, spent + took, min(likely, took)
+    return likely
 
 
 def _fitting(expected: Sequence[float], seconds: float) -> list[int]:

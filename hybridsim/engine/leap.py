@@ -17,6 +17,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
+from hybridsim.engine.stepping import IN_A_ROW, STANDSTILL
 from hybridsim.engine.steps_ahead import (
     BETWEEN,
     flow_holds,
@@ -234,7 +235,7 @@ def leap(
         put(floors, floor_now)
         put(x, y)
         constants = V if code != 0 else W
-        s, fired, lands, holds = 0.0, -1, landing(automata, z), holding(automata, z)
+        s, fired, short, lands, holds = 0.0, -1, 0, landing(automata, z), holding(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
         while fired < 0 and s < bound:
@@ -252,7 +253,8 @@ def leap(
                 sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
                 min(left, max_step), powers, totals,
             )  # fmt: skip
-            if not h > _SMALLEST * 2.0**-52 * s:
+            short = short + 1 if h < STANDSTILL * s else 0
+            if not h > _SMALLEST * 2.0**-52 * s or short >= IN_A_ROW:
                 return STOPPED, first_step, n_segments
             outcome, g, d = earliest_exit(
                 tapes,

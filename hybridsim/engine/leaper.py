@@ -14,6 +14,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import SegmentBlock
+from hybridsim.engine.code_shelf import CodeShelf
 from hybridsim.engine.desk import Desk
 from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.jit import Door
@@ -98,6 +99,8 @@ class Leaper(ABC):
     is_looked_at: ClassVar[bool] = (
         False  # whether steps are looked at after a leap, even if they are not kept
     )
+    codes: CodeShelf  # machine code of the modes
+    taken: tuple[Any, Any]  # the tapes of the last call, and their codes
 
     def __init__(self, system: System, columns: int, kind: str) -> None:
         self.system, self.columns, layout = system, columns, system.layout
@@ -209,6 +212,7 @@ class Leaper(ABC):
         code, steps, count = self._go(to, clock, desk.as_packed, desk.work, desk.room, rows)
         seconds = perf_counter() - began
         self.shelf.look()
+        self.codes.look(*self.taken)
         cost = self._cost(desk.room)
         z, after = desk.leave()
         self.spare.append(desk)
@@ -361,7 +365,7 @@ class TaylorLeaper(Leaper):
             self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.places, self.control,
             to, clock, state, work, room, rows,
         )  # fmt: skip
-        self.codes.look(tapes, codes)
+        self.taken = tapes, codes
         return code, steps, count
 
     def _cost(self, room: Any) -> None:

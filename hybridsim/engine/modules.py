@@ -29,6 +29,8 @@ class Compiled:
     _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     _shared: dict[str, Any] = field(default_factory=dict)
 
+    is_current = True  # expressions read nothing from outside
+
     @property
     def data(self) -> dict[str, Any]:
         """Everything about the model that the functions do not say."""
@@ -75,6 +77,8 @@ def _code_of_functions(model: Model) -> PythonCode:
     # copies with other values have the same functions
     key = (model.structure(), model.flow, model.components, model.monitors, model.schedules, model.outputs)
     with _lock:
+        if key in _of_functions and not _of_functions[key].is_current:
+            del _of_functions[key]
         if key not in _of_functions:
             while len(_of_functions) >= _MOST:
                 del _of_functions[next(iter(_of_functions))]

@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridsim.engine import jit
 from hybridsim.engine.python_forms import Forms, Parts, Scalar, number, parts_of, rates, value
+from hybridsim.engine.python_surroundings import surroundings
 from hybridsim.errors import ModelError
 from hybridsim.expr import function_name
 
@@ -55,11 +56,24 @@ class PythonCode:
         self._things: dict[str, Any] = {}
         self._compiler: Any = None
         self.refused = ""  # numba's reason, where it cannot compile them
+        self._surroundings = surroundings(self._functions)
         if jit.ENABLED:
             from hybridsim.engine.python_compile import Compiler
 
             self._compiler = Compiler(parts)
             self.refused = self._compiler.refused
+
+    @property
+    def _functions(self) -> list[Callable[..., Any]]:
+        parts = self.parts
+        scalars = [scalar.function for scalar in (*parts.guards, *parts.monitors, *parts.outputs)]
+        return [f for f in (*(flow for _, flow in parts.flows), *scalars) if callable(f)]
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the globals that the functions read are as they were when they were compiled."""
+        is_live = self._compiler is None or bool(self.refused)
+        return is_live or surroundings(self._functions) == self._surroundings
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
         """As in `Compiled`."""

@@ -31,7 +31,7 @@ def system_of(model: Model) -> System:
         With all faults of the model.
     """
     system = known_system(model)
-    if system is not None:
+    if system is not None and system.code.is_current:
         return system
     system = System(model.validate())
     with _lock:

@@ -165,7 +165,7 @@ class RungeKuttaLeaper(Leaper):
             self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs, NOT_LINEAR, codes,
             self.places, self.method, self.control, to, clock, state, work, room, rows,
         )  # fmt: skip
-        self.codes.look(tapes, codes)
+        self.taken = tapes, codes
         return code, steps, count
 
     def _cost(self, room: Any) -> tuple[int, int]:

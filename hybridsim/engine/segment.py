@@ -15,6 +15,8 @@ from hybridsim.engine.locate import Findings, Hit, Locator, polish
 from hybridsim.engine.pieces import Pieces, Segment
 from hybridsim.engine.roots import POINTS, find_roots
 from hybridsim.engine.stepping import (
+    IN_A_ROW,
+    STANDSTILL,
     Counters,
     Creeping,
     Dense,
@@ -109,6 +111,7 @@ class SegmentRun:
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.undefined: set[int] = set()  # monitors that were not a number somewhere
         self.last_step: float | None = None
+        self.short, self.since = 0, 0.0  # steps in a row that hardly moved on, and where they began
         self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
@@ -131,6 +134,7 @@ class SegmentRun:
             if not np.isfinite(step.x1).all():
                 raise StepFailure(f"the state is not finite at local time {step.s1!r}")
             self.last_step = abs(step.s1 - step.s0)
+            self._refuse_standstill(step)
             whole, known = step.s1, self.scale
             self.scale = np.maximum(known, np.abs(step.x1))
             if step.roots is None:
@@ -151,6 +155,22 @@ class SegmentRun:
                 return arrival
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
+
+    def _refuse_standstill(self, step: Step) -> None:
+        """Stop a run that would not come to an end; what it did at a standstill is left out."""
+        length = abs(step.s1 - step.s0)
+        if length >= STANDSTILL * abs(step.s1):
+            self.short = 0
+            return
+        if self.short == 0:
+            self.since = step.s0
+        self.short += 1
+        if self.short == IN_A_ROW:
+            self._go_back(self.since)
+            raise StepFailure(
+                f"{IN_A_ROW} steps in a row, which are left out, were shorter than {STANDSTILL:g} of local time "
+                f"{step.s1!r}, the last {length:.3g}"
+            )
 
     def _go_back(self, s: float) -> None:
         """Forget what came after the end of a step."""

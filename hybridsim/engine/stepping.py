@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from hybridsim.engine.timepair import Instant
     from hybridsim.engine.trajectory import Trajectory
 
+# So many steps in a row, each shorter than this share of local time, stand still: near a singularity they get too short
+# to move the state, or go back and forth within the tolerance.
+STANDSTILL, IN_A_ROW = 2e-11, 10000
+
 Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
 
 

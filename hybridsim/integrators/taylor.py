@@ -145,7 +145,7 @@ def _dense(s0: float, coefficients: np.ndarray) -> Dense:
 class Taylor(Integrator):
     """Taylor series by recurrences over the operations of the model, order and step chosen by the tolerance.
 
-    The order is 1.4 (1 - ln(rtol)/2), of linear modes with 1.6; the step is the one at which the
+    The order is 1.5 (1 - ln(rtol)/2), of linear modes with 1.6; the step is the one at which the
     last two terms reach the tolerance: near the least work for an accuracy. Guards have series of their own, and the
     step ends where these stop to be accurate.
 

@@ -212,3 +212,14 @@ def test_a_monitor_crosses_nothing_where_it_has_no_value(integrator: str, level:
     sol = hs.simulate(model, (0, 6), integrator=integrator)
     assert len(sol.event_times("place")) == 4
     assert sol.event_times("level") == pytest.approx(sol.event_times("place"), abs=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853"])
+def test_a_run_into_a_singularity_comes_to_an_end(integrator: str) -> None:
+    """Where log(0.3 + x) has no value any more steps of some units in the last place move nothing."""
+    rate = "-0.05*t - 0.89*x - 0.17*v + 0.05*log(0.3 + x) + 0.3"
+    model = hs.Model("into-a-logarithm", [hs.State("x", -0.2884, "v"), hs.State("v", -0.12, rate)])
+    sol = hs.simulate(model, (0, 10), integrator=integrator)
+    assert sol.status == "step-failure" and "the rate of v is not a number" in sol.message
+    assert sol.t_end == pytest.approx(0.1144536582, abs=1e-9)
+    assert sol(sol.t_end)[0] == pytest.approx(-0.3, abs=1e-8)

@@ -429,3 +429,49 @@ def test_a_division_by_zero_in_a_flow_is_told_with_the_name_of_the_function(
     sol = hs.simulate(hs.Model("drained", {"h": 1.0, "y": 0.0}, flow=flow), (0, 2), integrator=integrator)
     assert sol.status == "step-failure"
     assert told in sol.message
+
+
+STIFFNESS: Any = 1.0
+TABLE = np.array([1.0])
+
+
+def by_a_global(t: float, x: Any, p: Any) -> Any:
+    return x[1], -STIFFNESS * x[0]
+
+
+def by_an_array(t: float, x: Any, p: Any) -> Any:
+    return x[1], -TABLE[0] * x[0]
+
+
+def by_a_closure() -> Any:
+    k = 1.0
+
+    def flow(t: float, x: Any, p: Any) -> Any:
+        return x[1], -k * x[0]
+
+    def change(value: float) -> None:
+        nonlocal k
+        k = value
+
+    return flow, change
+
+
+def test_what_functions_read_from_outside_is_what_it_is_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x'' = -k x: x(5) = cos(5 sqrt(k)), with k changed between runs of one model and of another like it."""
+    closed, change = by_a_closure()
+    monkeypatch.setattr(f"{__name__}.TABLE", np.array([1.0]))
+    flows = (by_a_global, by_an_array, closed)
+    models = [hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=flow) for flow in flows]
+    for k in (1.0, 4.0):
+        monkeypatch.setattr(f"{__name__}.STIFFNESS", k)
+        TABLE[0] = k
+        change(k)
+        for model in (*models, *(hs.Model("swing", states=m.states, flow=m.flow) for m in models[:1])):
+            for integrator in ("dop853", "dop853", "scipy-dop853"):
+                sol = hs.simulate(model, (0, 5), integrator=integrator, rtol=1e-10)
+                assert sol.y[0, -1] == pytest.approx(math.cos(5 * math.sqrt(k)), abs=1e-7)
+
+
+def test_nothing_is_compiled_again_as_long_as_nothing_outside_has_changed() -> None:
+    model = hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=by_an_array)
+    assert system_of(model) is system_of(model)

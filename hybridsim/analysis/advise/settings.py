@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +26,7 @@ from hybridsim.simulate import simulate
 # From loose to tight: each family is followed until it is within the tolerance, so that its cheapest is found.
 _RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 _STEPS = (75, 300, 1200, 4800)  # a period; 1200 is the published one
+_MORE = 4 / 3  # times the steps, with which the outcome of a fixed step has to be adequate too
 _FAMILIES: tuple[tuple[str, str], ...] = (
     ("exact", ""),
     ("dop853", "rtol"),
@@ -83,13 +84,16 @@ class _Settling:
     save: str | float
     step_base: float
 
+    def options(self, option: str, value: float) -> dict[str, float]:
+        """What `simulate` is given; a number of steps is one in a period."""
+        if not option:
+            return {}
+        return {"step": self.step_base / value} if option == "steps" else {option: value}
+
     def ask(self, model: Model, name: str, options: Mapping[str, Any], watch: Watch | None = None) -> Answer:
-        given = dict(options)
-        if "steps" in given:
-            given = {"step": self.step_base / given["steps"]}
         stopwatch = Stopwatch()
         try:
-            solution = simulate(model, self.span, integrator=name, save=self.save, progress=watch, **given)
+            solution = simulate(model, self.span, integrator=name, save=self.save, progress=watch, **options)
             seconds = stopwatch.seconds
             if not solution.success:
                 raise NoAnswer(f"{solution.status}: {solution.message}")
@@ -121,14 +125,28 @@ def settings(
         for name, option in _FAMILIES:
             values: tuple[float, ...] = {"rtol": _RTOLS, "steps": _STEPS}.get(option, (0.0,))
             for value in values:
-                options = {option: value} if option else {}
                 told(f"{name} {value:g}" if option else name)
-                ask = partial(settling.ask, model, name, options)
-                one = _measured(name, options, ask, full, tol, limits)
+
+                def measured(value: float, name: str = name, option: str = option) -> Setting:
+                    options = settling.options(option, value)
+                    ask = partial(settling.ask, model, name, options)
+                    return _measured(name, options, ask, full, tol, limits)
+
+                one = measured(value)
+                if option == "steps" and one.is_adequate:
+                    one = confirmed(one, measured(_MORE * value), tol)
                 found.append(one)
                 if one.is_adequate or one.value is None:
                     break
     return tuple(sorted(found, key=lambda s: (not s.is_adequate, math.isnan(s.seconds), s.seconds)))
+
+
+def confirmed(one: Setting, finer: Setting, tol: float) -> Setting:
+    """A setting with a fixed step that is adequate, unless with a shorter one it is not: then its error is chance."""
+    if finer.is_adequate or finer.value is None:
+        return one
+    why = f"{finer.title} is off by {finer.error:.2g}, beyond {tol:g}: the error does not fall with the step"
+    return replace(one, verdict=NOT_ADEQUATE, why=why)
 
 
 def _measured(
