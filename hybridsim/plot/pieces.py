@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _POINTS, _LEAST = 6_000, 9
 # More periods than can be told apart in a picture are not drawn; the last few are, without the transient.
 _MANY, _FEW = 12, 4
+_MANY_EVENTS, _FEW_EVENTS = 300, 24  # and so with events, where nothing has a period
 # A number of periods that differs from a whole one by this share is whole: an end given as 100T is rounded.
 _WHOLE = 1e-9
 
@@ -55,7 +56,7 @@ def refuse_arrays(solution: Any) -> None:
 
 
 def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
-    """What to draw: `t_span` if given, else all of it, or the last few of very many periods."""
+    """What to draw: `t_span` if given, else all of it, or the last few of very many periods or regular events."""
     start, end = sorted((solution.t_start, solution.t_end))
     if t_span is not None:
         t0, t1 = sorted(map(float, t_span))
@@ -65,9 +66,23 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
             )
         return Window(max(t0, start), min(t1, end))
     period = forcing_period(solution.model)
-    if period is None or end - start <= _MANY * period:
+    if period is None:
+        return _last_events(solution, start, end)
+    if end - start <= _MANY * period:
         return Window(start, end)
     return Window(end - _FEW * period, end, f"the last {_FEW} periods of {_short((end - start) / period)}")
+
+
+def _last_events(solution: Solution, start: float, end: float) -> Window:
+    """All, or the last of very many events where they are spread over the run: a limit cycle's, not a bouncing ball's."""
+    times = np.array([event.t for event in solution.events if event.kind == "transition"])
+    if len(times) <= _MANY_EVENTS:
+        return Window(start, end)
+    first = end - (end - start) * _FEW_EVENTS / len(times)
+    count = int((times >= first).sum())
+    if not 0.5 * _FEW_EVENTS <= count <= 2 * _FEW_EVENTS:
+        return Window(start, end)
+    return Window(first, end, f"the last {count} of {len(times)} events")
 
 
 def _short(periods: float) -> str:

@@ -40,7 +40,7 @@ def sweep_lines(
 
     Parameters
     ----------
-    names : readings; the first six that are numbers if none is given.
+    names : readings; six of those that are numbers if none is given, amplitudes, stick and stops before others.
     over : the parameter that runs across; if not given the longest axis of numbers.
     axes : as many axes as readings, to draw in; a new figure if not given.
     """

@@ -41,7 +41,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
 
     Parameters
     ----------
-    names : readings; the first six that are numbers if none is given.
+    names : readings; six of those that are numbers if none is given, amplitudes, stick and stops before others.
     axes : as many axes as readings, to draw in; a new figure if not given.
     """
     if len(result.axes) != 2 or result.mode != "grid":

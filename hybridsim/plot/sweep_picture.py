@@ -24,7 +24,12 @@ def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ..
     over : the parameter that runs across. With it, or with one parameter only, there are lines, one for each value
         of the other parameter; without it two parameters make a map.
     """
-    has_texts = any(values.dtype.kind != "f" for values in result.axes.values())
-    if over is None and len(result.axes) == 2 and result.mode == "grid" and not has_texts:
+    if is_map(result, over):
         return sweep_map(result, *names)
     return sweep_lines(result, *names, over=over)
+
+
+def is_map(result: Sweep, over: str | None) -> bool:
+    """Whether the picture has both parameters as axes."""
+    has_texts = any(values.dtype.kind != "f" for values in result.axes.values())
+    return over is None and len(result.axes) == 2 and result.mode == "grid" and not has_texts

@@ -17,11 +17,17 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
 
 _MOST = 6  # panels that fit a page
+_RATHER = (
+    "amplitude",
+    "stick_fraction",
+    "stops_per_period",
+    "dissipated",
+)  # than others, where not all are drawn
 NO_RESULT = "no result"
 
 
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
-    """Readings that are asked for, or the first that are numbers; arrays only where they can be drawn.
+    """Readings that are asked for, else those that people ask for first; arrays only where they can be drawn.
 
     Raises
     ------
@@ -33,10 +39,28 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
         if result[name] is not None and name not in kept:
             what = "texts" if result[name].dtype.hasobject else "an array at each point"
             raise UsageError(f"{name} is {what}, which cannot be drawn", remedy=f"draw one of {kept}")
-    found = tuple(names or kept[:_MOST])
+    found = tuple(names) or _first_asked_for(kept)
     if not found:
         raise UsageError("the sweep holds nothing that can be drawn", remedy="see its status for what failed")
     return found
+
+
+def _first_asked_for(kept: Sequence[str]) -> tuple[str, ...]:
+    """As many as fit a page, one of each of the kinds above before a second; in the order of the sweep."""
+
+    def rank(name: str) -> tuple[int, int]:
+        kind = name.partition(".")[0]
+        before = [other for other in kept[: kept.index(name)] if other.partition(".")[0] == kind]
+        return len(before) if kind in _RATHER else len(kept), kept.index(name)
+
+    chosen = sorted(kept, key=rank)[:_MOST]
+    return tuple(name for name in kept if name in chosen)
+
+
+def not_drawn(result: Sweep, arrays: bool) -> tuple[str, ...]:
+    """Readings that could be drawn and are not, unless they are asked for by name."""
+    kept = [name for name in result.values if _drawable(result, name, arrays)]
+    return tuple(name for name in kept if name not in _first_asked_for(kept))
 
 
 def _drawable(result: Sweep, name: str, arrays: bool) -> bool:

@@ -71,6 +71,18 @@ def test_titles_stay_within_the_picture(draw: Callable, periods: float) -> None:
     assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
 
 
+def test_many_events_without_a_period_show_the_last_unless_they_crowd() -> None:
+    """A limit cycle of 12.001 with two events; bounces that accumulate say nothing by their last ones alone."""
+    first = time_history(hs.simulate("belt", (0, 4000))).quantities[0]
+    low, high = first.get_xlim()
+    assert high == 4000 and 11 * 12.001 < high - low < 13 * 12.001
+    assert first.get_title(loc="left").endswith("\nthe last 24 of 667 events")
+    model = hs.load("bouncing-ball").with_(e="0.995")
+    fallen = hs.simulate(model, (0, 300))
+    assert len(fallen.events) > 300
+    assert time_history(fallen).quantities[0].get_xlim() == (0, 300)
+
+
 def test_a_jump_is_dashed_and_interrupts_the_curve() -> None:
     solution = ball()
     h, w = time_history(solution).quantities

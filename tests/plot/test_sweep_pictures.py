@@ -10,6 +10,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.plot import save, sweep_lines, sweep_map
+from hybridsim.plot.sweep_readings import not_drawn
 
 OMEGA, N = [300.0, 500.0, 400.0, 600.0], [20.0, 40.0]
 
@@ -38,6 +39,23 @@ def test_lines_over_one_parameter() -> None:
     assert list(x) == sorted(OMEGA) and y[1] == found["a"][2]
     dots = panels[2].lines[0].get_xydata()
     assert sorted(map(tuple, dots)) == sorted((w, v) for w, row in zip(OMEGA, found["all"]) for v in row)
+
+
+def test_of_many_readings_those_that_people_ask_for_first_are_drawn() -> None:
+    result = hs.sweep("dfcs", {"omega": [400.0, 500.0]}, "steady")
+    drawn = [axes.get_ylabel().split(" ")[0] for axes in sweep_lines(result)]
+    kinds = [
+        "amplitude.x",
+        "amplitude.v",
+        "amplitude.f",
+        "stick_fraction.f",
+        "stops_per_period.f",
+        "dissipated.f",
+    ]
+    assert drawn == kinds
+    assert not_drawn(result, arrays=True) == tuple(
+        name for name, values in result.values.items() if values.dtype.kind in "fc" and name not in kinds
+    )
 
 
 def test_lines_of_two_parameters_say_where_there_is_nothing() -> None:
