@@ -7,6 +7,7 @@ Writes docs/images/event-*.png. What they show is computed: events by runs, the 
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def draw_domains() -> None:
         "is zero at the start and rises": "t*(1.5 - t)",
         "goes below zero and comes back": "1.8*(t - 0.4)*(t - 0.7)",
     }
-    figure = style.figure(10, 2.9)
+    figure = style.figure(10, 3.1)
     t = np.linspace(0, 1, 501)
     rows = figure.subplots(1, 4, sharex=True)
     for axes, (title, guard) in zip(rows, cases.items(), strict=True):
@@ -63,7 +64,7 @@ def draw_domains() -> None:
         for at in events:
             axes.plot(at, 0, marker="v", color=ORANGE, markersize=10, zorder=6)
         said = f"ends at t = {events[0]:.1f}" if events else "goes on"
-        axes.set_title(f"{title}:\n{said}", fontsize=10)
+        axes.set_title(f"{textwrap.fill(title, 20)}:\n{said}", fontsize=10)
         axes.set_ylim(-0.45, 0.75)
         axes.set_xlabel("time t (one step)")
     rows[0].set_ylabel("guard g")

@@ -35,7 +35,7 @@ ZEROS, MOTION, MODES = "zeros of guards", "motion and its records", "which mode 
 SERIES, ELEMENTARY = "series of states and guards", "sine, cosine, exponential, logarithm"
 MODEL, PYTHON = "functions of the model, other kernels", "Python, NumPy and the memory they take"
 PARTS = {
-    "first_zero": ZEROS, "first_exit_of": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
+    "first_zero": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
     "exact_leap": MOTION, "leap": MOTION,
     "judge_candidate": MODES, "settle_event": MODES, "settle_clearly": MODES, "bounds": MODES,
     "series": SERIES, "values": SERIES, "ahead": SERIES, "sizes": SERIES, "advance": SERIES, "expand": SERIES,

@@ -16,6 +16,7 @@ import numpy as np
 from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import OccurrenceList
 from hybridsim.engine.chain import Chain
+from hybridsim.engine.hidden_bounces import may_be_hidden
 from hybridsim.engine.jit import Door
 from hybridsim.engine.limits import UNLIMITED
 from hybridsim.engine.loop import ModeLoop
@@ -99,7 +100,8 @@ def _is_over(system: System, leapt: Leapt) -> bool:
     if leapt.events == 0:
         return True
     fires = leapt.rows.fires[leapt.first : leapt.first + leapt.events]
-    if not system.has_surface[system.owner[fires[-1]]]:
+    last = system.owner[fires[-1]]
+    if not system.has_surface[last] and may_be_hidden(system, leapt.after(), leapt.crossings or ()):
         return False
     work = np.empty((2, MOST))
     return bool(_leads_nowhere(leapt.instants, fires, system.owner, len(system.automata), work))

@@ -10,7 +10,7 @@ rule, Theory Probab. Appl. 35 (1991) 454, doi:10.1137/1135065).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
@@ -65,11 +65,11 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
     return found
 
 
-def last_bounces(system: System, record: Trajectory) -> dict[int, Bounce]:
-    """Those that stand in the record as the last one."""
-    if not record.occurrences:
+def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
+    """The one that is the last of what happened."""
+    if not happened:
         return {}
-    last = record.occurrences.blocks[-1][-1]
+    last = happened[-1]
     c = next(c for c, automaton in enumerate(system.automata) if automaton.name == last.component)
     return {c: _recorded(system.automata[c], last)}
 
@@ -84,23 +84,36 @@ def limit_of_hidden(
 ) -> Limit | None:
     """The limit of the components whose last bounces have just come to be hidden; None if there is none."""
     found = {}
+    for c, departure in _barely_seen(system, outcome, bounces).items():
+        last = bounces[c]
+        forecast = _forecast(system, outcome, c, last, departure)
+        if forecast is not None and forecast.hidden >= 1.0:
+            limit, count = _agreed(system, outcome, c, forecast, departure.speed, last, record)
+            if system.automata[c].is_unilateral or count >= _FEW:
+                found[c] = (limit, departure.flight)
+    if not found:
+        return None
+    limits, flights = zip(*found.values(), strict=True)
+    return Limit(max(limits), tuple(found), max(flights))
+
+
+def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrence]) -> bool:
+    """Whether there may be a limit of components whose bounces come to be hidden after what happened last."""
+    return bool(_barely_seen(system, outcome, last_bounces(system, happened)))
+
+
+def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
+    """Of those after which a flight is so short that rounding may hide what the next one loses, how they leave."""
+    found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
         rests = automaton.hold in (last.source, last.target)
         if automaton.is_corner or rests or (automaton.has_surface and not automaton.is_unilateral):
             continue
         departure = _departure(system, outcome, c, last)
-        if departure is None or departure.unknown < _LEAST_LOSS:
-            continue
-        forecast = _forecast(system, outcome, c, last, departure)
-        if forecast is not None and forecast.hidden >= 1.0:
-            limit, count = _agreed(system, outcome, c, forecast, departure.speed, last, record)
-            if automaton.is_unilateral or count >= _FEW:
-                found[c] = (limit, departure.flight)
-    if not found:
-        return None
-    limits, flights = zip(*found.values(), strict=True)
-    return Limit(max(limits), tuple(found), max(flights))
+        if departure is not None and departure.unknown >= _LEAST_LOSS:
+            found[c] = departure
+    return found
 
 
 def _agreed(

@@ -189,9 +189,9 @@ class ModeLoop:
                 self.adopted = Instant(*landing.instants[-1].tolist())
             limit = self.accumulation.limit_of_all(landing.instants, landing.owners)
             if limit is None and len(landing.owners) and not self.system.has_surface[landing.owners[-1]]:
-                limit = limit_of_hidden(
-                    self.system, self.outcome, last_bounces(self.system, self.record), self.record
-                )
+                blocks = self.record.occurrences.blocks
+                last = last_bounces(self.system, blocks[-1] if blocks else ())
+                limit = limit_of_hidden(self.system, self.outcome, last, self.record)
             if self._ends_at(limit):
                 return arrived, True
             if landing.end != PAUSED:

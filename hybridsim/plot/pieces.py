@@ -74,7 +74,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
 
 
 def _last_events(solution: Solution, start: float, end: float) -> Window:
-    """All, or the last of very many events where they are spread over the run: a limit cycle's, not a bouncing ball's."""
+    """All, or the last of very many events that are spread over the run: a limit cycle's, not a bouncing ball's."""
     times = np.array([event.t for event in solution.events if event.kind == "transition"])
     if len(times) <= _MANY_EVENTS:
         return Window(start, end)

@@ -206,7 +206,7 @@ def test_settings_are_measured() -> None:
     for setting in found.settings:  # the value is what it says, and is_adequate is what its error says
         assert setting.value is not None
         assert setting.error == pytest.approx(abs(setting.value - found.value) / abs(found.value), rel=1e-9)
-        assert setting.is_adequate == (setting.error <= 0.01)
+        assert setting.is_adequate == (setting.error <= 0.01 and not setting.why)
 
 
 def test_a_tolerance_finer_than_what_is_known() -> None:
@@ -350,7 +350,7 @@ def test_a_rung_dearer_than_the_full_model_is_stopped() -> None:
 
 def test_what_does_not_fit_the_budget_is_left_out_and_said() -> None:
     seen: list[tuple[int, int, str]] = []
-    with pytest.raises(SimulationError, match=r"within the budget: not done after 0\.01 s"):
+    with pytest.raises(SimulationError, match=r"within the budget: not done after 0\.0(1|0\d+) s"):
         # an undamped body with a cubic spring goes on for thousands of periods
         stray = hs.Model("stray", [hs.State("x", 1, "v"), hs.State("v", 0, "sin(1.3*t) - x**3 + x - 0.05*v")])
         hs.advise(stray, "amplitude.x", budget=0.01)

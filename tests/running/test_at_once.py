@@ -35,6 +35,13 @@ def pair() -> hs.Model:
     return hs.Model("pair", states, contacts=contacts)
 
 
+def struck() -> hs.Model:
+    """A driven mass on a spring that strikes a stop and leaves it at speed."""
+    stop = hs.Guard("stop", "0.3 - x", hs.Choice("free", reset={"x": "0.3", "v": "-0.7*v"}))
+    states = [hs.State("x", 0.0, "v"), hs.State("v", 0.0, "sin(1.6*t) - 0.1*v - x")]
+    return hs.Model("struck", states, components=[hs.Component("mode", hs.Mode("free", stop))])
+
+
 def bouncing() -> hs.Model:
     """A ball whose bounces accumulate."""
     return hs.load("bouncing-ball")
@@ -61,7 +68,7 @@ def is_at_once(sol: hs.Solution) -> bool:
 @pytest.mark.parametrize("save", ["all", "events", "nothing"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_is_made_later_is_what_was_made_at_once(engine: str, save: str) -> None:
-    for model, end in ((hs.load("dfcs"), 0.5), (pair(), 60.0)):
+    for model, end in ((hs.load("dfcs"), 0.5), (pair(), 60.0), (struck(), 100.0)):
         options: dict[str, Any] = {"integrator": engine, "save": save}
         wanted = content(hs.simulate(model, (0, end), limits=ENOUGH, **options), save)
         hs.simulate(model, (0, end), **options)
