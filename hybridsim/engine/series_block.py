@@ -40,32 +40,46 @@ class SeriesPieces:
 def series_states(
     project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
 ) -> None:
-    """States at local times s of the segments of these numbers; see `SeriesBlock`."""
+    """States at local times s of the segments of these numbers; see `SeriesBlock`.
+
+    Up to four times that follow each other and lie in one step are taken side by side: none waits for another's sum.
+    """
     modes, vectors, jumps = record
     n, order = series.shape[1], series.shape[2] - 1
-    x = np.empty(n)
-    for k in range(s.shape[0]):
+    x = np.empty((4, n))
+    k, total = 0, s.shape[0]
+    while k < total:
         i = index[k]
         first, last = ends[i], ends[i + 1] - 1
-        if s[k] >= steps[last, 0] + steps[last, 1]:
+        end = steps[last, 0] + steps[last, 1]
+        if s[k] >= end:
             out[k] = jumps[i, 0]
+            k += 1
             continue
+        until = end
         while first < last:
             middle = (first + last + 1) // 2
             if steps[middle, 0] <= s[k]:
                 first = middle
             else:
-                last = middle - 1
-        d = s[k] - steps[first, 0]
+                last, until = middle - 1, steps[middle, 0]
+        begin, count = steps[first, 0], 1
+        while count < 4 and k + count < total and index[k + count] == i and begin <= s[k + count] < until:
+            count += 1
+        a, z = s[k] - begin, k + count - 1
+        b, c, d = s[min(k + 1, z)] - begin, s[min(k + 2, z)] - begin, s[z] - begin
         for j in range(n):
-            total = series[first, j, order]
+            at_a = at_b = at_c = at_d = series[first, j, order]
             for m in range(order - 1, -1, -1):
-                total = total * d + series[first, j, m]
-            x[j] = total
-        if pinned:
-            call(project, s[k], x, vectors[i], modes[i], out[k])
-        else:
-            out[k] = x
+                term = series[first, j, m]
+                at_a, at_b, at_c, at_d = at_a * a + term, at_b * b + term, at_c * c + term, at_d * d + term
+            x[0, j], x[1, j], x[2, j], x[3, j] = at_a, at_b, at_c, at_d
+        for m in range(count):
+            if pinned:
+                call(project, s[k + m], x[m], vectors[i], modes[i], out[k + m])
+            else:
+                out[k + m] = x[m]
+        k += count
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.places import find_places
 from hybridsim.errors import UsageError, nearest
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.in_tables import InTables
@@ -226,21 +227,17 @@ class Solution(InTables):
                 remedy="run it with save='all', or with save='last-period' or a number for the end of it",
             )
         low, high = sorted((self.t_start, self.t_end))
-        if len(times) and not ((times >= low) & (times <= high)).all():
+        if len(times) and not (times.min() >= low and times.max() <= high):
             bad = times[~((times >= low) & (times <= high))][0]
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
             raise UsageError(f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}")
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)
-        index = np.searchsorted(sign * self._starts, sign * times, side="right" if later else "left") - 1
-        index = np.maximum(index, 0)
-        s = (times - self._origins[index, 0]) - self._origins[index, 1]
-        begins, ends = self._spans[index, 0], self._spans[index, 1]
-        s = np.clip(s, begins, ends) if sign > 0 else np.clip(s, ends, begins)
-        # a rounded time of an event means the event: its own state, on the side that is asked for
-        s = np.where(times == self._starts[index], begins, s)
-        return index, np.where(times == self._ends[index], ends, s)
+        index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
+        frame = self._starts, self._ends, self._origins, self._spans
+        find_places(np.ascontiguousarray(times), *frame, sign, later, index, s)
+        return index, s
 
     def _pieces(
         self, times: np.ndarray, side: str
