@@ -23,9 +23,11 @@ from hybridsim.engine.steps_ahead import (
     flow_holds,
     keeps_up,
     look_ahead,
+    may_come_back,
     parts_of,
     seems_still,
     values_at,
+    what_is_left,
 )
 from hybridsim.engine.taylor import SLACK, advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -220,6 +222,7 @@ def leap(
         rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
         high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
         flow_places = (time, states, tapes.derivatives[k])
+        fading = tapes.fading[tapes.fading_start[k] : tapes.fading_start[k + 1]]
         code, values_code = codes.series[k], codes.values[k]
         ahead_code, sizes_code = codes.ahead[k], codes.sizes[k]
         load(inputs, tapes, k, p, V)
@@ -235,6 +238,7 @@ def leap(
         put(floors, floor_now)
         put(x, y)
         constants = V if code != 0 else W
+        left_now = 0.0
         s, fired, short, lands, holds = 0.0, -1, 0, landing(automata, z), holding(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
@@ -271,9 +275,11 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             trials = 0
-            first_look = (
-                0 if seems_still(tapes.computed[k], coefficients, order, powers, rtol, atol) else len(BETWEEN)
-            )
+            first_look, left_before, left_now = len(BETWEEN), left_now, what_is_left(fading, V)
+            if may_come_back(left_now, left_before) or seems_still(
+                tapes.computed[k], coefficients, order, powers, rtol, atol
+            ):
+                first_look = 0
             while True:
                 look, holds_so_far = first_look, True
                 while holds_so_far and look <= len(BETWEEN):

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.bounds_code import Given
-from hybridsim.engine.lean_tape import PAIRED
+from hybridsim.engine.lean_tape import PAIRED, needed_rows
 from hybridsim.engine.series_code import ModeTape
-from hybridsim.engine.tape import LESS, SELECT
+from hybridsim.engine.tape import EXP, LESS, SELECT, TANGENT
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -58,6 +58,13 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
             register = chosen[register]
         found.append(register in results)
     return found
+
+
+def fading(system: System, z: np.ndarray) -> list[int]:
+    """Registers of the rates that may fade: exponentials, and ~r for a hyperbolic tangent in r, which may saturate."""
+    tape = system.lean_tape(z)
+    rows = needed_rows(list(_rows(tape.rows)), set(tape.derivatives.tolist()))
+    return [r if op == EXP else ~r for op, _, b, _, r in rows if op == EXP or (op == TANGENT and b != 0)]
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

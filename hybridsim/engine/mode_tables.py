@@ -19,6 +19,7 @@ from hybridsim.engine.mode_code import (
     WORTH,
     computed_rates,
     constant_rows,
+    fading,
     given,
     kept,
     mode_tape,
@@ -63,7 +64,8 @@ class Tapes(NamedTuple):
     """One row or one slice for each vector of modes: modes, lean rows, those of high orders, constant rows, active
     guards, registers. places: see `hybridsim.engine.modes_index`.
 
-    computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state.
+    computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state. fading:
+    see `hybridsim.engine.mode_code`.
     bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
     was missed.
     """
@@ -78,6 +80,8 @@ class Tapes(NamedTuple):
     constant: np.ndarray
     active_start: np.ndarray
     active: np.ndarray
+    fading_start: np.ndarray
+    fading: np.ndarray
     derivatives: np.ndarray
     computed: np.ndarray
     guards: np.ndarray
@@ -242,6 +246,7 @@ class TapeShelf:
                 *in_a_row([one.high for one in rows]),
                 *in_a_row([one.constant for one in rows]),
                 *in_a_row([one.active for one in rows], columns=()),
+                *in_a_row([np.array(one.fading, dtype=np.int64) for one in rows], columns=()),
                 np.array([one.derivatives for one in rows], dtype=np.int64).reshape(len(met), system.n),
                 np.array([one.computed for one in rows], dtype=np.bool_).reshape(len(met), system.n),
                 np.array([one.guards for one in rows], dtype=np.int64).reshape(len(met), system.guard_count),
@@ -260,6 +265,7 @@ class _ModeRows(NamedTuple):
     active: np.ndarray
     derivatives: np.ndarray
     computed: list[bool]
+    fading: list[int]
     guards: np.ndarray
 
     @classmethod
@@ -273,6 +279,7 @@ class _ModeRows(NamedTuple):
             np.flatnonzero(system.active(z)),
             tape.derivatives,
             computed_rates(system, z),
+            fading(system, z),
             tape.guards,
         )
 

@@ -6,6 +6,7 @@ and sum_k |c_k| d**(k - 1); of the watched functions their values there, and tho
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from hybridsim.engine.jets import UNIT
@@ -15,6 +16,10 @@ from hybridsim.engine.taylor import advance, tabulate
 _DEFECT = 100.0  # as in the taylor integrator
 # Shares of a step, by the golden ratio: what a state that seems to stand still is looked at before its end.
 BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
+
+# What an exponential, or the distance of a hyperbolic tangent from one, is below where it may be lost from a series and
+# come back within a step.
+_FAINT = 1e-6
 
 
 def room_ahead(order: int, n: int, guards: int) -> int:
@@ -146,6 +151,26 @@ def seems_still(computed: Any, series: Any, order: int, powers: Any, rtol: float
         if k > order:
             return True
     return False
+
+
+@inlined
+def what_is_left(fading: Any, V: Any) -> float:
+    """The least exponential, or distance of a hyperbolic tangent from one; inf if there is none.
+
+    fading: see `hybridsim.engine.mode_code`. Of a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) no term is
+    seen far away, where v may turn round on the way.
+    """
+    least = math.inf
+    for i in range(fading.shape[0]):
+        r = fading[i]
+        least = min(least, V[r, 0] if r >= 0 else 1.0 - abs(V[~r, 0]))
+    return least
+
+
+@inlined
+def may_come_back(left: float, before: float) -> bool:
+    """Whether so little is left that a series says nothing of a whole step, and not less than a step before."""
+    return left < _FAINT and left >= before
 
 
 @kernel

@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
-from hybridsim.engine.mode_code import computed_rates
+from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
-from hybridsim.engine.steps_ahead import BETWEEN
+from hybridsim.engine.steps_ahead import BETWEEN, may_come_back, what_is_left
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
@@ -43,6 +43,8 @@ class TaylorStepper:
         self.flow, self.bound, self.tolerances = flow, bound, tolerances
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.computed = np.array(computed_rates(flow.system, flow.z))
+        self.fading = np.array(fading(flow.system, flow.z), dtype=np.int64)
+        self.left = self.left_before = 0.0
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
         # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
@@ -58,6 +60,7 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
+        self.left_before, self.left = self.left, what_is_left(self.fading, self.series.V)
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
@@ -96,10 +99,10 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """The same as `_holds` on the way, where a state seems to stand still and its rate may be different later."""
+        """The same as `_holds` on the way, where a state seems to stand still, or a part of its rate has faded."""
         moves = np.abs(coefficients[:, 1:]) @ np.abs(h) ** np.arange(1, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
-        if not (still & self.computed).any():
+        if not (still & self.computed).any() and not may_come_back(self.left, self.left_before):
             return True
         places = h * np.array(BETWEEN)
         states = np.empty((len(places), len(self.x)))
