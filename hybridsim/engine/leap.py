@@ -23,11 +23,10 @@ from hybridsim.engine.steps_ahead import (
     flow_holds,
     keeps_up,
     look_ahead,
-    may_come_back,
     parts_of,
     seems_still,
     values_at,
-    what_is_left,
+    where_it_comes_back,
 )
 from hybridsim.engine.taylor import SLACK, advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -39,8 +38,8 @@ _SMALLEST = 10.0
 
 
 class Room(NamedTuple):
-    """Scratch arrays: series of all registers (registers, order + 1) and of the active guards, what is ahead of them,
-    powers of a step and sizes of the latter over it, a polynomial, its Bernstein forms, a state, guards."""
+    """Scratch arrays: series of all registers (registers, order + 1), of active guards and of what may fade, what is
+    ahead of them, powers of a step and sizes of guards over it, a polynomial, its Bernstein forms, a state, guards."""
 
     V: np.ndarray
     W: np.ndarray
@@ -105,11 +104,12 @@ def series_at(
     s: float,
     x: Any,
     watched: Any,
+    fading: Any,
     V: Any,
     U: Any,
     out: Any,
 ) -> None:
-    """Coefficients of the states, to out, and of the watched functions, to U, along the flow from x at local time s.
+    """Coefficients of the states, to out, of the watched functions and of what may fade, to U, from x at local time s.
 
     code: address of a function that does the same; 0 for none. is_known: `values_at` has been there last.
     """
@@ -124,6 +124,9 @@ def series_at(
     for j in range(watched.shape[0]):
         for k in range(order + 1):
             U[j, k] = V[watched[j], k]
+    for j in range(fading.shape[0]):
+        for k in range(order + 1):
+            U[watched.shape[0] + j, k] = V[fading[j], k]
 
 
 @inlined
@@ -238,7 +241,6 @@ def leap(
         put(floors, floor_now)
         put(x, y)
         constants = V if code != 0 else W
-        left_now = 0.0
         s, fired, short, lands, holds = 0.0, -1, 0, landing(automata, z), holding(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
@@ -250,7 +252,19 @@ def leap(
             coefficients = series[n_steps]
             is_known = n_steps > first_step and not lands
             series_at(
-                code, is_known, rows, high, flow_places, order, s, y, watched, V, guard_series, coefficients
+                code,
+                is_known,
+                rows,
+                high,
+                flow_places,
+                order,
+                s,
+                y,
+                watched,
+                fading,
+                V,
+                guard_series,
+                coefficients,
             )
             left = bound - s
             h = reach(
@@ -275,15 +289,19 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             trials = 0
-            first_look, left_before, left_now = len(BETWEEN), left_now, what_is_left(fading, V)
-            if may_come_back(left_now, left_before) or seems_still(
-                tapes.computed[k], coefficients, order, powers, rtol, atol
-            ):
+            first_look = len(BETWEEN)
+            if seems_still(tapes.computed[k], coefficients, order, powers, rtol, atol):
                 first_look = 0
             while True:
-                look, holds_so_far = first_look, True
+                look, holds_so_far = first_look - fading.shape[0], True
                 while holds_so_far and look <= len(BETWEEN):
-                    e = d if look == len(BETWEEN) else BETWEEN[look] * d
+                    if look < first_look:
+                        e = where_it_comes_back(guard_series[count + first_look - 1 - look], order, d)
+                        if e == 0.0:
+                            look += 1
+                            continue
+                    else:
+                        e = d if look == len(BETWEEN) else BETWEEN[look] * d
                     look_ahead(
                         ahead_code,
                         rows,
@@ -297,8 +315,11 @@ def leap(
                         constants,
                         ahead,
                     )
-                    holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
-                if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
+                    holds_so_far = flow_holds(ahead, order, n, e, y, rtol, atol) and keeps_up(
+                        guard_series, numbers, order, ahead, rtol, values, sums
+                    )
+                    look += 1
+                if holds_so_far:
                     break
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
                 if trials > _TRIALS:

@@ -21,6 +21,7 @@ from hybridsim.engine.jit import Door
 from hybridsim.engine.leap import Record, Room, leap
 from hybridsim.engine.leapt import Leapt
 from hybridsim.engine.linear_tables import no_tables
+from hybridsim.engine.mode_code import most_fading
 from hybridsim.engine.mode_tables import automata_of, shelf_of
 from hybridsim.engine.outcome import Outcome
 from hybridsim.engine.packs import ALIGNED, LARGEST, Sheet, packed
@@ -334,7 +335,7 @@ class TaylorLeaper(Leaper):
             Room(
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
-                guard_series=np.zeros((guards, order + 1)),
+                guard_series=np.zeros((guards + most_fading(system), order + 1)),
                 ahead=np.empty(room_ahead(order, n, guards)),
                 sizes=np.empty(order + 1 + guards),
                 numbers=np.arange(guards, dtype=np.int64),

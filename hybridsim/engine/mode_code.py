@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.bounds_code import Given
-from hybridsim.engine.lean_tape import PAIRED, needed_rows
+from hybridsim.engine.lean_tape import PAIRED
 from hybridsim.engine.series_code import ModeTape
 from hybridsim.engine.tape import EXP, LESS, SELECT, TANGENT
 
@@ -32,6 +32,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
         states=tuple(tape["states"]),
         rates=tuple(lean.derivatives.tolist()),
         guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
+        fading=tuple(fading(system, z)),
         holding=frozenset(_holding(system, z)),
     )
 
@@ -61,10 +62,18 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Registers of the rates that may fade: exponentials, and ~r for a hyperbolic tangent in r, which may saturate."""
-    tape = system.lean_tape(z)
-    rows = needed_rows(list(_rows(tape.rows)), set(tape.derivatives.tolist()))
-    return [r if op == EXP else ~r for op, _, b, _, r in rows if op == EXP or (op == TANGENT and b != 0)]
+    """Registers with arguments of what may fade, in a rate, guard or monitor: exponentials and hyperbolic tangents."""
+    return list(dict.fromkeys(a for op, a, b, *_ in _rows(system.lean_tape(z).rows) if _may_fade(op, b)))
+
+
+def most_fading(system: System) -> int:
+    """How many these are at most, whatever the modes."""
+    parts = system.code.data["tape"]["parts"]
+    return sum(_may_fade(op, b) for _, branches in parts for rows in branches for op, _, b, *_ in rows)
+
+
+def _may_fade(op: int, b: int) -> bool:
+    return op == EXP or (op == TANGENT and b != 0)
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

@@ -155,7 +155,7 @@ class Lines:
 @dataclass(frozen=True)
 class ModeTape:
     """What is needed of the lean tape of one vector of modes: rows, those of high orders, registers of time, states,
-    rates, active guards; conditions that hold while time goes on."""
+    rates, active guards, arguments of what may fade; conditions that hold while time goes on."""
 
     rows: tuple[tuple[int, ...], ...]
     high: tuple[tuple[int, ...], ...]
@@ -163,6 +163,7 @@ class ModeTape:
     states: tuple[int, ...]
     rates: tuple[int, ...]
     guards: tuple[int, ...]
+    fading: tuple[int, ...]
     holding: frozenset[int]
 
     @property
@@ -343,9 +344,9 @@ def function(name: str, lines: Iterable[str]) -> str:
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
-    """The function that writes the coefficients (n, order + 1) of the states and (guards, order + 1)."""
+    """The function that writes the coefficients (n, order + 1) of the states and (guards + fading, order + 1)."""
     code, size = _Expansion(tape, order, order + 1, is_known=True), order + 1
-    for array, registers in (("%out", tape.states), ("%g", tape.guards)):
+    for array, registers in (("%out", tape.states), ("%g", tape.guards + tape.fading)):
         for i, r in enumerate(registers):
             for k in range(size):
                 code.store(code.at(r, k), array, i * size + k)

@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
-from hybridsim.engine.steps_ahead import BETWEEN, may_come_back, what_is_left
+from hybridsim.engine.steps_ahead import BETWEEN, where_it_comes_back
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
@@ -44,7 +45,6 @@ class TaylorStepper:
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.computed = np.array(computed_rates(flow.system, flow.z))
         self.fading = np.array(fading(flow.system, flow.z), dtype=np.int64)
-        self.left = self.left_before = 0.0
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
         # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
@@ -60,7 +60,6 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
-        self.left_before, self.left = self.left, what_is_left(self.fading, self.series.V)
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
@@ -102,14 +101,24 @@ class TaylorStepper:
         """The same as `_holds` on the way, where a state seems to stand still, or a part of its rate has faded."""
         moves = np.abs(coefficients[:, 1:]) @ np.abs(h) ** np.arange(1, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
-        if not (still & self.computed).any() and not may_come_back(self.left, self.left_before):
-            return True
-        places = h * np.array(BETWEEN)
+        shares = np.array(BETWEEN if (still & self.computed).any() else ())
+        back = [where_it_comes_back(self.series.V[r], self.series.order, h) for r in self.fading]
+        places = np.array([*(d for d in back if d != 0.0), *(h * shares)])
         states = np.empty((len(places), len(self.x)))
         polynomials(coefficients, places, states)
         return all(
-            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(places, states, strict=True)
+            self._holds(coefficients, self.x, x, self.s, d) and self._keeps_up(d, x)
+            for d, x in zip(places, states, strict=True)
         )
+
+    def _keeps_up(self, d: float, x: np.ndarray) -> bool:
+        """Whether the series of guards and monitors still give their values at a distance, where the state is x."""
+        flow, series = self.flow, self.series
+        time, state = np.array([self.s + d]), x[None, :]
+        values = np.concatenate([flow.guards(time, state)[0][series.active], flow.monitors(time, state)[0]])
+        terms = series.V[series.watched] * d ** np.arange(series.order + 1)
+        share = _DEFECT * series.rtol + 64.0 * UNIT
+        return bool((np.abs(terms.sum(axis=1) - values) <= share * np.abs(terms).max(axis=1)).all())
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
         """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.

@@ -39,6 +39,84 @@ def test_a_force_that_is_there_near_rest_alone(integrator: str) -> None:
     assert sol.y[1, -1] == pytest.approx(1.0, abs=1e-7)
 
 
+@pytest.mark.parametrize("way", ["compiled", "stepped"])
+@pytest.mark.parametrize(
+    "rate, area",
+    [
+        # the integrals of all but cos(t) over the real line, of pulses that are over before the run ends
+        ("exp(-((t - 0.45)/0.003)**2)", 0.003 * math.sqrt(math.pi)),
+        ("exp(-((t - 0.2)/0.01)**2) + exp(-((t - 0.6)/0.01)**2)", 0.02 * math.sqrt(math.pi)),
+        ("exp(-((t - 0.3)/0.01)**2) - exp(-((t - 0.8)/0.004)**2)", 0.006 * math.sqrt(math.pi)),
+        ("1 - tanh((t - 0.37)/0.002)**2", 0.004),
+        ("exp((t - 0.37)/0.002)/(1 + exp((t - 0.37)/0.002))**2", 0.002),
+        ("1/(1 + exp((t - 0.55)/0.004)) - 1/(1 + exp((t - 0.5)/0.004))", 0.05),
+    ],
+)
+def test_narrow_pulses(rate: str, area: float, way: str) -> None:
+    """y' = cos(t) + pulses, along whose rises and falls no step begins or ends: y(1) = sin(1) + their areas."""
+    model = hs.Model(
+        "pulses",
+        [hs.State("y", 0, f"cos(t) + {rate}")],
+        monitors=[hs.Monitor("high", "y - 1000")] if way == "stepped" else [],
+    )
+    for rtol in (1e-4, 1e-7, 1e-12):
+        sol = hs.simulate(model, (0, 1), integrator="taylor", rtol=rtol)
+        assert sol.y[0, -1] == pytest.approx(math.sin(1) + area, abs=30 * rtol)
+
+
+@pytest.mark.parametrize("way", ["compiled", "stepped"])
+@pytest.mark.parametrize("width", [0.1, 0.03, 0.01])
+def test_a_velocity_that_goes_away_and_turns_round(width: float, way: str) -> None:
+    """A force near rest alone, of a body that leaves rest, turns, passes rest and turns again: v = sin(1.7 t) - 0.2.
+
+    x' = exp(-(v/w)**2): by quadrature in 30 digits, split where v passes rest.
+    """
+    model = hs.Model(
+        "turns",
+        [hs.State("v", -0.2, "1.7*cos(1.7*t)"), hs.State("x", 0, f"exp(-(v/{width})**2)")],
+        monitors=[hs.Monitor("high", "x - 1000")] if way == "stepped" else [],
+    )
+    with mpmath.workdps(30):
+        rest = [mpmath.asin(mpmath.mpf(0.2)), mpmath.pi - mpmath.asin(mpmath.mpf(0.2))]
+        rest = [(phase + 2 * k * mpmath.pi) / mpmath.mpf(1.7) for k in range(4) for phase in rest]
+        places = sorted(
+            {0, *(t + d for t in rest for d in (-0.1, -0.02, 0, 0.02, 0.1) if 0 < t + d < 10), 10}
+        )
+        area = mpmath.quad(
+            lambda t: mpmath.exp(
+                -(((mpmath.sin(mpmath.mpf(1.7) * t) - mpmath.mpf(0.2)) / mpmath.mpf(width)) ** 2)
+            ),
+            places,
+        )
+    for rtol in (1e-6, 1e-9, 1e-12):
+        sol = hs.simulate(model, (0, 10), integrator="taylor", rtol=rtol)
+        assert sol.y[1, -1] == pytest.approx(float(area), abs=30 * rtol)
+
+
+@pytest.mark.parametrize("way", ["compiled", "stepped"])
+def test_a_guard_that_falls_for_a_moment(way: str) -> None:
+    """1/2 - exp(-((t - c)/w)**2) crosses zero at c - w sqrt(log(2)), which no step begins or ends beside."""
+    monitor = '[monitors.high]\nexpr = "y - 1000"\n' if way == "stepped" else ""
+    model = hs.Model.from_toml(
+        """
+schema = 1
+name = "moment"
+[states]
+y = { start = 0, der = "cos(t)" }
+z = { start = 0, der = "exp(-y)*tanh(y + 0.3)" }
+[components.a]
+initial = "low"
+[components.a.modes.low]
+guards.up = { expr = "0.5 - exp(-((t - 0.45)/0.003)**2)", then = "high" }
+[components.a.modes.high]
+"""
+        + monitor
+    )
+    for rtol in (1e-4, 1e-9):
+        sol = hs.simulate(model, (0, 1), integrator="taylor", rtol=rtol)
+        assert sol.event_times("a") == pytest.approx([0.45 - 0.003 * math.sqrt(math.log(2))], abs=1e-12)
+
+
 def test_a_stribeck_contact_that_comes_near_rest_under_way() -> None:
     """Two methods agree where the body comes near rest under way in one long step, and friction rises there."""
     model = hs.Model.from_toml("""
