@@ -26,8 +26,8 @@ BUDGET = 120.0  # seconds of a comparison that nobody has given any thought
 
 def compare(
     model: Model | str | PathLike[str],
-    *,
     t_span: tuple[float, float] | None = None,
+    *,
     integrators: Sequence[str | tuple[str, Mapping[str, Any]] | Series] | None = None,
     rtols: Sequence[float] | None = None,
     steps: Sequence[int] | None = None,

@@ -21,7 +21,8 @@ COMPARED_PERIODS = 20  # a comparison runs dozens of times: a minute, not five
 DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
 
 MOST_WORKERS = 1024  # beyond the processors of a machine; each takes memory
-_PERIODS = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*T\s*")
+_NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
+_PERIODS, _WITH_UNIT = re.compile(_NUMBER + r"T\s*"), re.compile(_NUMBER + r"[A-Za-z]+\s*")
 
 
 def assignment(text: str) -> tuple[str, str]:
@@ -197,6 +198,11 @@ def _record_end(model: Model) -> float:
 def _time(model: Model, text: str) -> float:
     from hybridsim.expr import evaluate, parse, require_names
 
+    if _WITH_UNIT.fullmatch(text):
+        raise UsageError(
+            f"--t-end {text} ends in what is no unit here",
+            remedy="give a number in the model's unit of time, 20T for periods, or an expression of parameters",
+        )
     with blaming_the_command_line():
         values = model.parameter_values()
         expression = parse(text, Place(file="--t-end", text=text))

@@ -315,8 +315,9 @@ def leap(
                         constants,
                         ahead,
                     )
-                    holds_so_far = flow_holds(ahead, order, n, e, y, rtol, atol) and keeps_up(
-                        guard_series, numbers, order, ahead, rtol, values, sums
+                    of_states_alone = first_look <= look < len(BETWEEN)
+                    holds_so_far = flow_holds(ahead, order, n, e, y, rtol, atol) and (
+                        of_states_alone or keeps_up(guard_series, numbers, order, ahead, rtol, values, sums)
                     )
                     look += 1
                 if holds_so_far:

@@ -103,12 +103,13 @@ class TaylorStepper:
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         shares = np.array(BETWEEN if (still & self.computed).any() else ())
         back = [where_it_comes_back(self.series.V[r], self.series.order, h) for r in self.fading]
-        places = np.array([*(d for d in back if d != 0.0), *(h * shares)])
+        back = [d for d in back if d != 0.0]
+        places = np.array([*back, *(h * shares)])
         states = np.empty((len(places), len(self.x)))
         polynomials(coefficients, places, states)
         return all(
-            self._holds(coefficients, self.x, x, self.s, d) and self._keeps_up(d, x)
-            for d, x in zip(places, states, strict=True)
+            self._holds(coefficients, self.x, x, self.s, d) and (i >= len(back) or self._keeps_up(d, x))
+            for i, (d, x) in enumerate(zip(places, states, strict=True))
         )
 
     def _keeps_up(self, d: float, x: np.ndarray) -> bool:

@@ -15,6 +15,7 @@ from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.run import STATUS, new_room, new_state, reach_kernels
 from hybridsim.mechanics.trajectory import Pieces, instants, quantities
 from hybridsim.solution import Event, ModeInterval
+from hybridsim.solution.by_name import ByName
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.run import MechanicalRun
@@ -199,7 +200,7 @@ class MechanicalSolution(ArraysResult):
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
         """For each contact its modes in order, with the stretch of time of each."""
         self._require_events()
-        found: dict[str, tuple[ModeInterval, ...]] = {}
+        found = ByName[tuple[ModeInterval, ...]]()
         place = np.argsort(self._contact_of)
         for i, contact in enumerate(self.model.contacts):
             mine = self._event[:, 0] == place[i]

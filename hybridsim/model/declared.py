@@ -4,15 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field
+from inspect import Signature, signature
 from typing import Any
 
-from hybridsim.errors import ModelError, Place, UsageError
+from hybridsim.errors import ModelError, Place, UsageError, near
 from hybridsim.expr import Expression, of_function, parse
 from hybridsim.model.frozen_map import FrozenMap
 
 
+class _Refusing(type):
+    """Constructors that say what they take where they are called with something else."""
+
+    @property
+    def __signature__(cls) -> Signature:
+        """What help and editors show; without it they would show that of the call below."""
+        _, *parameters = signature(cls.__init__).parameters.values()  # type: ignore[misc]  # of this very class
+        return Signature(parameters)
+
+    def __call__(cls, *args: Any, **keywords: Any) -> Any:
+        try:
+            return super().__call__(*args, **keywords)
+        except TypeError:
+            takes = signature(cls)
+            try:
+                takes.bind(*args, **keywords)
+            except TypeError as error:
+                names = [name for name in takes.parameters if name != "place"]
+                raise _refusal(cls.__name__, names, keywords, error) from None
+            raise
+
+
+def _refusal(title: str, names: list[str], keywords: Iterable[str], error: TypeError) -> UsageError:
+    """What is wrong with the arguments: an unknown one before a missing one, which may be the same."""
+    takes = f"it takes {', '.join(names)}"
+    for name in keywords:
+        if name not in (*names, "place"):
+            close = near(name, names)
+            remedy = f"did you mean '{close[0]}'? {takes}" if close else takes
+            return UsageError(f"{title} has no argument '{name}'", remedy=remedy)
+    return UsageError(f"{title}: {error}", remedy=takes)
+
+
 @dataclass(frozen=True)
-class Declared:
+class Declared(metaclass=_Refusing):
     """Base of every part of a model; ``place`` says where it was declared and takes no part in comparisons.
 
     Constructors take a number or a text wherever an `Expression` is wanted, a dict wherever a mapping is, and

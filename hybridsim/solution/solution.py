@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridsim.engine.places import find_places
 from hybridsim.errors import UsageError, nearest
+from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.in_tables import InTables
 from hybridsim.solution.summary import in_html, in_words
@@ -317,7 +318,7 @@ class Solution(InTables):
         if self._save == "events":
             return self._modes_of_events()
         numbers, ends = self._segments.modes(), self._ends
-        result = {}
+        result = ByName[tuple[ModeInterval, ...]]()
         for c, automaton in enumerate(self._system.declared):
             changed = np.flatnonzero(np.diff(numbers[:, c])) + 1
             first = np.concatenate([[0], changed]) if len(numbers) else changed
@@ -328,7 +329,7 @@ class Solution(InTables):
         return result
 
     def _modes_of_events(self) -> dict[str, tuple[ModeInterval, ...]]:
-        result = {}
+        result = ByName[tuple[ModeInterval, ...]]()
         for automaton, last in zip(self._system.declared, self._segments.modes()[-1].tolist(), strict=False):
             changes = [e for e in self.events if e.component == automaton.name and e.source != e.target]
             times = [self.t_start, *(e.t for e in changes), self.t_end]

@@ -39,6 +39,7 @@ BAD = {
     "negative number of periods": (["run", "dfcs", "--t-end", "-5T"], ["-5T", "above zero"]),
     "t-end of zero": (["run", "dfcs", "--t-end", "0"], ["0", "above zero"]),
     "t-end that is no time": (["run", "dfcs", "--t-end", "soon"], ["soon"]),
+    "t-end with a unit": (["run", "dfcs", "--t-end", "5h"], ["5h", "unit of time", "20T"]),
     "t-end that is infinite": (["run", "dfcs", "--t-end", "1e999"], ["1e999"]),
     "periods of a model without": (["run", "bouncing-ball", "--t-end", "5T"], ["bouncing-ball", "period"]),
     "negative tolerance": (["run", "dfcs", "--rtol", "-1e-6"], ["--rtol", "-1e-6"]),

@@ -128,14 +128,16 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
             ("series_0", "values_0", "ahead_0", "sizes_0"),
             partial(series_text, tape, order),
         )
-        watched = np.array(tape.guards, dtype=np.int64)
+        watched, fading = np.array(tape.guards, dtype=np.int64), np.array(tape.fading, dtype=np.int64)
         constants, interpreted = run.V.copy(), run.V.copy()
         run.expand(0.1, x, 1.0)
         expected, guards = run.V[run.states], run.V[watched]
-        C, U = np.empty((n, order + 1)), np.empty((len(watched), order + 1))
-        called(series, 0.1, 0.0, x, U, constants, C)
+        C, with_fading = np.empty((n, order + 1)), np.empty((len(watched) + len(fading), order + 1))
+        U = with_fading[: len(watched)]
+        called(series, 0.1, 0.0, x, with_fading, constants, C)
         np.testing.assert_array_equal(C, expected)
         np.testing.assert_array_equal(U, guards)
+        np.testing.assert_array_equal(with_fading[len(watched) :], run.V[fading])
         d = 0.01
         found, want = np.empty((2, room_ahead(order, n, len(watched))))
         called(ahead, 0.1, d, C, U, constants, found)
@@ -150,7 +152,7 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
         # from there, where order 0 is known, and by itself
         x1 = found[order + 1 : order + 1 + n].copy()
         run.expand(0.1 + d, x1, 1.0)
-        called(series, 0.1 + d, 1.0, x1, U, constants, C)
+        called(series, 0.1 + d, 1.0, x1, with_fading, constants, C)
         np.testing.assert_array_equal(C, run.V[run.states])
         rates, at = np.empty(n), np.empty(len(watched))
         called(values, 0.1 + d, 0.0, x1, at, constants, rates)

@@ -26,6 +26,9 @@ X = hs.State("x", 0, "1")
         (lambda: hs.Model("a", [X], definitions=5), "Model a: definitions is 5"),
         (lambda: hs.Model("a", [X], definitions=[5]), r"Model a: definitions is \[5\]"),
         (lambda: hs.Model("a", [X], outputs={"y": None}), "Output y: expr is None"),
+        (lambda: hs.State("x", 0, "1", units="m"), "State has no argument 'units'\ndid you mean 'unit'?"),  # type: ignore[call-arg]  # the slip meant
+        (lambda: hs.Contact(mu=0.3), "Contact has no argument 'mu'\nit takes name, velocity, normal"),  # type: ignore[call-arg]  # the slip meant
+        (lambda: hs.State("x"), "State: missing a required argument: 'start'\nit takes name, start"),  # type: ignore[call-arg]  # the slip meant
         (lambda: hs.State(["x"], 0, "1"), r"State: name is \['x'\]"),
         (lambda: hs.State("x", None, "1"), "State x: start is None"),
         (lambda: hs.State("x", 0, "1", nominal="a"), "State x: nominal is 'a'"),

@@ -85,6 +85,14 @@ def test_modes_cover_the_run_without_gaps(ball: hs.Solution) -> None:
     assert [i.mode for i in intervals] == ["flight", "rest"]
 
 
+@pytest.mark.parametrize("save", ["all", "events"])
+def test_modes_of_no_component_are_refused(save: str) -> None:
+    modes = hs.simulate("dfcs", (0, 10), save=save).modes
+    with pytest.raises(UsageError, match="no component 'f3'\ndid you mean 'f'"):
+        modes["f3"]
+    assert modes.get("f3") is None and list(modes) == ["f"]
+
+
 def test_outside_of_the_run_is_refused(ball: hs.Solution) -> None:
     with pytest.raises(UsageError, match="outside"):
         ball(3.1)
