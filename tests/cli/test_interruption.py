@@ -97,7 +97,7 @@ def test_compare_stops_altogether(tmp_path: Path) -> None:
 
 
 def test_a_run_that_is_asked_to_end_goes_on(tmp_path: Path) -> None:
-    argv = ("run", "dfcs", "--t-end", "500T", "--integrator", "scipy-dop853", "--save", "run.hsol")
+    argv = ("run", "dfcs", "--t-end", "150T", "--integrator", "scipy-dop853", "--save", "run.hsol")
     code, messages = interrupted(tmp_path, *argv, number=signal.SIGTERM)
     assert code == 143, messages
     assert "'hybridsim resume run.hsol' goes on" in messages and "Traceback" not in messages
