@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.event_work import LEAP, ROW, called_by
-from hybridsim.engine.few import put
+from hybridsim.engine.few import few, put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address, merged
@@ -42,6 +42,7 @@ from hybridsim.engine.segment_end import (
 )
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
+_MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _DONE = -1.0  # in place of a guard's size: its first zero is known
 
 
@@ -164,6 +165,19 @@ def room_for(system: Any, tables: Any) -> Room:
 
 
 @inlined
+def grows_beyond_doubles(lin: Any, k: int, s: float) -> bool:
+    """Whether a mode of the motion in row k grows within a time s by more than its coordinate may be too small for.
+
+    Of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one.
+    """
+    for j in range(lin.counts[k]):
+        few()
+        if lin.values[k, j].real * s > _MOST_GROWTH:
+            return True
+    return False
+
+
+@inlined
 def stopped(hints: Any, k: int, former: Any) -> int:
     """The segment under way is left to others, or to a leap that begins with it: its zeros have not been met."""
     put(former, hints[k])
@@ -208,7 +222,7 @@ def exact_leap(
         fired, s = first_exit_of(lin, tapes, k, bound, state, room)
         if fired == _OPEN:
             return stopped(hints, k, former)
-        if s > longest:
+        if s > longest or grows_beyond_doubles(lin, k, s):
             return stopped(hints, k, former)
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)

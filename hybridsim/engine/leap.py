@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.faint_terms import where_it_ends
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
@@ -24,9 +25,8 @@ from hybridsim.engine.steps_ahead import (
     keeps_up,
     look_ahead,
     parts_of,
-    seems_still,
+    seems_straight,
     values_at,
-    where_it_comes_back,
 )
 from hybridsim.engine.taylor import SLACK, advance, expand, reach
 from hybridsim.engine.timepair import phase_of
@@ -126,7 +126,7 @@ def series_at(
             U[j, k] = V[watched[j], k]
     for j in range(fading.shape[0]):
         for k in range(order + 1):
-            U[watched.shape[0] + j, k] = V[fading[j], k]
+            U[watched.shape[0] + j, k] = V[max(fading[j], ~fading[j]), k]
 
 
 @inlined
@@ -288,20 +288,18 @@ def leap(
             )
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
+            for i in range(fading.shape[0]):
+                end = where_it_ends(guard_series[count + i], fading[i] >= 0, order, d)
+                if end < d:
+                    d, outcome = end, NEVER
             trials = 0
             first_look = len(BETWEEN)
-            if seems_still(tapes.computed[k], coefficients, order, powers, rtol, atol):
+            if seems_straight(tapes.computed[k], coefficients, order, powers, rtol, atol):
                 first_look = 0
             while True:
-                look, holds_so_far = first_look - fading.shape[0], True
+                look, holds_so_far = first_look, True
                 while holds_so_far and look <= len(BETWEEN):
-                    if look < first_look:
-                        e = where_it_comes_back(guard_series[count + first_look - 1 - look], order, d)
-                        if e == 0.0:
-                            look += 1
-                            continue
-                    else:
-                        e = d if look == len(BETWEEN) else BETWEEN[look] * d
+                    e = d if look == len(BETWEEN) else BETWEEN[look] * d
                     look_ahead(
                         ahead_code,
                         rows,
@@ -315,12 +313,8 @@ def leap(
                         constants,
                         ahead,
                     )
-                    of_states_alone = first_look <= look < len(BETWEEN)
-                    holds_so_far = flow_holds(ahead, order, n, e, y, rtol, atol) and (
-                        of_states_alone or keeps_up(guard_series, numbers, order, ahead, rtol, values, sums)
-                    )
-                    look += 1
-                if holds_so_far:
+                    holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
+                if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
                     break
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
                 if trials > _TRIALS:

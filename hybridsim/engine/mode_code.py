@@ -12,7 +12,7 @@ import numpy as np
 from hybridsim.engine.bounds_code import Given
 from hybridsim.engine.lean_tape import PAIRED
 from hybridsim.engine.series_code import ModeTape
-from hybridsim.engine.tape import EXP, LESS, SELECT, TANGENT
+from hybridsim.engine.tape import EXP, LESS, SELECT, SINHCOSH, TANGENT
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -32,7 +32,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
         states=tuple(tape["states"]),
         rates=tuple(lean.derivatives.tolist()),
         guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
-        fading=tuple(fading(system, z)),
+        fading=tuple(max(r, ~r) for r in fading(system, z)),
         holding=frozenset(_holding(system, z)),
     )
 
@@ -62,8 +62,9 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Registers with arguments of what may fade, in a rate, guard or monitor: exponentials and hyperbolic tangents."""
-    return list(dict.fromkeys(a for op, a, b, *_ in _rows(system.lean_tape(z).rows) if _may_fade(op, b)))
+    """Registers with arguments of what may fade: r of exponentials, ~r of hyperbolic functions."""
+    rows = _rows(system.lean_tape(z).rows)
+    return list(dict.fromkeys(a if op == EXP else ~a for op, a, b, *_ in rows if _may_fade(op, b)))
 
 
 def most_fading(system: System) -> int:
@@ -73,7 +74,7 @@ def most_fading(system: System) -> int:
 
 
 def _may_fade(op: int, b: int) -> bool:
-    return op == EXP or (op == TANGENT and b != 0)
+    return op in (EXP, SINHCOSH) or (op == TANGENT and b != 0)
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

@@ -54,8 +54,7 @@ class SeriesRun:
         advance(self.lean.constant_rows, self.V, 0)
         self.states = np.array(tape["states"], dtype=np.int64)
         self.places = (tape["time"], self.states, self.lean.derivatives)
-        self.active = np.flatnonzero(system.active(z))
-        self.guards = self.lean.guards[self.active]
+        self.guards = self.lean.guards[np.flatnonzero(system.active(z))]
         self.watched = np.concatenate([self.guards, self.lean.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:

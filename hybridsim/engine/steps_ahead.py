@@ -13,15 +13,8 @@ from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 from hybridsim.engine.taylor import advance, tabulate
 
 _DEFECT = 100.0  # as in the taylor integrator
-# Shares of a step, by the golden ratio: what a state that seems to stand still is looked at before its end.
+# Shares of a step, by the golden ratio: where a state that seems to go straight on is looked at before the end.
 BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
-
-# Of exp(u), or of tanh(u), what depends on u is faint where |u| is larger than the first, so that a series may lose it;
-# beyond the second it is nothing.
-_FAINT, _NOTHING = 7.0, 45.0
-_SLIGHT = 1e-2  # change of u
-_PARTS = 16  # of a step: in each of them |u| is taken to have one minimum
-_POLISHED = 4  # steps of Newton's method
 
 
 def room_ahead(order: int, n: int, guards: int) -> int:
@@ -140,66 +133,19 @@ def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, a
 
 
 @inlined
-def seems_still(computed: Any, series: Any, order: int, powers: Any, rtol: float, atol: Any) -> bool:
-    """Whether by its series a state hardly moves, whose rate may be different later.
+def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: float, atol: Any) -> bool:
+    """Whether by its series the rate of a state hardly changes, which may be different later.
 
-    computed (n,): see `hybridsim.engine.mode_tables`. Of a rate such as sin(t)**20 all terms vanish where it begins:
-    they tell nothing of the step, at whose end it may vanish again.
+    computed (n,): see `hybridsim.engine.mode_tables`. Of a rate such as 1 + sin(t)**20 all terms but the first vanish
+    where it begins: they tell nothing of the step, at whose end they may vanish again.
     """
     for i in range(series.shape[0]):
-        scale, k = atol[i] + rtol * abs(series[i, 0]), 1
+        scale, k = atol[i] + rtol * abs(series[i, 0]), 2
         while computed[i] and k <= order and abs(series[i, k]) * powers[k] <= scale:
             k += 1
         if k > order:
             return True
     return False
-
-
-@kernel
-def where_it_comes_back(u: Any, order: int, h: float) -> float:
-    """At which distance within a step h the series u is nearest to zero, if exp(u) is faint at first; 0 for none.
-
-    Of a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) no term is seen far away, where v may turn round on the
-    way and the end of the step be as far away as its beginning; u itself is seen all the way. What is nearest at the
-    end is not said: there a step is looked at in any case.
-    """
-    if not abs(u[0]) > _FAINT:
-        return 0.0
-    change, turn, power, last = abs(u[1] * h), 0.0, h, 1
-    for k in range(2, order + 1):
-        power *= h
-        size = abs(u[k] * power)
-        change += size
-        turn += k * size
-        if size > _SLIGHT:
-            last = k  # further terms do not move the minimum to speak of
-    # it stays away, or goes one way only and comes to zero nowhere: then the end is nearest, or the beginning
-    if not abs(u[0]) - change < _NOTHING or (abs(u[0]) > change and turn < abs(u[1] * h)):
-        return 0.0
-    nearest, part = abs(u[0]), 0
-    for j in range(1, _PARTS + 1):
-        d, value = j * h / _PARTS, u[last]
-        for k in range(last - 1, -1, -1):
-            value = value * d + u[k]
-        if abs(value) < nearest or value * u[0] < 0.0:
-            nearest, part = abs(value), j
-            if value * u[0] < 0.0:
-                break
-    if part == 0:
-        return 0.0
-    # the least square of u
-    d, least, most = part * h / _PARTS, (part - 1) * h / _PARTS, min(part + 1, _PARTS) * h / _PARTS
-    for _ in range(_POLISHED):
-        value, slope, bend = u[last], 0.0, 0.0
-        for k in range(last - 1, -1, -1):
-            bend = bend * d + slope
-            slope = slope * d + value
-            value = value * d + u[k]
-        curve = slope * slope + 2.0 * value * bend
-        if curve > 0.0:
-            d -= value * slope / curve
-        d = min(max(d, min(least, most)), max(least, most))
-    return d if abs(value) < _NOTHING and abs(d) < abs(h) else 0.0
 
 
 @kernel

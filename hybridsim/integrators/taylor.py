@@ -8,12 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.jets import UNIT
+from hybridsim.engine.faint_terms import where_it_ends
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
 from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
-from hybridsim.engine.steps_ahead import BETWEEN, where_it_comes_back
+from hybridsim.engine.steps_ahead import BETWEEN
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
@@ -60,6 +60,9 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
+        for r in self.fading:
+            u = self.series.V[max(r, ~r)]
+            h = min(h, abs(where_it_ends(u, r >= 0, self.series.order, direction * h)))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
@@ -98,28 +101,17 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """The same as `_holds` on the way, where a state seems to stand still, or a part of its rate has faded."""
-        moves = np.abs(coefficients[:, 1:]) @ np.abs(h) ** np.arange(1, coefficients.shape[1])
+        """The same as `_holds` on the way, where the rate of a state seems to stay as it is."""
+        moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
-        shares = np.array(BETWEEN if (still & self.computed).any() else ())
-        back = [where_it_comes_back(self.series.V[r], self.series.order, h) for r in self.fading]
-        back = [d for d in back if d != 0.0]
-        places = np.array([*back, *(h * shares)])
+        if not (still & self.computed).any():
+            return True
+        places = h * np.array(BETWEEN)
         states = np.empty((len(places), len(self.x)))
         polynomials(coefficients, places, states)
         return all(
-            self._holds(coefficients, self.x, x, self.s, d) and (i >= len(back) or self._keeps_up(d, x))
-            for i, (d, x) in enumerate(zip(places, states, strict=True))
+            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(places, states, strict=True)
         )
-
-    def _keeps_up(self, d: float, x: np.ndarray) -> bool:
-        """Whether the series of guards and monitors still give their values at a distance, where the state is x."""
-        flow, series = self.flow, self.series
-        time, state = np.array([self.s + d]), x[None, :]
-        values = np.concatenate([flow.guards(time, state)[0][series.active], flow.monitors(time, state)[0]])
-        terms = series.V[series.watched] * d ** np.arange(series.order + 1)
-        share = _DEFECT * series.rtol + 64.0 * UNIT
-        return bool((np.abs(terms.sum(axis=1) - values) <= share * np.abs(terms).max(axis=1)).all())
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
         """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.

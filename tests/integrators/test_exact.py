@@ -130,3 +130,36 @@ def test_impacts_that_accumulate_are_said_to() -> None:
         expected.append(t)
         t += 2 * fall * 0.5 ** (k + 1)
     assert [event.t for event in solution.events[:12]] == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(("rate", "end"), [(2, 400), (20, 40), (100, 8), (200, 3.55), (200, 4)])
+def test_a_load_that_grows_from_less_than_doubles_hold(rate: float, end: float) -> None:
+    """x' = -x + exp(k (t - T)): x(T) = exp(-T) + (1 - exp(-(k + 1) T))/(k + 1), of a load exp(-k T) at the start."""
+    sol = hs.simulate(
+        hs.Model("late", [hs.State("x", 1, f"-x + exp({rate}*(t - {end}))")]), (0, end), integrator="exact"
+    )
+    expected = math.exp(-end) + (1 - math.exp(-(rate + 1) * end)) / (rate + 1)
+    assert sol.success and sol.y[0, -1] == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_event_by_a_load_that_was_nothing() -> None:
+    """x = exp(-t) + 100/51 exp(50 (t - 18)) passes 1.1 near 18 + log(1.1*51/100)/50; one Newton step from there."""
+    low = hs.Mode("low", hs.Guard("up", "1.1 - x", "high"))
+    model = hs.Model(
+        "late",
+        [hs.State("x", 1, "-x + 100*exp(50*(t - 18))")],
+        components=[hs.Component("a", [low, hs.Mode("high")], "low")],
+    )
+    guess = 18 + math.log(1.1 * 51 / 100) / 50
+    expected = guess - math.exp(-guess) / (50 * 1.1)
+    assert hs.simulate(model, (0, 19), integrator="exact").event_times("a") == pytest.approx(
+        [expected], abs=1e-13
+    )
+
+
+def test_growth_to_the_end_of_doubles_is_told() -> None:
+    """x' = 200 x: from 1e-300 it is exp(800) larger at 4; from 1 it leaves doubles before."""
+    small = hs.simulate(hs.Model("growth", [hs.State("x", 1e-300, "200*x")]), (0, 4), integrator="exact")
+    assert small.success and math.log(small.y[0, -1]) == pytest.approx(800 - 300 * math.log(10), rel=1e-13)
+    large = hs.simulate(hs.Model("growth", [hs.State("x", 1, "200*x")]), (0, 4), integrator="exact")
+    assert large.status == "step-failure" and "grow without bound" in large.message

@@ -1,11 +1,14 @@
-"""A part of a rate that is below rounding at both ends of a step and not between them is not stepped over."""
+"""A part of a rate or guard that is below rounding at both ends of a step and not between is not stepped over."""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable, Iterable
 
 import mpmath
 import pytest
+from scipy.integrate import quad
 
 import hybridsim as hs
 
@@ -65,32 +68,23 @@ def test_narrow_pulses(rate: str, area: float, way: str) -> None:
 
 
 @pytest.mark.parametrize("way", ["compiled", "stepped"])
-@pytest.mark.parametrize("width", [0.1, 0.03, 0.01])
+@pytest.mark.parametrize("width", [0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4])
 def test_a_velocity_that_goes_away_and_turns_round(width: float, way: str) -> None:
     """A force near rest alone, of a body that leaves rest, turns, passes rest and turns again: v = sin(1.7 t) - 0.2.
 
-    x' = exp(-(v/w)**2): by quadrature in 30 digits, split where v passes rest.
+    x' = exp(-(v/w)**2): by quadrature, split about where v passes rest.
     """
     model = hs.Model(
         "turns",
         [hs.State("v", -0.2, "1.7*cos(1.7*t)"), hs.State("x", 0, f"exp(-(v/{width})**2)")],
         monitors=[hs.Monitor("high", "x - 1000")] if way == "stepped" else [],
     )
-    with mpmath.workdps(30):
-        rest = [mpmath.asin(mpmath.mpf(0.2)), mpmath.pi - mpmath.asin(mpmath.mpf(0.2))]
-        rest = [(phase + 2 * k * mpmath.pi) / mpmath.mpf(1.7) for k in range(4) for phase in rest]
-        places = sorted(
-            {0, *(t + d for t in rest for d in (-0.1, -0.02, 0, 0.02, 0.1) if 0 < t + d < 10), 10}
-        )
-        area = mpmath.quad(
-            lambda t: mpmath.exp(
-                -(((mpmath.sin(mpmath.mpf(1.7) * t) - mpmath.mpf(0.2)) / mpmath.mpf(width)) ** 2)
-            ),
-            places,
-        )
+    phases = [math.asin(0.2) + 2 * k * math.pi for k in range(4)]
+    rest = [phase / 1.7 for first in phases for phase in (first, first + math.pi - 2 * math.asin(0.2))]
+    area = integral(lambda t: math.exp(-(((math.sin(1.7 * t) - 0.2) / width) ** 2)), 10, rest, width / 2)
     for rtol in (1e-6, 1e-9, 1e-12):
         sol = hs.simulate(model, (0, 10), integrator="taylor", rtol=rtol)
-        assert sol.y[1, -1] == pytest.approx(float(area), abs=30 * rtol)
+        assert sol.y[1, -1] == pytest.approx(area, abs=10 * rtol)
 
 
 @pytest.mark.parametrize("way", ["compiled", "stepped"])
@@ -115,6 +109,58 @@ guards.up = { expr = "0.5 - exp(-((t - 0.45)/0.003)**2)", then = "high" }
     for rtol in (1e-4, 1e-9):
         sol = hs.simulate(model, (0, 1), integrator="taylor", rtol=rtol)
         assert sol.event_times("a") == pytest.approx([0.45 - 0.003 * math.sqrt(math.log(2))], abs=1e-12)
+
+
+A, B = "((t - 0.45)/0.003)", "((t - 0.47)/0.01)"
+
+
+@pytest.mark.parametrize("way", ["compiled", "stepped"])
+@pytest.mark.parametrize(
+    "rate",
+    [
+        "1e3*exp(-((t - 0.47)/0.001)**2)",
+        "exp(cos(40*t)*60 - 61)",  # whose argument turns many times in a step of the rest
+        "exp(-100*sin(20*t)**2)",
+        f"(1 + {B}**2)**(-10.3)",  # whose argument is a logarithm
+        "1e-12*exp((0.7 - 16*(t - 0.47)**2)/0.0259)",  # a diode, large where its argument is
+        f"1e22*exp(-50 - {B}**2)",
+        "1e22*exp(-1e4/(200 - 700*(t - 0.47)**2))",
+        f"1/cosh({A})**2",
+        f"1/(1 + sinh({B})**2)",
+        f"tanh({A})**2*(1 - tanh({A})**2)",  # zero where the argument is
+        f"{A}**2*exp(-{A}**2)",
+        f"exp(-400*(tanh({A}) - 0.5)**2)",  # beside where the inner argument is zero
+        f"exp(-100*(exp(-{A}**2) - 0.5)**2)",
+        f"exp(-exp({B}**2/9))",
+        "exp(-1/(t - 0.5)**2)",
+        "sin(3.3*t)**64 - cos(t) + 1",
+        "(5*t*(0.9 - t))**40 - cos(t) + 1",
+    ],
+)
+def test_pulses_of_many_kinds(rate: str, way: str) -> None:
+    """y' = cos(t) + a pulse: y(0.9) by quadrature, split about the pulses."""
+
+    def integrand(t: float) -> float:
+        known = vars(math) | {"t": t}
+        try:
+            return float(eval(f"cos(t) + {rate}", known))  # noqa: S307  # the texts above
+        except ArithmeticError:  # exp(-exp(u)), exp(-1/u**2), 1/(1 + sinh(u)**2): nothing is left there
+            return math.cos(t)
+
+    about = {0.45, 0.47, 0.5, *(k * math.pi / 20 for k in range(6))}
+    expected = integral(integrand, 0.9, about, 0.005)
+    monitors = [hs.Monitor("high", "y - 1000")] if way == "stepped" else []
+    model = hs.Model("pulse", [hs.State("y", 0, f"cos(t) + {rate}")], monitors=monitors)
+    for rtol in (1e-4, 1e-6, 1e-9, 1e-12):
+        sol = hs.simulate(model, (0, 0.9), integrator="taylor", rtol=rtol)
+        assert sol.y[0, -1] == pytest.approx(expected, abs=10 * rtol)
+
+
+def integral(f: Callable[[float], float], end: float, places: Iterable[float], width: float) -> float:
+    """From 0 to an end, with narrow pieces about some places."""
+    edges = {p + q * width for p in places for q in (-40, -10, -4, -1, 0, 1, 4, 10, 40)}
+    pieces = sorted({0.0, end, *(edge for edge in edges if 0 < edge < end)})
+    return sum(quad(f, a, b, epsabs=1e-14, epsrel=1e-12, limit=400)[0] for a, b in itertools.pairwise(pieces))
 
 
 def test_a_stribeck_contact_that_comes_near_rest_under_way() -> None:
