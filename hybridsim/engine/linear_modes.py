@@ -142,25 +142,37 @@ def what_is_not_linear(system: System) -> str | None:
 
 
 def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
-    vectors = {"": np.zeros(len(system.automata), dtype=np.int64)}
+    vectors, of_mode = {"": np.zeros(len(system.automata), dtype=np.int64)}, {}
     for c, automaton in enumerate(system.automata):
         for m, mode in enumerate(automaton.modes):
             name = f"mode {mode}" if automaton.name == SINGLE else f"{automaton.name}.{mode}"
             z = vectors[f"in {name} "] = vectors[""].copy()
-            z[c] = m
+            z[c], of_mode[f"in {name} "] = m, (c, m)
     for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
         names = " and ".join(system.automata[c].name for c in cluster)
         hold = "hold together" if len(cluster) > 1 else "holds"
         z = vectors[f"where {names} {hold} "] = vectors[""].copy()
         z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
+    reasons: dict[str, str] = {}
     for place, z in reversed(vectors.items()):
         try:
             LinearMode(system, Atoms(), z, p)
         except DividesByZero:
             continue  # no such motion
         except NotLinear as reason:
-            return str(reason) if " in mode " in str(reason) else f"{place}{reason}"  # a guard's title has it
-    return None
+            reasons[place] = str(reason)
+    if not reasons:
+        return None
+    # the mode with which none is linear: others may only stand beside it
+    to_blame = (
+        place
+        for place, (c, m) in of_mode.items()
+        if all(other in reasons for other, z in vectors.items() if z[c] == m)
+    )
+    place = next(to_blame, next(iter(reasons)))
+    return (
+        reasons[place] if " in mode " in reasons[place] else f"{place}{reasons[place]}"
+    )  # a guard's title has it
 
 
 def refuse_nonlinear(system: System) -> None:

@@ -25,7 +25,14 @@ from hybridsim.expr.python_tree import python_tree
 from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
-_WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s+[A-Za-z]")  # a number and a word behind it
+_NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+_WITH_UNIT, _JOINED = (
+    re.compile(_NUMBER + r"\s+[A-Za-z]"),
+    re.compile(_NUMBER + "[A-Za-z]"),
+)  # and a word behind it
+_WITHOUT_UNIT = "write the number alone: a unit stands in the field 'unit', and nothing is converted."
+_PRODUCT = "write the number alone, its unit in the field 'unit', or a product with '*', e.g. '2*x'."
+_AS_IN_PYTHON = "write it as in Python, e.g. 'a*sin(omega*t) - c*v'."
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
 _ADVICE = {
     "^": "write a power as **.",
@@ -122,9 +129,11 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
         raise ExpressionError(
             f"not an expression: {reason}",
             place=where.at(text, column),
-            remedy="write the number alone: a unit stands in the field 'unit', and nothing is converted."
+            remedy=_WITHOUT_UNIT
             if _WITH_UNIT.match(text)
-            else "write it as in Python, e.g. 'a*sin(omega*t) - c*v'.",
+            else _PRODUCT
+            if _JOINED.match(text)
+            else _AS_IN_PYTHON,
         ) from None
     except (RecursionError, MemoryError):
         raise ExpressionError(

@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass, field
 from inspect import Signature, signature
 from typing import Any
 
-from hybridsim.errors import ModelError, Place, UsageError, near
+from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, near
 from hybridsim.expr import Expression, of_function, parse
 from hybridsim.model.frozen_map import FrozenMap
 
@@ -70,14 +70,18 @@ class Declared(metaclass=_Refusing):
         for name in fields:
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, self._parsed(value, functions))
+                object.__setattr__(self, name, self._parsed(value, name, functions))
             elif not self._has_default(name):
                 raise self._fault(f"{name} is None", "give a number or an expression")
 
-    def _parsed(self, value: Any, functions: bool) -> Expression:
+    def _parsed(self, value: Any, field: str, functions: bool) -> Expression:
         if functions and callable(value):
             return of_function(value, self.place)
-        return parse(value, self.place)
+        try:
+            return parse(value, self.place)
+        except ExpressionError as fault:
+            message = f"{self._title}: {field}: {fault.message}"
+            raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
     def _maps(self, *fields: str, functions: bool = False) -> None:
         """Freeze mappings of expressions (or, if so, Python functions); a value of None stays None."""
@@ -85,7 +89,10 @@ class Declared(metaclass=_Refusing):
             items = getattr(self, name)
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
                 raise self._fault(f"{name} is {items!r}", "give a mapping from names to expressions")
-            parsed = {key: None if v is None else self._parsed(v, functions) for key, v in items.items()}
+            parsed = {
+                key: None if v is None else self._parsed(v, f"{name}[{key!r}]", functions)
+                for key, v in items.items()
+            }
             object.__setattr__(self, name, FrozenMap(parsed))
 
     def _functions(self, *fields: str) -> None:
@@ -115,11 +122,14 @@ class Declared(metaclass=_Refusing):
     def _has_default(self, field: str) -> bool:
         return self.__dataclass_fields__[field].default is not MISSING
 
+    @property
+    def _title(self) -> str:
+        name = getattr(self, "name", None)
+        return f"{type(self).__name__} {name}" if isinstance(name, str) else type(self).__name__
+
     def _fault(self, message: str, remedy: str) -> UsageError:
         """What is wrong with an argument of the constructor."""
-        name = getattr(self, "name", None)
-        who = f"{type(self).__name__} {name}" if isinstance(name, str) else type(self).__name__
-        return UsageError(f"{who}: {message}", place=self.place, remedy=remedy)
+        return UsageError(f"{self._title}: {message}", place=self.place, remedy=remedy)
 
     def error(self, message: str, remedy: str | None = None) -> ModelError:
         """An error about this part, at its place."""

@@ -92,14 +92,17 @@ def _short(periods: float) -> str:
 
 
 def unit_of(solution: Solution, name: str) -> str:
-    """Unit of a state or an output; `UsageError` for a name that is neither."""
+    """Unit of what `Solution.output` knows, empty where none is declared; `UsageError` for a name that it does not."""
     units = units_of(solution.model)
     if name not in units:
-        raise UsageError(
-            f"{solution.model.name} has no state or output '{name}'",
-            remedy=nearest(name, units, kind="quantities"),
-        )
-    return units[name]
+        try:
+            solution.output(name, solution.t_start)
+        except UsageError:
+            raise UsageError(
+                f"{solution.model.name} has no quantity '{name}'",
+                remedy=nearest(name, units, kind="quantities"),
+            ) from None
+    return units.get(name, "")
 
 
 def extent(pieces: Sequence[Piece], name: str) -> tuple[float, float]:

@@ -107,7 +107,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
         raise UsageError(
             f"the run has {len(events)} events, and event {number!r} is asked for",
-            remedy="give the place of one",
+            remedy=f"give the place of one, 0 to {len(events) - 1}, or -1 for the last" if events else None,
         )
     event = events[number]
     happened = [o for o in solution._trajectory.occurrences if o.kind != "corner"]

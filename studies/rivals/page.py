@@ -95,10 +95,12 @@ def _scene_table(scene: Scene, exact: Truth, lines: Sequence[Line]) -> str:
 
 
 def _ratios(found: Found) -> str:
-    rows = ["| ratio | aim | scene | times | ratio | |", "| --- | --- | --- | --- | --- | --- |"]
+    rows = ["| ratio | aim | scene | times | ratio | of medians | |", "| --- " * 7 + "|"]
     for r in ratios(found):
         times = f"{seconds(r.second)} / {seconds(r.first)}"
-        rows.append(f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.note} |")
+        rows.append(
+            f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.of_medians:.3g} | {r.note} |"
+        )
     return "\n".join(rows)
 
 

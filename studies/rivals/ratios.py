@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import statistics
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rivals.race import Line
+from rivals.race import Line, Times
 
 Found = Mapping[str, Sequence[Line]]
 _BOUND = 1e-11
+_LINEAR, _SMOOTH = ("P1", "P2", "two-masses"), ("P1", "P2", "belt", "stribeck")  # scenes that have an aim
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """What is compared on a scene, with the smaller and the larger side's times in seconds, and the aim."""
+    """What is compared on a scene: the least times of both sides in seconds, the ratio of their medians; the aim."""
 
     what: str
     scene: str
     first: float
     second: float
+    of_medians: float
     asked: str
     note: str = ""
 
@@ -37,15 +40,14 @@ def ratios(found: Found) -> list[Ratio]:
         exact, limit, heyoka = by.get("exact"), by.get("closed-form"), by.get("heyoka@1e-12")
         if exact and limit and limit.events and exact.events:
             first, second = limit.events.least, _inside(exact)
+            middle = statistics.median(exact.events.inside) / limit.events.middle
+            aim = "at most 5" if scene in _LINEAR else ""
             result.append(
-                Ratio("kernel of `exact` over the closed form by hand", scene, first, second, "at most 5")
+                Ratio("kernel of `exact` over the closed form by hand", scene, first, second, middle, aim)
             )
         if exact and exact.events and heyoka and heyoka.events:
-            result.append(
-                Ratio(
-                    "heyoka over `exact` in all", scene, exact.events.least, heyoka.events.least, "at least 4"
-                )
-            )
+            aim = "at least 4" if scene in _LINEAR else ""
+            result.append(Ratio("heyoka over `exact` in all", scene, *_times(exact, heyoka), aim))
         tight, rival = _cheapest(lines, "taylor@"), _cheapest(lines, "heyoka@")
         if tight and tight.events and rival and rival.events:
             note = f"{tight.method.label} ({tight.errors.states:.0e}), {rival.method.label} ({rival.errors.states:.0e})"
@@ -53,22 +55,23 @@ def ratios(found: Found) -> list[Ratio]:
                 Ratio(
                     "heyoka over `taylor`, error at most 1e-11",
                     scene,
-                    tight.events.least,
-                    rival.events.least,
-                    "above 1",
+                    *_times(tight, rival),
+                    "above 1" if scene in _SMOOTH else "",
                     note,
                 )
             )
         dop853 = by.get("dop853@1e-09")
         scans = [line for line in lines if line.method.name.startswith("scipy@") and line.errors.right]
         if dop853 and dop853.events and len(scans) > 1:
-            seconds, note = _at_error(scans, dop853.errors.states)
+            seconds, note = _at_error(scans, dop853.errors.states, lambda times: times.least)
+            middle, _ = _at_error(scans, dop853.errors.states, lambda times: times.middle)
             result.append(
                 Ratio(
                     "SciPy restarted over `dop853`, equal error",
                     scene,
                     dop853.events.least,
                     seconds,
+                    middle / dop853.events.middle,
                     "at least 100",
                     note,
                 )
@@ -81,13 +84,18 @@ def ratios(found: Found) -> list[Ratio]:
                 Ratio(
                     "diffrax over `tsit5`, both at 1e-6",
                     scene,
-                    tsit5.events.least,
-                    diffrax.events.least,
+                    *_times(tsit5, diffrax),
                     "above 1",
                     note,
                 )
             )
     return sorted(result, key=lambda ratio: ratio.what)
+
+
+def _times(first: Line, second: Line) -> tuple[float, float, float]:
+    """The least times of both, and the ratio of the medians."""
+    assert first.events is not None and second.events is not None
+    return first.events.least, second.events.least, second.events.middle / first.events.middle
 
 
 def _inside(line: Line) -> float:
@@ -108,10 +116,10 @@ def _cheapest(lines: Sequence[Line], begins: str) -> Line | None:
     return min(good, key=lambda line: line.events.least if line.events else math.inf, default=None)
 
 
-def _at_error(lines: Sequence[Line], error: float) -> tuple[float, str]:
+def _at_error(lines: Sequence[Line], error: float, time: Callable[[Times], float]) -> tuple[float, str]:
     """Seconds at an error: between two settings, or beyond the last two, on a straight line in logarithms."""
     points = sorted(
-        (math.log(line.errors.states), math.log(line.events.least)) for line in lines if line.events
+        (math.log(line.errors.states), math.log(time(line.events))) for line in lines if line.events
     )
     at = math.log(error)
     k = max(0, min(sum(x < at for x, _ in points) - 1, len(points) - 2))
