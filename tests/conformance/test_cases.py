@@ -21,7 +21,7 @@ REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corn
 
 
 NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
-QUICK = {"scipy-dop853", "scipy-rk45"}
+QUICK = {"scipy-dop853"}
 # They step from Python and share all that hybridsim adds to them: every second scene has its turn with one of them,
 # and the rest, some minutes, where slow tests are asked for; `python -m conformance.table` runs all of them as well.
 TURNS = [name for name in NATIVE if name not in QUICK]

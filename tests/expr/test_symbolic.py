@@ -7,7 +7,7 @@ import math
 import pytest
 import sympy
 from expr.strategies import NAMES, tame
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from hybridsim.errors import ExpressionError
 from hybridsim.expr import evaluate, parse
@@ -18,7 +18,6 @@ SYMBOLS = {name: sympy.Symbol(name, real=True) for name in NAMES}
 POINT = {"a": 0.7310586, "b": -0.4142135, "x": 0.9360679, "omega": 0.5772156, "t": -0.3010299}
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # SymPy's time varies widely
 @given(tame)
 def test_same_value_as_the_walk(text: str) -> None:
     expr = parse(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from model.samples import block, everything
 
@@ -244,7 +244,6 @@ TEXTS = [
 SCRAPS = [*"='[]{},.\n\\#xvt0", '"', "-1", "nan", "true", "1e999", "9**9**9"]
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.sampled_from(TEXTS), st.data())
 def test_a_damaged_file_is_a_model_or_a_model_error(text: str, data: st.DataObject) -> None:
     for _ in range(data.draw(st.integers(1, 3))):
@@ -283,7 +282,6 @@ def _inline(value: object) -> str:
     return json.dumps(value)
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.data())
 def test_a_wrong_value_anywhere_is_a_model_or_a_model_error(data: st.DataObject) -> None:
     tables = (
