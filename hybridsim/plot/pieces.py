@@ -47,7 +47,12 @@ class Window:
 
 
 def refuse_arrays(solution: Any) -> None:
-    """Refuse the result of a `MechanicalSystem`, which has no units, no period and no look of its own."""
+    """Refuse what is no solution, and that of a `MechanicalSystem`: it has no units, no period, no look of its own."""
+    if not hasattr(solution, "model"):
+        raise UsageError(
+            f"there is nothing to draw in {type(solution).__name__} {getattr(solution, 'name', '')}".rstrip(),
+            remedy="give what simulate returns: hs.simulate(model, (t0, t1))",
+        )
     if isinstance(solution.model, MechanicalSystem):
         raise UsageError(
             f"{type(solution).__name__} of {solution.model.name} is not drawn by this",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hybridsim.analysis.closed_forms.coulomb_model import recognise
+from hybridsim.errors import UsageError
 from hybridsim.model import Component, Contact, FrictionLaw, Guard, Mode, Model, Output, State
 from hybridsim.model.component import Choice
 
@@ -66,6 +67,8 @@ class FakeSolution:
         return self.states(np.asarray(t, dtype=float), side)
 
     def output(self, name, t, side="+"):
+        if name not in self.outputs:
+            raise UsageError(f"no quantity {name!r}")
         return self.outputs[name](np.asarray(t, dtype=float), side)
 
 

@@ -150,17 +150,27 @@ def test_nothing_global_is_touched() -> None:
 @pytest.mark.parametrize(
     "draw, message",
     [
-        (lambda: time_history(oscillator(2), ["y"]), "no state or output 'y'"),
+        (lambda: time_history(oscillator(2), ["y"]), "has no quantity 'y'"),
         (lambda: time_history(oscillator(2), ["x"], axes=[]), "0 axes"),
         (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside of the run"),
         (lambda: friction_loop(ball()), "no outputs"),
-        (lambda: phase_portrait(oscillator(2), "x", "w"), "no state or output 'w'"),
+        (lambda: phase_portrait(oscillator(2), "x", "w"), "has no quantity 'w'"),
         (lambda: save(phase_portrait(ball()), "picture.jpg"), "picture.jpg"),
+        (lambda: time_history(oscillator(2).model), "nothing to draw in Model"),
     ],
 )
 def test_what_cannot_be_drawn_says_why(draw, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         draw()
+
+
+def test_what_a_surface_switches_can_be_drawn() -> None:
+    """It is neither a state nor an output, and `output` knows it."""
+    solution = hs.simulate("relay-control", (0, 1))
+    assert "u" not in {output.name for output in solution.model.outputs}
+    line = time_history(solution, ["u"]).quantities[0].lines[0]
+    t = line.get_xdata()[1:-1]
+    assert len(t) > 10 and (line.get_ydata()[1:-1] == solution.output("u", t)).all()
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])

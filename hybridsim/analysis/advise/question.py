@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.allowance import Stopwatch
 from hybridsim.analysis.steady.measures import Measures
-from hybridsim.errors import HybridsimError, UsageError, nearest
+from hybridsim.errors import HybridsimError, UsageError, near, nearest
 from hybridsim.model import Model, Output
 
 if TYPE_CHECKING:
@@ -280,7 +280,9 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         )
     head, *rest = quantity.split(".")
     if head not in HEADS:
-        raise UsageError(f"there is no quantity {quantity!r}", remedy=nearest(head, HEADS, kind="quantities"))
+        meant = [".".join((other, *rest)) for other in near(head, HEADS)]
+        named = nearest(quantity, meant) if meant else nearest(head, HEADS, kind="quantities")
+        raise UsageError(f"there is no quantity {quantity!r}", remedy=named)
     if head in OF_RUN and t_span is None:
         raise UsageError(f"{quantity} is of a run, and there is no t_span", remedy="give t_span=(0, ...)")
     if head in OF_MOTION:
@@ -291,8 +293,8 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)
     if not rest or rest[0] not in names:
-        near = nearest(rest[0] if rest else "", names, kind=head)
-        raise UsageError(f"there is no quantity {quantity!r}", remedy=near)
+        remedy = nearest(rest[0] if rest else "", names, kind=head)
+        raise UsageError(f"there is no quantity {quantity!r}", remedy=remedy)
     numbered = head in ("harmonic", "event_time")
     if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
         raise UsageError(
