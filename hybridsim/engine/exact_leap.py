@@ -165,16 +165,14 @@ def room_for(system: Any, tables: Any) -> Room:
 
 
 @inlined
-def grows_beyond_doubles(lin: Any, k: int, s: float) -> bool:
-    """Whether a mode of the motion in row k grows within a time s by more than its coordinate may be too small for.
-
-    Of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one.
-    """
+def length_of_growth(lin: Any, k: int) -> float:
+    """How long the motion in row k may be followed from one point: of exp(2*(t - 400)) nothing is left at t = 0 that
+    could grow to one."""
+    fastest = 0.0
     for j in range(lin.counts[k]):
         few()
-        if lin.values[k, j].real * s > _MOST_GROWTH:
-            return True
-    return False
+        fastest = max(fastest, lin.values[k, j].real)
+    return _MOST_GROWTH / fastest if fastest > 0.0 else math.inf
 
 
 @inlined
@@ -187,7 +185,7 @@ def stopped(hints: Any, k: int, former: Any) -> int:
 def exact_leap(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
 ) -> int:
-    """Go from event to event; returns why it ended: FULL too where guards were followed for a second.
+    """Go from event to event; returns why it ended: FULL too where guards were followed for a second, or after growth.
 
     It is reached by its address, so that it is compiled once for all that go by it. automata, tapes, inputs, state,
     work as for `leap`; lin: tables of linear modes. record: what the segments and events are written to.
@@ -219,10 +217,11 @@ def exact_leap(
             functions_of_time(lin, 0.0, p, work.factors, work.w)
         put(hints[k], former)
         to_modal(lin, k, x, work.w, c)
-        fired, s = first_exit_of(lin, tapes, k, bound, state, room)
+        until = min(bound, length_of_growth(lin, k))
+        fired, s = first_exit_of(lin, tapes, k, until, state, room)
         if fired == _OPEN:
             return stopped(hints, k, former)
-        if s > longest or grows_beyond_doubles(lin, k, s):
+        if s > longest:
             return stopped(hints, k, former)
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
@@ -245,8 +244,13 @@ def exact_leap(
             put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
-            clock[0], clock[1] = target[0], target[1]
             committed[0] = n_segments + 1
+            if until < bound:  # the next leap begins there, with functions of time from there
+                clock[0], clock[1] = moved_on(clock[0], clock[1], s)
+                for g in range(state.sides.shape[0]):
+                    state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
+                return FULL
+            clock[0], clock[1] = target[0], target[1]
             return AT_TARGET
         if is_crowded(s, clock, pace):
             return stopped(hints, k, former)

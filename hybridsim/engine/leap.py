@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import where_it_ends
+from hybridsim.engine.faint_terms import KINDS, where_it_ends
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
@@ -126,7 +126,7 @@ def series_at(
             U[j, k] = V[watched[j], k]
     for j in range(fading.shape[0]):
         for k in range(order + 1):
-            U[watched.shape[0] + j, k] = V[max(fading[j], ~fading[j]), k]
+            U[watched.shape[0] + j, k] = V[fading[j] // KINDS, k]
 
 
 @inlined
@@ -289,7 +289,7 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             for i in range(fading.shape[0]):
-                end = where_it_ends(guard_series[count + i], fading[i] >= 0, order, d)
+                end = where_it_ends(guard_series[count + i], fading[i] % KINDS, order, d)
                 if end < d:
                     d, outcome = end, NEVER
             trials = 0

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.bounds_code import Given
+from hybridsim.engine.faint_terms import EXPONENTIAL, HYPERBOLIC, KINDS, ROOT
 from hybridsim.engine.lean_tape import PAIRED
 from hybridsim.engine.series_code import ModeTape
-from hybridsim.engine.tape import EXP, LESS, SELECT, SINHCOSH, TANGENT
+from hybridsim.engine.tape import EXP, LESS, SELECT, SINHCOSH, SQRT, TANGENT
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
+_KIND = {EXP: EXPONENTIAL, SINHCOSH: HYPERBOLIC, TANGENT: HYPERBOLIC, SQRT: ROOT}
 KNOWN = 32  # times without it that make it worth reading machine code (2 ms): each costs a microsecond
 WORTH = 2000  # times after which there are likely to be as many more as pay for compiling (0.1 s)
 NEVER = -(2**62)  # in place of these times: there is code, or there will be none
@@ -32,7 +34,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
         states=tuple(tape["states"]),
         rates=tuple(lean.derivatives.tolist()),
         guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
-        fading=tuple(max(r, ~r) for r in fading(system, z)),
+        fading=tuple(number // KINDS for number in fading(system, z)),
         holding=frozenset(_holding(system, z)),
     )
 
@@ -62,9 +64,9 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Registers with arguments of what may fade: r of exponentials, ~r of hyperbolic functions."""
+    """Arguments of what may fade, as numbers KINDS r + kind of registers r; see `hybridsim.engine.faint_terms`."""
     rows = _rows(system.lean_tape(z).rows)
-    return list(dict.fromkeys(a if op == EXP else ~a for op, a, b, *_ in rows if _may_fade(op, b)))
+    return list(dict.fromkeys(KINDS * a + _KIND[op] for op, a, b, *_ in rows if _may_fade(op, b)))
 
 
 def most_fading(system: System) -> int:
@@ -74,7 +76,7 @@ def most_fading(system: System) -> int:
 
 
 def _may_fade(op: int, b: int) -> bool:
-    return op in (EXP, SINHCOSH) or (op == TANGENT and b != 0)
+    return op in _KIND and (op != TANGENT or b != 0)
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:

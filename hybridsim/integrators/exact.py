@@ -16,7 +16,7 @@ from hybridsim.engine.system import System
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor import TaylorStepper
 
-_TIGHTEST = 1e-14  # what a series in doubles is asked for
+_TIGHTEST = 1e-15  # what a series in doubles is asked for
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import where_it_ends
+from hybridsim.engine.faint_terms import KINDS, where_it_ends
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
@@ -60,9 +60,9 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
-        for r in self.fading:
-            u = self.series.V[max(r, ~r)]
-            h = min(h, abs(where_it_ends(u, r >= 0, self.series.order, direction * h)))
+        for number in self.fading:
+            u = self.series.V[number // KINDS]
+            h = min(h, abs(where_it_ends(u, number % KINDS, self.series.order, direction * h)))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):

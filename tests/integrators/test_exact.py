@@ -163,3 +163,29 @@ def test_growth_to_the_end_of_doubles_is_told() -> None:
     assert small.success and math.log(small.y[0, -1]) == pytest.approx(800 - 300 * math.log(10), rel=1e-13)
     large = hs.simulate(hs.Model("growth", [hs.State("x", 1, "200*x")]), (0, 4), integrator="exact")
     assert large.status == "step-failure" and "grow without bound" in large.message
+
+
+def test_growth_over_many_stretches_is_the_closed_form() -> None:
+    """x'' - 2 a x' + x = 0 grows by exp(600): its closed form in 40 digits; a fast decay beside it costs nothing."""
+    growth = hs.Model(
+        "growth", [hs.State("x", 1, "v"), hs.State("v", 0, "0.01*v - x"), hs.State("y", 1, "-1e4*y")]
+    )
+    sol = hs.simulate(growth, (0, 120_000), integrator="exact")
+    assert sol.stats["steps"] < 10
+    with mpmath.workdps(40):
+        a = mpmath.mpf(0.01) / 2
+        w = mpmath.sqrt(1 - a * a)
+        for t in (20_000, 60_000, 90_000, 120_000):
+            expected = mpmath.cos(w * t) - a / w * mpmath.sin(w * t)
+            assert float(mpmath.mpf(sol(t)[0]) / mpmath.e ** (a * t) - expected) == pytest.approx(
+                0, abs=1e-10
+            )
+
+
+def test_what_goes_by_series_stays_at_rounding() -> None:
+    """A monitor takes the run out of closed forms: after 4000 turns still cos(t)."""
+    model = hs.Model(
+        "o", [hs.State("x", 1, "v"), hs.State("v", 0, "-x")], monitors=[hs.Monitor("far", "x - 5")]
+    )
+    sol = hs.simulate(model, (0, 25_000), integrator="exact")
+    assert sol.y[0, -1] == pytest.approx(math.cos(25_000), abs=2e-10)
