@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.event_work import LEAP, ROW, called_by
-from hybridsim.engine.few import few, put
+from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address, merged
@@ -42,7 +42,6 @@ from hybridsim.engine.segment_end import (
 )
 
 _NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
-_MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _DONE = -1.0  # in place of a guard's size: its first zero is known
 
 
@@ -165,17 +164,6 @@ def room_for(system: Any, tables: Any) -> Room:
 
 
 @inlined
-def length_of_growth(lin: Any, k: int) -> float:
-    """How long the motion in row k may be followed from one point: of exp(2*(t - 400)) nothing is left at t = 0 that
-    could grow to one."""
-    fastest = 0.0
-    for j in range(lin.counts[k]):
-        few()
-        fastest = max(fastest, lin.values[k, j].real)
-    return _MOST_GROWTH / fastest if fastest > 0.0 else math.inf
-
-
-@inlined
 def stopped(hints: Any, k: int, former: Any) -> int:
     """The segment under way is left to others, or to a leap that begins with it: its zeros have not been met."""
     put(former, hints[k])
@@ -217,7 +205,7 @@ def exact_leap(
             functions_of_time(lin, 0.0, p, work.factors, work.w)
         put(hints[k], former)
         to_modal(lin, k, x, work.w, c)
-        until = min(bound, length_of_growth(lin, k))
+        until = min(bound, lin.lasting[k])
         fired, s = first_exit_of(lin, tapes, k, until, state, room)
         if fired == _OPEN:
             return stopped(hints, k, former)

@@ -18,6 +18,7 @@ from hybridsim.engine.panels import LANES, panels_of, rows_of
 from hybridsim.engine.system import System
 
 _LARGEST = 1e150  # the square of it has a value yet
+_MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 _MOST_BYTES = 1 << 28  # of all of these, but for the last ones
 
@@ -39,7 +40,8 @@ class LinearTables(NamedTuple):
     coefficients of the guards in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J):
     bounds of the guard and of the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds,
     but for a factor. waves (K, G): the modal coordinate that turns without damping, where a guard sees one such and
-    else constants; -1 otherwise.
+    else constants; -1 otherwise. lasting (K,): how long the motion may be followed from one point: of exp(2*(t - 400))
+    nothing is left at t = 0 that could grow to one.
     """
 
     kinds: np.ndarray
@@ -68,6 +70,7 @@ class LinearTables(NamedTuple):
     farthest: np.ndarray
     grown: np.ndarray
     waves: np.ndarray
+    lasting: np.ndarray
 
 
 def no_tables() -> LinearTables:
@@ -79,7 +82,7 @@ def no_tables() -> LinearTables:
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros(0),
     ))  # fmt: skip
     return tables
 
@@ -238,7 +241,13 @@ def of_matrices(
         "farthest": farthest,
         "grown": grown,
         "waves": waves,
+        "lasting": _lasting(flows.values.real.max(axis=1, initial=0.0)),
     }
+
+
+def _lasting(growth: np.ndarray) -> np.ndarray:
+    """The time to grow by as much as leaves both ends within doubles; growth (K,): the fastest rates, 0 for none."""
+    return np.divide(_MOST_GROWTH, growth, out=np.full_like(growth, np.inf), where=growth > 0.0)
 
 
 def horizon_class(horizon: float) -> float:
