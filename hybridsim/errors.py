@@ -165,7 +165,7 @@ class ExpressionError(ModelError):
     ...     hs.Model("m", states=[hs.State("x", 1, "-x*(")]).validate()
     ... except hs.ExpressionError as error:
     ...     print(error.message)
-    not an expression: '(' was never closed
+    State x: der: not an expression: '(' was never closed
     """
 
 

@@ -209,7 +209,7 @@ def test_threads_that_meet_the_same_modes_change_no_bit(integrator: str) -> None
     model = replace(one_way_chain(5), name=f"one-way-{integrator}")
     system = system_of(model)
     vars(system.code)["_shared"].clear()
-    values = {"F": np.linspace(2.5, 6, 16)}
+    values = {"F": np.linspace(2.5, 6, 8)}
     many, one = (
         hs.sweep(model, values, "final", workers=workers, t_span=(0, 60), integrator=integrator)
         for workers in (4, 1)
