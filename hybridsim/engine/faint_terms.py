@@ -22,9 +22,8 @@ _FAINT, _NEAR = 7.0, 4.0
 _FAR_SHARE, _NEAR_SHARE = 0.01, 0.005
 _NOTHING = 745.0  # exp(-745) is the last double
 _ERROR, _SHARE = 0.1, 1e-6  # what the last terms of u may be; or of how far exp(u) is from being a double
-_SHORTEST = (
-    1.0 / 64.0
-)  # share of a step to which they may shorten it: u may have a pole that the rates do not
+# share of a step to which they may shorten it: u may have a pole that the rates do not
+_SHORTEST = 1.0 / 64.0
 _PARTS = 16  # of a step: in each of them u is taken to have one extremum
 _POLISHED = 6  # steps of Newton's method
 _HALVED = 40  # times, at most, between two parts

@@ -26,10 +26,8 @@ from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
-_WITH_UNIT, _JOINED = (
-    re.compile(_NUMBER + r"\s+[A-Za-z]"),
-    re.compile(_NUMBER + "[A-Za-z]"),
-)  # and a word behind it
+# a number and a word behind it
+_WITH_UNIT, _JOINED = re.compile(_NUMBER + r"\s+[A-Za-z]"), re.compile(_NUMBER + "[A-Za-z]")
 _WITHOUT_UNIT = "write the number alone: a unit stands in the field 'unit', and nothing is converted."
 _PRODUCT = "write the number alone, its unit in the field 'unit', or a product with '*', e.g. '2*x'."
 _AS_IN_PYTHON = "write it as in Python, e.g. 'a*sin(omega*t) - c*v'."
