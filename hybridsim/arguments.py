@@ -286,9 +286,9 @@ def time_grid(
         )
     grid = numbers(t_eval, "t_eval", "give times from t0 to t1")
     low, high = min(span), max(span)
-    if not np.isfinite(grid).all() or (len(grid) and (grid.min() < low or grid.max() > high)):
+    if len(grid) and not (grid.min() >= low and grid.max() <= high):
         raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
-    if (np.abs(span[1] - grid) > keep.segments).any():
+    if keep.segments < math.inf and (np.abs(span[1] - grid) > keep.segments).any():
         raise UsageError(
             f"t_eval begins before the last {keep.segments:.9g} of the run, which is what save={save!r} keeps",
             remedy="give later times, or save='all'",

@@ -1,8 +1,8 @@
 """A run that one call of its compiled loop takes from start to end: what it leaves behind is made when it is asked for.
 
 A short run takes no longer in compiled code than Python takes to lay out what happened, and a program that runs the
-same again and again looks at little of it. So the times of events are read from what the loop wrote; whoever asks for
-more gets the record that the mode loop makes of that very call.
+same again and again looks at little of it. So the times of events and the states between them are read from what the loop wrote;
+whoever asks for more gets the record that the mode loop makes of that very call.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import OccurrenceList
-from hybridsim.engine.chain import Chain
+from hybridsim.engine.chain import Chain, SegmentChain
 from hybridsim.engine.hidden_bounces import may_be_hidden
 from hybridsim.engine.jit import Door
 from hybridsim.engine.limits import UNLIMITED
@@ -26,29 +26,30 @@ from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 
 if TYPE_CHECKING:
-    from hybridsim.engine.crossings import Crossings
     from hybridsim.engine.leapt import Leapt
     from hybridsim.engine.pieces import Occurrence
 
 
 class AtOnce(Trajectory):
-    """The record of a finished run; all but the times of its events and its cost is made when somebody asks for it.
+    """The record of a finished run; all but its segments, its events and its cost is made when somebody asks for it.
 
     Parameters
     ----------
-    crossings : makes the occurrences.
+    leapt : the call that was all of the run.
+    segments : makes its segments; None where the whole record is needed for them.
     count : makes the counters.
     make : makes the whole record.
     """
 
     def __init__(
         self,
-        crossings: Callable[[], Crossings | None],
+        leapt: Leapt,
+        segments: Callable[[], SegmentChain] | None,
         count: Callable[[], Counters],
         make: Callable[[], Trajectory],
     ) -> None:
         self.status, self.message = "finished", ""
-        self._crossings, self._count, self._make = crossings, count, make
+        self._leapt, self._segments, self._count, self._make = leapt, segments, count, make
 
     def then(self, last: Callable[[Trajectory], None]) -> None:
         """What is to be done with the whole record, once it is made."""
@@ -67,11 +68,13 @@ class AtOnce(Trajectory):
         if name == "counters":
             self.counters = self._count()
         elif name == "occurrences":
-            happened = self._crossings()
+            happened = self._leapt.crossings
             found: Chain[Occurrence] = Chain(OccurrenceList)
             if happened is not None:
                 found.add(happened)
             self.occurrences = found  # once it is whole: another thread may ask as well
+        elif name == "segments" and self._segments is not None:
+            self.segments = self._segments()
         else:
             vars(self).update(vars(self._make()))
         return getattr(self, name)
@@ -141,4 +144,9 @@ def carried_out(
         leaper.count(leapt, counters)
         return counters
 
-    return AtOnce(lambda: leapt.crossings, counted, made)
+    def between() -> SegmentChain:
+        found = SegmentChain(system)
+        found.add(leaper.segments_of(leapt))
+        return found
+
+    return AtOnce(leapt, None if leapt.ends_in_event or not keep.segments else between, counted, made)

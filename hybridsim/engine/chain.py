@@ -111,6 +111,9 @@ class Chain(Sequence[Item]):
         """Number of the first item of each block, and of all items."""
         return np.cumsum([0, *map(len, self.blocks)])
 
+    def __bool__(self) -> bool:
+        return bool(self.blocks)  # none is empty
+
     def __len__(self) -> int:
         return sum(map(len, self.blocks))
 
@@ -145,11 +148,11 @@ class SegmentChain(Chain[Segment]):
 
     def origins(self) -> np.ndarray:
         """Origins of local time (N, 2)."""
-        return np.concatenate([np.empty((0, 2)), *(block.origins for block in self.blocks)])
+        return _joined([block.origins for block in self.blocks])
 
     def spans(self) -> np.ndarray:
         """First and last local times (N, 2)."""
-        return np.concatenate([np.empty((0, 2)), *(block.spans for block in self.blocks)])
+        return _joined([block.spans for block in self.blocks])
 
     def modes(self) -> np.ndarray:
         """Modes (N, C)."""
@@ -206,3 +209,8 @@ class SegmentChain(Chain[Segment]):
             s.append(times)
             x.append(states)
         return np.concatenate(index), np.concatenate(s), np.concatenate(x)
+
+
+def _joined(pairs: list[np.ndarray]) -> np.ndarray:
+    """Pairs of all blocks (N, 2); those of a single one as they are."""
+    return pairs[0] if len(pairs) == 1 else np.concatenate([np.empty((0, 2)), *pairs])

@@ -118,10 +118,10 @@ class ExactLeaper:
         leapt, self.leapt = self.leapt or self.go(origin, outcome, p, target), None
         if leapt is None:
             return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
-        tables, self.horizon, self.hints = leapt.beside
+        _, self.horizon, self.hints = leapt.beside
         self.count(leapt, record.counters)
         if leapt.count:
-            self._commit(tables, leapt, record)
+            self._commit(leapt, record)
         goes_on = leapt.is_full or leapt.has_news
         end = ARRIVED if leapt.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
         return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
@@ -158,25 +158,27 @@ class ExactLeaper:
         sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
         return sheet
 
-    def _commit(self, tables: LinearTables, leapt: Leapt, record: Trajectory) -> None:
+    def segments_of(self, leapt: Leapt) -> ClosedFormBlock:
+        """The segments of a call that has some, and has let go of none."""
+        ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
+        begun, tables = slice(0, leapt.count), leapt.beside[0]
+        return ClosedFormBlock(
+            self.system,
+            tables,
+            numbers[begun],
+            ends[begun],
+            coordinates[begun],
+            origins[begun],
+            modes[begun],
+            vectors[begun],
+            jumps[begun],
+        )
+
+    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
         """Leave the segments to the trajectory, and the events."""
-        begun, crossings = slice(0, leapt.count), leapt.crossings
         if record.segments.is_end_alone:
             record.segments.keep_only(leapt.last_end)
         else:
-            ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
-            record.segments.add(
-                ClosedFormBlock(
-                    self.system,
-                    tables,
-                    numbers[begun],
-                    ends[begun],
-                    coordinates[begun],
-                    origins[begun],
-                    modes[begun],
-                    vectors[begun],
-                    jumps[begun],
-                )
-            )
-        if crossings is not None:
-            record.occurrences.add(crossings)
+            record.segments.add(self.segments_of(leapt))
+        if leapt.crossings is not None:
+            record.occurrences.add(leapt.crossings)

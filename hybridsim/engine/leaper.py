@@ -288,29 +288,31 @@ class Leaper(ABC):
             self.memory = self.sheet.blank()
         return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
+    def segments_of(self, leapt: Leapt) -> SegmentBlock:
+        """The segments of a call that has some, and has let go of none."""
+        first_step, first = leapt.beside[1], leapt.first
+        lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
+        steps, begun = slice(first_step, first_step + leapt.steps), slice(first, first + leapt.count)
+        ends[first] = 0
+        return self._block(
+            ends[first : first + leapt.count + 1],
+            lengths[steps],
+            series[steps],
+            origins[begun],
+            modes[begun],
+            vectors[begun],
+            jumps[begun],
+        )
+
     def _commit(self, leapt: Leapt, record: Trajectory) -> None:
         """Leave what one call has written to the trajectory: its segments and events."""
-        first_step, first = leapt.beside[1], leapt.first
-        last_step, last = self.used = (first_step + leapt.steps, first + leapt.count + 1)
-        begun, crossings = slice(first, last - 1), leapt.crossings
+        self.used = (leapt.beside[1] + leapt.steps, leapt.first + leapt.count + 1)
         if record.segments.is_end_alone and not self.is_looked_at:
             record.segments.keep_only(leapt.last_end)
         else:
-            lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
-            ends[first] = 0
-            record.segments.add(
-                self._block(
-                    ends[first:last],
-                    lengths[first_step:last_step],
-                    series[first_step:last_step],
-                    origins[begun],
-                    modes[begun],
-                    vectors[begun],
-                    jumps[begun],
-                )
-            )
-        if crossings is not None:
-            record.occurrences.add(crossings)
+            record.segments.add(self.segments_of(leapt))
+        if leapt.crossings is not None:
+            record.occurrences.add(leapt.crossings)
 
 
 _leap = Door(leap)

@@ -94,6 +94,11 @@ class Leapt:
             )
         return self._crossings
 
+    @property
+    def ends_in_event(self) -> bool:
+        """Whether an event ended the last of its segments, so that another state follows at the very same time."""
+        return self.count > 0 and self.events == self.count
+
     def count_in(self, counters: Counters) -> None:
         """Add what every call costs."""
         counters.kernel_time += self.seconds

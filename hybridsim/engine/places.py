@@ -2,9 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from hybridsim.engine.jit import inlined, kernel
+
+
+class Frame(NamedTuple):
+    """Where the segments of a run lie, in the order in which it went.
+
+    starts, ends (N,): times at which each starts and ends, to the last bit that at which the next one starts. origins,
+    spans (N, 2): the instants from which their local times are counted, and their first and last ones.
+    """
+
+    starts: np.ndarray
+    ends: np.ndarray
+    origins: np.ndarray
+    spans: np.ndarray
+
+    @classmethod
+    def of(cls, origins: np.ndarray, spans: np.ndarray, t_end: float) -> Frame:
+        """Of segments, the last of which ends at that time."""
+        starts, ends = np.empty(len(spans)), np.empty(len(spans))
+        _lay_out(origins, spans, t_end, starts, ends)
+        return cls(starts, ends, origins, spans)
+
+
+@kernel
+def _lay_out(origins: Any, spans: Any, t_end: float, starts: Any, ends: Any) -> None:
+    """Sums of three numbers, rounded once."""
+    last = starts.shape[0] - 1
+    for i in range(last + 1):
+        high, low, s = origins[i, 0], origins[i, 1], spans[i, 0]
+        total = high + s
+        moved = total - high
+        starts[i] = total + (((high - (total - moved)) + (s - moved)) + low)
+        if i > 0:
+            ends[i - 1] = starts[i]
+    if last >= 0:
+        ends[last] = t_end
 
 
 @inlined
@@ -13,10 +51,16 @@ def _has_begun(start: float, t: float, sign: float, is_later: bool) -> bool:
 
 
 @inlined
-def _holds(t: float, i: int, starts: Any, sign: float, is_later: bool) -> bool:
-    """Whether it is segment i that holds t."""
-    has_begun = i == 0 or _has_begun(starts[i], t, sign, is_later)
-    return has_begun and (i + 1 == starts.shape[0] or not _has_begun(starts[i + 1], t, sign, is_later))
+def _search(t: float, starts: Any, sign: float, is_later: bool) -> int:
+    """Number of the segment that holds a time."""
+    low, high = 0, starts.shape[0] - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if _has_begun(starts[middle], t, sign, is_later):
+            low = middle
+        else:
+            high = middle - 1
+    return low
 
 
 @kernel
@@ -33,28 +77,30 @@ def find_places(
 ) -> None:
     """Of times (m,) numbers of segments and local times, to index and s (m,).
 
-    starts, ends (N,): where segments start and end, in the order in which the run went. origins, spans (N, 2): of their
-    local times. sign: -1 backward in time. is_later: where one ends and the next one starts, it is the next one. A time
-    that is that of an event, rounded, means the event. Times in a row are found soonest.
+    The next four: see `Frame`. sign: -1 backward in time. is_later: where one ends and the next one starts, it is the
+    next one. A time that is that of an event, rounded, means the event. Times in a row are found soonest.
     """
-    i, last = 0, starts.shape[0] - 1
-    for k in range(times.shape[0]):
-        t = times[k]
-        if not _holds(t, i, starts, sign, is_later):
-            i = min(i + 1, last)
-        if not _holds(t, i, starts, sign, is_later):
-            low, high = 0, last
-            while low < high:
-                middle = (low + high + 1) // 2
-                if _has_begun(starts[middle], t, sign, is_later):
-                    low = middle
-                else:
-                    high = middle - 1
-            i = low
-        at = (t - origins[i, 0]) - origins[i, 1]
-        begin, end = spans[i, 0], spans[i, 1]
-        if t == starts[i] or sign * at < sign * begin:
-            at = begin
-        if t == ends[i] or sign * at > sign * end:
-            at = end
-        index[k], s[k] = i, at
+    i, last, k = 0, starts.shape[0] - 1, 0
+    while k < times.shape[0]:
+        i = min(i + 1, last) if k > 0 else 0
+        is_held = i == 0 or _has_begun(starts[i], times[k], sign, is_later)
+        if not is_held or (i < last and _has_begun(starts[i + 1], times[k], sign, is_later)):
+            i = _search(times[k], starts, sign, is_later)
+        start, end, high, low = starts[i], ends[i], origins[i, 0], origins[i, 1]
+        first, final = spans[i, 0], spans[i, 1]
+        since = sign * start if i > 0 else -math.inf
+        until = sign * starts[i + 1] if i < last else math.inf
+        while True:  # those in a row that it holds
+            t = times[k]
+            at = (t - high) - low
+            if t == start or sign * at < sign * first:
+                at = first
+            if t == end or sign * at > sign * final:
+                at = final
+            index[k], s[k] = i, at
+            k += 1
+            if k == times.shape[0]:
+                break
+            now = sign * times[k]
+            if now < since or now > until or (now == until if is_later else now == since):
+                break

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import allocating_kernel, call
+from hybridsim.engine.eight import WIDTH, load, splat, store
+from hybridsim.engine.jit import allocating_kernel, call, inlined, kernel
 from hybridsim.engine.pieces import Segment, end_point
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
@@ -36,50 +37,77 @@ class SeriesPieces:
         return out
 
 
+@inlined
+def _step_at(steps: Any, first: int, last: int, s: float) -> int:
+    """Which of the steps of a segment, from the first to the last, holds a local time."""
+    while first < last:
+        middle = (first + last + 1) // 2
+        if steps[middle, 0] <= s:
+            first = middle
+        else:
+            last = middle - 1
+    return first
+
+
 @allocating_kernel
 def series_states(
     project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
 ) -> None:
     """States at local times s of the segments of these numbers; see `SeriesBlock`.
 
-    Up to four times that follow each other and lie in one step are taken side by side: none waits for another's sum.
+    Up to eight times that follow each other and lie in one step are taken at once.
     """
     modes, vectors, jumps = record
     n, order = series.shape[1], series.shape[2] - 1
-    x = np.empty((4, n))
-    k, total = 0, s.shape[0]
+    since, x, one = np.empty(WIDTH), np.empty((n, WIDTH)), np.empty(n)
+    k, total, i, step = 0, s.shape[0], -1, 0
     while k < total:
-        i = index[k]
-        first, last = ends[i], ends[i + 1] - 1
-        end = steps[last, 0] + steps[last, 1]
+        if index[k] != i:
+            i = index[k]
+            step, last = ends[i], ends[i + 1] - 1
+            end = steps[last, 0] + steps[last, 1]
         if s[k] >= end:
-            out[k] = jumps[i, 0]
+            for j in range(n):
+                out[k, j] = jumps[i, 0, j]
             k += 1
             continue
-        until = end
-        while first < last:
-            middle = (first + last + 1) // 2
-            if steps[middle, 0] <= s[k]:
-                first = middle
-            else:
-                last, until = middle - 1, steps[middle, 0]
-        begin, count = steps[first, 0], 1
-        while count < 4 and k + count < total and index[k + count] == i and begin <= s[k + count] < until:
+        if step < last and steps[step + 1, 0] <= s[k]:
+            step += 1
+        if s[k] < steps[step, 0] or (step < last and steps[step + 1, 0] <= s[k]):
+            step = _step_at(steps, ends[i], last, s[k])
+        begin, until, count = steps[step, 0], end if step == last else steps[step + 1, 0], 1
+        while (
+            count < WIDTH and k + count < total and index[k + count] == i and begin <= s[k + count] < until
+        ):
             count += 1
-        a, z = s[k] - begin, k + count - 1
-        b, c, d = s[min(k + 1, z)] - begin, s[min(k + 2, z)] - begin, s[z] - begin
-        for j in range(n):
-            at_a = at_b = at_c = at_d = series[first, j, order]
+        for m in range(WIDTH):
+            since[m] = s[k + min(m, count - 1)] - begin
+        d = load(since, 0)
+        for j in range(0, n, 2):  # two at a time: neither waits for the other's sum
+            other = min(j + 1, n - 1)
+            value, beside = splat(series[step, j, order]), splat(series[step, other, order])
             for m in range(order - 1, -1, -1):
-                term = series[first, j, m]
-                at_a, at_b, at_c, at_d = at_a * a + term, at_b * b + term, at_c * c + term, at_d * d + term
-            x[0, j], x[1, j], x[2, j], x[3, j] = at_a, at_b, at_c, at_d
+                value = value * d + splat(series[step, j, m])
+                beside = beside * d + splat(series[step, other, m])
+            store(x, other * WIDTH, beside)
+            store(x, j * WIDTH, value)
         for m in range(count):
             if pinned:
-                call(project, s[k + m], x[m], vectors[i], modes[i], out[k + m])
+                for j in range(n):
+                    one[j] = x[j, m]
+                call(project, s[k + m], one, vectors[i], modes[i], out[k + m])
             else:
-                out[k + m] = x[m]
+                for j in range(n):
+                    out[k + m, j] = x[j, m]
         k += count
+
+
+@kernel
+def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
+    """First and last local times of segments."""
+    for i in range(spans.shape[0]):
+        last = ends[i + 1] - 1
+        spans[i, 0], spans[i, 1] = steps[ends[i], 0], steps[last, 0] + steps[last, 1]
 
 
 @dataclass(frozen=True)
@@ -114,7 +142,9 @@ class SeriesBlock(Sequence[Segment]):
     @cached_property
     def spans(self) -> np.ndarray:
         """Local times of start and end (N, 2)."""
-        return np.stack([self.steps[self.ends[:-1], 0], self.steps[self.ends[1:] - 1].sum(axis=1)], axis=1)
+        spans = np.empty((len(self), 2))
+        _spans_of(self.ends, self.steps, spans)
+        return spans
 
     @property
     def until(self) -> Instant:

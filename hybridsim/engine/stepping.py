@@ -12,6 +12,7 @@ from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.system import System
 
 if TYPE_CHECKING:
+    from hybridsim.engine.blocks import SegmentBlock
     from hybridsim.engine.leapt import Leapt
     from hybridsim.engine.outcome import Outcome
     from hybridsim.engine.timepair import Instant
@@ -234,6 +235,9 @@ class Leaps(Protocol):
 
     def count(self, leapt: Leapt, counters: Counters) -> None:
         """Add what a call has cost."""
+
+    def segments_of(self, leapt: Leapt) -> SegmentBlock:
+        """The segments of a call that has some, and has let go of none."""
 
     def forget_segments(self, leapt: Leapt) -> bool:
         """Let go of the memory that is for segments but for the end of the last one, unless it is needed: then False.

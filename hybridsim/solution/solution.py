@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.places import find_places
+from hybridsim.engine.places import Frame, find_places
 from hybridsim.errors import UsageError, nearest
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval
@@ -87,13 +87,13 @@ class Solution(InTables):
         if self._grid is not None:
             if not self._segments:
                 return self._grid[:0]
-            low, high = sorted((self.t_start, self.t_end))
-            return self._grid[(self._grid >= low) & (self._grid <= high)]
-        index, s, _ = self._knots
-        times = self._origins[index, 0] + (s + self._origins[index, 1])
-        counts = np.bincount(index, minlength=len(self._starts))
+            outside = self._outside(self._grid)
+            return self._grid if outside is None else self._grid[~outside]
+        (index, s, _), (starts, ends, origins, _) = self._knots, self._frame
+        times = origins[index, 0] + (s + origins[index, 1])
+        counts = np.bincount(index, minlength=len(starts))
         last = np.cumsum(counts) - 1
-        times[last - counts + 1], times[last] = self._starts, self._ends  # s is rounded there
+        times[last - counts + 1], times[last] = starts, ends  # s is rounded there
         return times
 
     @cached_property
@@ -197,24 +197,26 @@ class Solution(InTables):
         return found
 
     @cached_property
-    def _origins(self) -> np.ndarray:
-        return self._segments.origins()
+    def _frame(self) -> Frame:
+        segments = self._segments
+        return Frame.of(segments.origins(), segments.spans(), self.t_end)
 
-    @cached_property
-    def _spans(self) -> np.ndarray:
-        return self._segments.spans()
-
-    @cached_property
+    @property
     def _starts(self) -> np.ndarray:
-        (high, low), s = self._origins.T, self._spans[:, 0]
-        total = high + s
-        moved = total - high
-        return total + (((high - (total - moved)) + (s - moved)) + low)
+        return self._frame.starts
 
-    @cached_property
+    @property
     def _ends(self) -> np.ndarray:
-        """Where each segment ends: to the last bit where the next begins."""
-        return np.append(self._starts[1:], self.t_end) if self._segments else self._starts
+        return self._frame.ends
+
+    def _outside(self, times: np.ndarray) -> np.ndarray | None:
+        """Which of some times lie outside of what is kept of the run, or are no numbers; None if none does."""
+        low, high = self.t_start, self.t_end
+        if high < low:
+            low, high = high, low
+        if not len(times) or (times.min() >= low and times.max() <= high):
+            return None
+        return ~((times >= low) & (times <= high))
 
     def _places(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
         """Number of the segment that holds each time, and its local time there."""
@@ -227,17 +229,15 @@ class Solution(InTables):
                 f"the run was made with save={self._save!r}, which keeps no states between the ends",
                 remedy="run it with save='all', or with save='last-period' or a number for the end of it",
             )
-        low, high = sorted((self.t_start, self.t_end))
-        if len(times) and not (times.min() >= low and times.max() <= high):
-            bad = times[~((times >= low) & (times <= high))][0]
+        if (outside := self._outside(times)) is not None:
+            bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
             raise UsageError(f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}")
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)
         index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
-        frame = self._starts, self._ends, self._origins, self._spans
-        find_places(np.ascontiguousarray(times), *frame, sign, later, index, s)
+        find_places(np.ascontiguousarray(times), *self._frame, sign, later, index, s)
         return index, s
 
     def _pieces(
