@@ -1,8 +1,8 @@
 """A run that one call of its compiled loop takes from start to end: what it leaves behind is made when it is asked for.
 
 A short run takes no longer in compiled code than Python takes to lay out what happened, and a program that runs the
-same again and again looks at little of it. So the times of events and the states between them are read from what the loop wrote;
-whoever asks for more gets the record that the mode loop makes of that very call.
+same again and again looks at little of it. So the times of events and the states between them are read from what the
+loop wrote; whoever asks for more gets the record that the mode loop makes of that very call.
 """
 
 from __future__ import annotations

@@ -76,9 +76,7 @@ def series_states(
         if s[k] < steps[step, 0] or (step < last and steps[step + 1, 0] <= s[k]):
             step = _step_at(steps, ends[i], last, s[k])
         begin, until, count = steps[step, 0], end if step == last else steps[step + 1, 0], 1
-        while (
-            count < WIDTH and k + count < total and index[k + count] == i and begin <= s[k + count] < until
-        ):
+        while count < WIDTH and k + count < total and index[k + count] == i and begin <= s[k + count] < until:
             count += 1
         for m in range(WIDTH):
             since[m] = s[k + min(m, count - 1)] - begin

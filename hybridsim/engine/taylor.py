@@ -25,7 +25,7 @@ from hybridsim.engine.high_orders import (
     OVER_C,
     RECIPROCAL,
 )
-from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, inlined, kernel, polynomial_kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -423,9 +423,9 @@ def evaluate_series(V: Any, registers: Any, order: int, d: float, out: Any) -> N
         out[i] = total
 
 
-@kernel
+@polynomial_kernel
 def polynomials(coefficients: Any, d: Any, out: Any) -> None:
-    """out[j, i] = sum_k coefficients[i, k] d[j]**k."""
+    """out[j, i] = sum_k coefficients[i, k] d[j]**k; to the last bit as `hybridsim.engine.series_block` has it."""
     order = coefficients.shape[1] - 1
     for j in range(d.shape[0]):
         for i in range(coefficients.shape[0]):
