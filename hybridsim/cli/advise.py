@@ -103,15 +103,17 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             budget=args.budget,
             progress=progress.of_steps,
         )
-    print(found.to_json() if args.json else found.table())
+    try:  # before anything is printed to a reader who may have gone
+        if args.plot:
+            from hybridsim.plot import advice, save
+
+            save(advice(found), args.plot)
+            session.wrote(args.plot)
+    finally:
+        print(found.to_json() if args.json else found.table())
     if found.region is not None:
         for text, count in found.region.problems():
             complain(f"{count} of {found.region.status.size} points: {text}")
-    if args.plot:
-        from hybridsim.plot import advice, save
-
-        save(advice(found), args.plot)
-        session.wrote(args.plot)
     return 0
 
 

@@ -152,14 +152,16 @@ def _write(
     draw: Any,
     session: Session,
 ) -> None:
-    """Print the result, and fill the folder."""
+    """Fill the folder, and print the result, to a reader who may have gone."""
     from hybridsim.plot import save
 
-    print(result.to_json() if as_json else result.table())
-    folder.mkdir(parents=True, exist_ok=True)
-    result.to_csv(folder / "table.csv")
-    session.wrote(folder / "table.csv")
-    result.to_json(folder / "comparison.json")
-    session.wrote(folder / "comparison.json")
-    save(draw(result), folder / picture)
-    session.wrote(folder / picture)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        result.to_csv(folder / "table.csv")
+        session.wrote(folder / "table.csv")
+        result.to_json(folder / "comparison.json")
+        session.wrote(folder / "comparison.json")
+        save(draw(result), folder / picture)
+        session.wrote(folder / picture)
+    finally:
+        print(result.to_json() if as_json else result.table())

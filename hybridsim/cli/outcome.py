@@ -97,19 +97,20 @@ def limits(args: argparse.Namespace) -> dict[str, Any]:
 def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:
     """Print the summary, write the files; 1 where the simulation did not succeed. Warnings `told` are not repeated."""
     explanations = [solution.explain(number) for number in args.explain]
-    if args.json:
-        print_json(
-            _record(solution) | ({"explanations": [asdict(e) for e in explanations]} if explanations else {})
-        )
-    else:
-        print("\n".join([*_summary(solution), *map(str, explanations)]))
+    try:  # first, since whoever reads the rest may have had enough, as `head` has
+        if solution.t.size:  # else it stopped before the first step, and there is nothing to write
+            _write(solution, args, session)
+        if args.save:
+            solution.save(args.save)
+            session.wrote(args.save)
+    finally:
+        if args.json:
+            more = {"explanations": [asdict(e) for e in explanations]} if explanations else {}
+            print_json(_record(solution) | more)
+        else:
+            print("\n".join([*_summary(solution), *map(str, explanations)]))
     for warning in (one for one in solution.warnings if one not in told):
         complain(f"warning: {warning}")
-    if solution.t.size:  # else it stopped before the first step, and there is nothing to write
-        _write(solution, args, session)
-    if args.save:
-        solution.save(args.save)
-        session.wrote(args.save)
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)

@@ -78,15 +78,17 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             progress=progress,
         )
     record = found.to_dict(args.harmonics)
-    if args.json:
-        print_json(record)
-    else:
-        print("\n".join(_summary(found, record)))
-    if args.plot:
-        from hybridsim.plot import save, time_history
+    try:  # before anything is printed to a reader who may have gone
+        if args.plot:
+            from hybridsim.plot import save, time_history
 
-        save(time_history(found.solution), args.plot)
-        session.wrote(args.plot)
+            save(time_history(found.solution), args.plot)
+            session.wrote(args.plot)
+    finally:
+        if args.json:
+            print_json(record)
+        else:
+            print("\n".join(_summary(found, record)))
     if not found.success:
         print(f"hybridsim: {found.message}", file=sys.stderr)
         return SimulationError.exit_code

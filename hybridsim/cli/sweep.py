@@ -131,8 +131,10 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         raise
     if not result.interrupted:
         journal.unlink()
-    print(result.to_json() if args.json else result.table())
-    _write(result, args.over, folder, session)
+    try:  # before anything is printed to a reader who may have gone
+        _write(result, args.over, folder, session)
+    finally:
+        print(result.to_json() if args.json else result.table())
     for text, count in result.problems():
         complain(f"{count} of {result.status.size} points: {text}")
     if result.interrupted:

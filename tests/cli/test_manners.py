@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -137,6 +138,33 @@ def test_closed_pipe() -> None:
     )
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes break otherwise on Windows")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "dfcs", "--t-end", "0.1", "--json", "--csv", "found.csv"),
+        ("sweep", "dfcs", "F0=10,30", "--workers", "1", "--out", "."),
+        ("steady", "dfcs", "--plot", "found.png"),
+    ],
+    ids=["run", "sweep", "steady"],
+)
+def test_a_reader_who_has_gone_loses_no_file(words: tuple[str, ...], tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "hybridsim", *words],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    os.close(writer)
+    assert done.returncode == 141, done.stderr
+    names = {"found.csv", "found.png", "sweep.csv"} & {path.name for path in tmp_path.iterdir()}
+    assert len(names) == 1
 
 
 def test_ascii_terminal() -> None:
