@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model, load
 
@@ -22,6 +23,7 @@ class Ivp(NamedTuple):
     jac: Function
 
 
+@refusing
 def to_ivp(
     model: Model | str | PathLike[str],
     z: Mapping[str, str] | None = None,

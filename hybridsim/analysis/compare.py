@@ -15,6 +15,7 @@ from hybridsim.analysis.reference import find_reference
 from hybridsim.analysis.regularised import regularised_series
 from hybridsim.analysis.series import Series, choose_series
 from hybridsim.arguments import callback, chosen_model, time_span
+from hybridsim.calls import refusing
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
@@ -24,6 +25,7 @@ TIME = 10.0  # of a model without a period: a few swings of a mechanism of about
 BUDGET = 120.0  # seconds of a comparison that nobody has given any thought
 
 
+@refusing
 def compare(
     model: Model | str | PathLike[str],
     t_span: tuple[float, float] | None = None,

@@ -7,7 +7,8 @@ from dataclasses import MISSING, dataclass, field
 from inspect import Signature, signature
 from typing import Any
 
-from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, near
+from hybridsim.calls import refusal
+from hybridsim.errors import ExpressionError, ModelError, Place, UsageError
 from hybridsim.expr import Expression, of_function, parse
 from hybridsim.model.frozen_map import FrozenMap
 
@@ -30,19 +31,8 @@ class _Refusing(type):
                 takes.bind(*args, **keywords)
             except TypeError as error:
                 names = [name for name in takes.parameters if name != "place"]
-                raise _refusal(cls.__name__, names, keywords, error) from None
+                raise refusal(cls.__name__, names, [k for k in keywords if k != "place"], error) from None
             raise
-
-
-def _refusal(title: str, names: list[str], keywords: Iterable[str], error: TypeError) -> UsageError:
-    """What is wrong with the arguments: an unknown one before a missing one, which may be the same."""
-    takes = f"it takes {', '.join(names)}"
-    for name in keywords:
-        if name not in (*names, "place"):
-            close = near(name, names)
-            remedy = f"did you mean '{close[0]}'? {takes}" if close else takes
-            return UsageError(f"{title} has no argument '{name}'", remedy=remedy)
-    return UsageError(f"{title}: {error}", remedy=takes)
 
 
 @dataclass(frozen=True)

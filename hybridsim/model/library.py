@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from hybridsim.calls import refusing
 from hybridsim.errors import ModelError, Place, UsageError, nearest
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.model import Model
@@ -26,6 +27,7 @@ class ModelInfo:
     path: Path
 
 
+@refusing
 def load(name_or_path: str | os.PathLike[str]) -> Model:
     """Load a model by the name of one that comes with the package, or by the path of a ``.toml`` file.
 
@@ -101,6 +103,7 @@ def list_laws() -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=64)
+@refusing
 def load_law(name: str) -> FrictionLaw:
     """Load a friction law of the package by name, ready for a `Contact`.
 

@@ -17,6 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import whole_file
 
@@ -109,6 +110,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
     return arrays | {_HEADER: np.frombuffer(text.encode(), dtype=np.uint8), _SEAL: seal}
 
 
+@refusing
 def load_solution(path: str | PathLike[str]) -> Solution:
     """Read a solution that `Solution.save` wrote.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.calls import refusing
 from hybridsim.engine.places import Frame, find_places
 from hybridsim.errors import UsageError, nearest
 from hybridsim.solution.by_name import ByName
@@ -131,6 +132,7 @@ class Solution(InTables):
         x = self._segments.states(*self._places(times, side))
         return x[0] if np.ndim(t) == 0 else x.T
 
+    @refusing
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
         """A named quantity over time: a state, an output, an input, a definition, a variable of a mode such as a force.
 
@@ -294,6 +296,7 @@ class Solution(InTables):
 
         return explain(self, number)
 
+    @refusing
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
         self._require_events()
@@ -407,6 +410,7 @@ class Solution(InTables):
 
         save(self, path)
 
+    @refusing
     def resume(
         self,
         t_end: float | None = None,

@@ -22,6 +22,7 @@ from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.race import Budget
 from hybridsim.analysis.rungs import LADDER, Rung
 from hybridsim.analysis.wanted import positive, words
+from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 
@@ -33,6 +34,7 @@ _FINER = 1e-6  # of the tolerance: verdicts are then wrong only for errors that 
 _ACCURACY = (1e-10, 1e-6)  # bounds of what is asked of the runs
 
 
+@refusing
 def advise(
     model: Model | str | PathLike[str],
     quantity: str | Callable[[Any], Any],

@@ -20,6 +20,7 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class _Closing:
     jacobian: np.ndarray  # (n + d [+ 1], n + d [+ 1] + 1): by start, period where it is free, parameter
 
 
+@refusing
 def continuation(
     model: Model | str | PathLike[str],
     parameter: str,

@@ -13,6 +13,7 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven
 from hybridsim.analysis.equilibria.linearize import equilibrium_near
+from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class Equilibrium:
         return bool((self.low == self.high).all())
 
 
+@refusing
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:

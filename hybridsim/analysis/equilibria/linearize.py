@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
+from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ class Linearization:
         return -pairs.real / np.abs(pairs)
 
 
+@refusing
 def linearize(
     model: Model | str | PathLike[str],
     mode: Mapping[str, str] | str | None = None,

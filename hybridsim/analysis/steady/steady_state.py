@@ -19,6 +19,7 @@ from hybridsim.analysis.steady.settling import Passings, died_out, forced_passin
 from hybridsim.analysis.steady.shooting import Orbit, shoot
 from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.variations.sizes import ranges
+from hybridsim.calls import refusing
 from hybridsim.engine.recent import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
@@ -48,6 +49,7 @@ PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
 )
 
 
+@refusing
 def steady_state(
     model: Model | str | PathLike[str],
     *,

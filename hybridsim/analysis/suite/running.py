@@ -16,6 +16,7 @@ from hybridsim.analysis.series import Series, choose_series
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
 from hybridsim.arguments import callback
+from hybridsim.calls import refusing
 from hybridsim.engine.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import load
@@ -32,6 +33,7 @@ class _TooSlow(Exception):
     """A reference has used up its time."""
 
 
+@refusing
 def compare_suite(
     *,
     scenes: Sequence[str] | None = None,

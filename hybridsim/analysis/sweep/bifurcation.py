@@ -19,6 +19,7 @@ from hybridsim.analysis.sweep.section import Section, with_section
 from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import positive, whole
 from hybridsim.arguments import callback, chosen_model
+from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 from hybridsim.model.units import units_of
@@ -46,6 +47,7 @@ class _Branches:
         return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
 
 
+@refusing
 def bifurcation(
     model: Model | str | PathLike[str],
     parameter: str,

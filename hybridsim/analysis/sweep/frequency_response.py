@@ -10,10 +10,12 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
 from hybridsim.analysis.wanted import mapping
 from hybridsim.arguments import chosen_model
+from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 
+@refusing
 def frequency_response(
     model: Model | str | PathLike[str],
     frequencies: Sequence[Any],

@@ -21,10 +21,12 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import whole
 from hybridsim.arguments import callback, chosen_model
+from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 
+@refusing
 def sweep(
     model: Model | str | PathLike[str],
     values: Mapping[str, Sequence[Any]],

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused_limits import refuse_limits
+from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Sensitivities:
     times_by_parameter: np.ndarray
 
 
+@refusing
 def sensitivities(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
