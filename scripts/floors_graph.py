@@ -24,6 +24,7 @@ PACKAGE = ROOT / "hybridsim"
 PLACES = {
     "errors": (0, 0.0),
     "files": (1, 2.2),
+    "calls": (1, -2.2),
     "expr": (1, 0.0),
     "model": (2, 0.0),
     "engine": (3, 0.0),

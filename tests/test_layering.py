@@ -19,6 +19,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     "errors",
     "files",
+    "calls",
     "expr",
     "model",
     "engine",
