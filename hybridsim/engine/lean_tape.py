@@ -17,9 +17,11 @@ import numpy as np
 from hybridsim.engine.tape import (
     ABS,
     ADD,
+    AGREEING,
     COPY,
     DIV,
     EXP,
+    LESS,
     MUL,
     NEG,
     NOT,
@@ -148,11 +150,16 @@ def lean(
 def has_corners(tape: dict[str, Any]) -> bool:
     """Whether a corner or a jump (abs, min, max, sign, a condition) depends on what moves, in any mode."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
+    agreeing = set()
     for _, branches in tape["parts"]:
         for op, *given, out in (row for branch in branches for row in branch):
             kinds = [kind.get(r, CONSTANT) for r in given[: _registers(op)]]
             deciding = kinds[:1] if op == SELECT else kinds
-            if op >= ABS and max(deciding) != CONSTANT:
+            if op == LESS and given[2] == AGREEING:
+                agreeing.add(out)
+            elif op == SELECT and given[0] in agreeing:
+                pass
+            elif op >= ABS and max(deciding) != CONSTANT:
                 return True
             kind[out] = max(_kind(op, kinds), kind.get(out, CONSTANT))
             if op in PAIRED:

@@ -38,7 +38,7 @@ from hybridsim.engine.lean_tape import (
     SUB_CONSTANT,
     needed_rows,
 )
-from hybridsim.engine.tape import ADD, COPY, DIV, EXP, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
+from hybridsim.engine.tape import ADD, COPY, DIV, EXP, LESS, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
 from hybridsim.engine.taylor import EXACTLY
 
 # A function of so many lines is compiled in half a second; a longer one is left to the interpreter.
@@ -49,7 +49,7 @@ _COMMUTES = ("fadd", "fmul")
 ZERO, ONE, NAN, INF = "0.0", "1.0", "0x7FF8000000000000", "0x7FF0000000000000"
 KNOWN = frozenset(
     (
-        COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT,
+        COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
         ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR,
     )
 )  # fmt: skip
@@ -272,6 +272,8 @@ class _Expansion(Lines):
             return (u,)
         if op == NEG:
             return (self.negative(u),)
+        if op == LESS:
+            return (self.choice("olt", u, self.at(b, 0), ONE, ZERO) if k == 0 else ZERO,)
         if op == SELECT and a in self.tape.holding:
             return (self.at(b, k),)
         if op == SELECT:

@@ -15,6 +15,8 @@ from hybridsim.expr.grammar import WHOLE_POWERS
 # Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
 COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
 SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, EQUAL = range(10, 23)
+# what LESS has in c where what is chosen by it is one function on both sides
+AGREEING = 1
 # how INTEGRAL finds its own leading coefficient from the argument c
 LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
@@ -99,11 +101,16 @@ class TapeBuilder:
         if e.is_Mul:
             # negative powers only: exp(-u) over one would be infinite where it is nothing
             below = [a for a in e.args if a.is_Pow and a.exp.is_number and a.exp.is_negative]
+            saturating = [a for a in below if _grows_without_bound(a.base, a.exp)]
             numerator = sp.Mul(*(a for a in e.args if a not in below))
-            denominator = sp.Mul(*(1 / a for a in below))
-            if denominator != 1 and not denominator.is_number:
-                a, b = self._emit(numerator, known, rows), self._emit(denominator, known, rows)
-                return self._op(rows, DIV, a, b)
+            denominator = sp.Mul(*(1 / a for a in below if a not in saturating))
+            if saturating or (denominator != 1 and not denominator.is_number):
+                out = self._emit(numerator, known, rows)
+                for a in saturating:
+                    out = self._op(rows, MUL, out, self._emit(a, known, rows))
+                if denominator == 1:
+                    return out
+                return self._op(rows, DIV, out, self._emit(denominator, known, rows))
             if e.could_extract_minus_sign() and e.args[0] is sp.S.NegativeOne:
                 return self._op(rows, NEG, self._emit(-e, known, rows))
         out = -1
@@ -120,6 +127,8 @@ class TapeBuilder:
         self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
         """Whole and half powers as products of the base or its root, so that they have a value at 0 and below."""
+        if _grows_without_bound(base, exponent):
+            return self._products(self._over(base, known, rows), -int(exponent), known, rows)
         source = self._emit(base, known, rows)
         twice = 2.0 * float(exponent) if exponent.is_number else 0.5
         if twice.is_integer() and abs(twice) <= 2 * _MAX_INTEGER_POWER:
@@ -137,6 +146,26 @@ class TapeBuilder:
         ):
             return power
         return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
+
+    def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        """1/(c + d e^u) and 1/cosh(u), which are nothing where the exponential is infinite, by q = e^-|u|."""
+
+        found = _with_exponential(base)
+        rest, factor, u = found or (None, None, base.args[0])
+        exponent, one = self._emit(u, known, rows), self._constant(1.0)
+        is_large = self._op(rows, LESS, self._constant(0.0), exponent, AGREEING)
+        q = self._op(rows, EXP, self._op(rows, SELECT, is_large, self._op(rows, NEG, exponent), exponent))
+        if found is None:
+            below = self._op(rows, ADD, one, self._op(rows, MUL, q, q))
+            return self._op(rows, DIV, self._op(rows, ADD, q, q), below)
+        c, d = self._emit(rest, known, rows), self._emit(factor, known, rows)
+        large = self._op(rows, ADD, self._op(rows, MUL, c, q), d)
+        small = self._op(rows, ADD, c, self._op(rows, MUL, d, q))
+        above, below = (
+            self._op(rows, SELECT, is_large, q, one),
+            self._op(rows, SELECT, is_large, large, small),
+        )
+        return self._op(rows, DIV, above, below)
 
     def _whole(
         self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
@@ -235,3 +264,29 @@ class TapeBuilder:
             # on the unit circle turned by the leading angle the rest is an ordinary arc tangent
             return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)
         raise NotImplementedError(f"no Taylor recurrence for {kind}")
+
+
+def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
+    """(c, d, u) of a sum c + d e^u in which nothing else grows as fast; None of anything else."""
+    import sympy as sp
+
+    if not base.is_Add:
+        return None
+    growing = [term for term in base.args if term.has(sp.exp, sp.sinh, sp.cosh)]
+    if len(growing) != 1 or len(base.args) == 1:
+        return None
+    factors = sp.Mul.make_args(growing[0])
+    exponentials = [factor for factor in factors if isinstance(factor, sp.exp)]
+    others = [factor for factor in factors if not isinstance(factor, sp.exp)]
+    if len(exponentials) != 1 or any(factor.has(sp.exp, sp.sinh, sp.cosh) for factor in others):
+        return None
+    rest = sp.Add(*(term for term in base.args if term is not growing[0]))
+    return rest, sp.Mul(*others), exponentials[0].args[0]
+
+
+def _grows_without_bound(base: Any, exponent: Any) -> bool:
+    """Whether a power is one over what has no series where an exponential in it is infinite, and is nothing there."""
+    import sympy as sp
+
+    is_below = exponent.is_Integer and exponent.is_negative
+    return bool(is_below and (isinstance(base, sp.cosh) or _with_exponential(base) is not None))
