@@ -49,9 +49,12 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             ]
         )
         return 0
+    _paragraph(f"What a model may need: {', '.join(CAPABILITIES)}.", indent="")
+    print()
+    lacking = [[c for c in CAPABILITIES if c in each.lacks] for each in found]
     print_table(
-        ("INTEGRATOR", *CAPABILITIES),
-        [(each.name, *("-" if c in each.lacks else "yes" for c in CAPABILITIES)) for each in found],
+        ("INTEGRATOR", "LACKS"),
+        [(each.name, ", ".join(lacks) or "nothing") for each, lacks in zip(found, lacking, strict=True)],
     )
     for each in found:
         options = options_of(each)
@@ -84,5 +87,5 @@ def _options(options: tuple[Option, ...]) -> None:
         _paragraph(option.text)
 
 
-def _paragraph(text: str) -> None:
-    print(textwrap.fill(text, width=100, initial_indent="    ", subsequent_indent="        "))
+def _paragraph(text: str, indent: str = "    ") -> None:
+    print(textwrap.fill(text, width=100, initial_indent=indent, subsequent_indent=2 * indent))

@@ -116,7 +116,7 @@ class Model(Declared):
         self._named("parameters", Parameter)
         self._named("discrete", Discrete)
         self._named("outputs", Output)
-        self._texts("name")
+        self._texts("name", "title", "source", "description", "look")
         self._expressions("duration")
         for field, kind in _PARTS.items():
             self._parts(field, kind)

@@ -42,7 +42,7 @@ class Parameter(Declared):
     title: str = ""
 
     def __post_init__(self) -> None:
-        self._texts("name")
+        self._texts("name", "unit", "title")
         self._expressions("value")
 
 
@@ -81,7 +81,7 @@ class State(Declared):
     nominal: float | None = None
 
     def __post_init__(self) -> None:
-        self._texts("name")
+        self._texts("name", "unit")
         self._expressions("start", "der")
         nominal: object = self.nominal
         if not (nominal is None or isinstance(nominal, Real)):
@@ -116,7 +116,7 @@ class Discrete(Declared):
     unit: str = ""
 
     def __post_init__(self) -> None:
-        self._texts("name")
+        self._texts("name", "unit")
         self._expressions("start")
 
 
@@ -152,6 +152,6 @@ class Output(Declared):
     modes: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
-        self._texts("name")
+        self._texts("name", "unit")
         self._expressions("expr", functions=True)
         self._maps("modes")
