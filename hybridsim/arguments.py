@@ -64,6 +64,22 @@ def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
     return np.array([number(item, f"a value of {what}", remedy) for item in value], dtype=float)
 
 
+def as_times(t: Any) -> np.ndarray:
+    """One time, or times in a row, as (k,)."""
+    remedy = "give a time, or times in a row"
+    try:
+        found = np.asarray(t)
+    except ValueError:  # rows of different lengths
+        raise UsageError(f"t is {t!r}", remedy=remedy) from None
+    if found.dtype.kind == "O" and found.ndim == 1:
+        return numbers(found.tolist(), "t", remedy)
+    if found.dtype.kind == "O" and found.ndim == 0:
+        return np.array([number(t, "t", remedy)])
+    if found.dtype.kind not in "iuf" or found.ndim > 1:
+        raise UsageError(f"t is {t!r}", remedy=remedy)
+    return np.atleast_1d(found.astype(float, copy=False))
+
+
 def chosen_model(model: Any, params: Any) -> Model:
     """The model itself, or loaded by its name or path, with parameters changed."""
     if not isinstance(model, Model):

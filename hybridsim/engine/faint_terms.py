@@ -11,7 +11,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.jit import inlined, kernel
+import numpy as np
+
+from hybridsim.engine.first_exit import to_bernstein
+from hybridsim.engine.jit import allocating_kernel, call_apart, inlined, kernel
 
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
 # Where exp(u) changes by a factor of exp(8) or less within a step its series shows it.
@@ -24,8 +27,10 @@ _NOTHING = 745.0  # exp(-745) is the last double
 _ERROR, _SHARE = 0.1, 1e-6  # what the last terms of u may be; or of how far exp(u) is from being a double
 # share of a step to which they may shorten it: u may have a pole that the rates do not
 _SHORTEST = 1.0 / 64.0
-_PARTS = 16  # of a step: in each of them u is taken to have one extremum
-_POLISHED = 6  # steps of Newton's method
+# halvings of a step, and pieces that are looked at: u has as many extrema as its order has, at most
+_DEEPEST, _MOST_PIECES = 40, 400
+_ROUNDING = 1e-15  # of the slope, in shares of the sum of its terms
+_POLISHED, _CLOSE = 60, 1e-12  # steps towards an extremum, and when it is near enough
 _HALVED = 40  # times, at most, between two parts
 
 
@@ -66,7 +71,6 @@ def where_it_ends(u: Any, kind: int, order: int, h: float) -> float:
     """
     if kind == ROOT:
         return where_a_root_ends(u, order, h)
-    is_exponential = kind == EXPONENTIAL
     change, turn, last = _sizes(u, order, h)
     if not change > _SEEN:
         return h
@@ -79,24 +83,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float) -> float:
     comes_near = start > _FAINT and start - change < low
     if not change > _SEEN or start - change > _NOTHING or (turn < abs(u[1] * h) and not comes_near):
         return h
-    sign = 1.0 if u[0] > 0.0 else -1.0
-    part = h / _PARTS
-    before, here = u[0] - u[1] * part, u[0]  # as if it went straight on beyond both ends
-    for j in range(1, _PARTS + 2):
-        after = _value(u, order, j * part) if j <= _PARTS else here + _slope(u, order, h) * part
-        # an extremum about the point before this one
-        rises, falls = before < here >= after, before > here <= after
-        if (here <= 0.0 and rises) or (here > 0.0 and (falls or (is_exponential and rises))):
-            d = _extremum(u, order, (j - 1) * part, abs(part))
-            value, is_within = _value(u, order, d), d * h > 0.0 and abs(d) < abs(h)
-            if is_within and start > _FAINT and sign * value < low:
-                return _becomes_near(u, order, sign, high, low, max(j - 2, 0) * part, d)
-            if is_within and (start - abs(value) > _SEEN or (is_exponential and value - u[0] > _SEEN)):
-                return d
-        if j <= _PARTS and start > _FAINT and sign * after < low:
-            return _becomes_near(u, order, sign, high, low, (j - 1) * part, j * part)
-        before, here = here, after
-    return h
+    return call_apart(_first_place, (u, order, h, kind, high, low))
 
 
 @kernel
@@ -106,30 +93,102 @@ def where_a_root_ends(u: Any, order: int, h: float) -> float:
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
         return h
-    part = h / _PARTS
-    before, here = u[0] - u[1] * part, u[0]
-    for j in range(1, _PARTS + 2):
-        after = _value(u, order, j * part) if j <= _PARTS else here + _slope(u, order, h) * part
-        if before > here <= after:
-            d = _extremum(u, order, (j - 1) * part, abs(part))
-            if d * h > 0.0 and abs(d) < abs(h) and _value(u, order, d) < low:
-                return _becomes_near(u, order, 1.0, high, low, max(j - 2, 0) * part, d)
-        before, here = here, after
+    return call_apart(_first_place, (u, order, h, ROOT, high, low))
+
+
+@allocating_kernel
+def _first_place(u: Any, order: int, h: float, kind: int, high: float, low: float) -> float:
+    """The first place in a step h at which it has to end, or h: from piece to piece on which u rises or falls.
+
+    The slope is isolated in Bernstein form: where its coefficients change their sign at most once, so does it.
+    """
+    start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
+    is_far = start > _FAINT and kind != ROOT
+    a, stack = np.empty(order), np.empty((_DEEPEST + 2, order + 2))
+    power, size = 1.0, 0.0
+    for k in range(order):
+        a[k] = (k + 1.0) * u[k + 1] * power
+        size += abs(a[k])
+        power *= h
+    to_bernstein(a, stack[0, :order])
+    stack[0, order], stack[0, order + 1] = 0.0, 1.0
+    top = 1
+    for _ in range(_MOST_PIECES):
+        if top == 0:
+            return h
+        top -= 1
+        left, width = stack[top, order], stack[top, order + 1]
+        changes, rises = _changes(stack[top, :order], _ROUNDING * size)
+        if changes > 1 and width > 2.0**-_DEEPEST:
+            _halve(stack, top, order, a)
+            top += 2
+            continue
+        near, far = left * h, (left + width) * h
+        if changes > 0:
+            d = _extremum(u, order, near, far, rises)
+            value = _value(u, order, d)
+            if (is_far or (kind == ROOT and not rises)) and sign * value < low:
+                return _becomes_near(u, order, sign, high, low, near, d)
+            is_nearest = rises if value <= 0.0 else not rises or kind == EXPONENTIAL
+            is_seen = start - abs(value) > _SEEN or (kind == EXPONENTIAL and value - u[0] > _SEEN)
+            if kind != ROOT and is_nearest and is_seen and 0.0 < abs(d) < abs(h):
+                return d
+            near = d
+        if is_far and sign * _value(u, order, far) < low:
+            return _becomes_near(u, order, sign, high, low, near, far)
     return h
 
 
 @inlined
-def _extremum(u: Any, order: int, near: float, width: float) -> float:
-    """Where the slope of u is zero, not farther than a width from a place."""
-    d = near
+def _changes(b: Any, rounding: float) -> tuple[int, bool]:
+    """How often Bernstein coefficients beyond rounding change their sign; whether they begin positive."""
+    changes, last, first = 0, 0.0, 0.0
+    for i in range(b.shape[0]):
+        if abs(b[i]) > rounding:
+            if first == 0.0:
+                first = b[i]
+            if last * b[i] < 0.0:
+                changes += 1
+            last = 1.0 if b[i] > 0.0 else -1.0
+    return changes, first > 0.0
+
+
+@inlined
+def _halve(stack: Any, top: int, m: int, b: Any) -> None:
+    """The piece in a row of the stack in its two halves, the left one above the right one; b (m,): room."""
+    left, width = stack[top, m], 0.5 * stack[top, m + 1]
+    for i in range(m):
+        b[i] = stack[top, i]
+    for step in range(m):
+        stack[top + 1, step] = b[0]
+        stack[top, m - 1 - step] = b[m - 1 - step]
+        for i in range(m - 1 - step):
+            b[i] = 0.5 * (b[i] + b[i + 1])
+    stack[top, m], stack[top, m + 1] = left + width, width
+    stack[top + 1, m], stack[top + 1, m + 1] = left, width
+
+
+@inlined
+def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float:
+    """Where the slope of u changes its sign between two places: by Newton's method, by bisection where it leads out."""
+    d = 0.5 * (near + far)
     for _ in range(_POLISHED):
         slope, bend = 0.0, 0.0
         for k in range(order, 0, -1):
             bend = bend * d + slope
             slope = slope * d + k * u[k]
-        if bend != 0.0:
-            d -= slope / bend
-        d = min(max(d, near - width), near + width)
+        if slope == 0.0:
+            return d
+        if (slope * (far - near) > 0.0) == rises:
+            near = d
+        else:
+            far = d
+        moved = d - slope / bend if bend != 0.0 else d
+        if not min(near, far) < moved < max(near, far):
+            moved = 0.5 * (near + far)
+        if abs(moved - d) <= _CLOSE * abs(d):
+            return moved
+        d = moved
     return d
 
 

@@ -19,6 +19,7 @@ from hybridsim.engine.system import System
 
 _LARGEST = 1e150  # the square of it has a value yet
 _MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
+_PARTING = 2.0  # exponent by which coordinates of one block may grow apart
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 _MOST_BYTES = 1 << 28  # of all of these, but for the last ones
 
@@ -241,13 +242,28 @@ def of_matrices(
         "farthest": farthest,
         "grown": grown,
         "waves": waves,
-        "lasting": _lasting(flows.values.real.max(axis=1, initial=0.0)),
+        "lasting": np.array(
+            [_lasting(*row) for row in zip(flows.values.real, flows.ends, flows.counts, strict=True)]
+        ),
     }
 
 
-def _lasting(growth: np.ndarray) -> np.ndarray:
-    """The time to grow by as much as leaves both ends within doubles; growth (K,): the fastest rates, 0 for none."""
-    return np.divide(_MOST_GROWTH, growth, out=np.full_like(growth, np.inf), where=growth > 0.0)
+def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
+    """The time to grow by as much as leaves both ends within doubles, and no part of a block to its rounding.
+
+    Coordinates of one block are known to rounding of the largest of them. One that grows faster than others, as a load
+    does that is nothing yet, would make of that rounding what it makes of itself.
+    """
+    lasting, j = np.inf, 0
+    while j < count:
+        block = rates[j : ends[j]]
+        fastest, slowest = block.max(), max(block.min(), 0.0)
+        if fastest > 0.0:
+            lasting = min(lasting, _MOST_GROWTH / fastest)
+        if fastest > slowest:
+            lasting = min(lasting, _PARTING / (fastest - slowest))
+        j = ends[j]
+    return float(lasting)
 
 
 def horizon_class(horizon: float) -> float:

@@ -17,6 +17,8 @@ from hybridsim.engine.jit import kernel
 
 _CONDITION = 1e3  # of the basis, at most: so many roundings of the state does the change of basis cost
 _SWEEPS = 8  # of balancing
+_TINY = 1e-9  # of the largest entry of a row: rounding, where there should be none
+_ALIKE = 1e-3  # eigenvalues that differ by less may be those of either
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ def _by_blocks(balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, sc
             if cluster not in known:
                 known[cluster] = _block(balanced, cluster, values, partners)
         blocks = [known[cluster] for cluster in clusters]
-    return _joined(clusters, blocks, scale)
+    return _joined(balanced, clusters, blocks, scale)
 
 
 def _partners(values: np.ndarray) -> list[int]:
@@ -274,25 +276,57 @@ def _block(
 
 
 def _joined(
-    clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]], scale: np.ndarray
+    A: np.ndarray, clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]], scale: np.ndarray
 ) -> Modal:
     """All blocks as arrays, one for each pair of conjugates."""
     inverse = np.linalg.inv(_full(clusters, blocks))
+    seen, moved = _supports(A, [np.diag(block) for block, _ in blocks])
     kept = sum(len(block) for block, _ in blocks)
     values, ends = np.empty(kept, dtype=complex), np.empty(kept, dtype=np.int64)
     upper = np.zeros((kept, kept), dtype=complex)
     basis, rows = np.empty((len(scale), kept), dtype=complex), np.empty((kept, len(scale)), dtype=complex)
     growth, speeds = np.empty(kept), np.empty(kept)
     at = source = 0
-    for cluster, (block, vectors) in zip(clusters, blocks, strict=True):
+    for b, (cluster, (block, vectors)) in enumerate(zip(clusters, blocks, strict=True)):
         size = len(block)
         if size == 0:  # two orders of arithmetic tell eigenvalues that nearly coincide apart differently
             continue
         here = slice(at, at + size)
         values[here], ends[here], upper[here, here] = np.diag(block), at + size, np.triu(block, 1)
-        basis[:, here] = vectors if cluster.folded else 2.0 * vectors
-        rows[here] = inverse[source : source + size]
+        basis[:, here] = _without_rounding(vectors.T, moved[b]).T * (1.0 if cluster.folded else 2.0)
+        rows[here] = _without_rounding(inverse[source : source + size], seen[b])
         growth[here] = np.linalg.eigvalsh(0.5 * (block + block.conj().T)).max()
         speeds[here] = np.linalg.norm(block, 2)
         at, source = at + size, source + (size if cluster.folded else 2 * size)
     return Modal(values, upper, ends, basis * scale[:, None], rows / scale[None, :], growth, speeds)
+
+
+def _supports(A: np.ndarray, blocks: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Which variables the coordinates of each block are made of, and which they move (blocks, m).
+
+    blocks: eigenvalues. A group of variables that depend on each other has eigenvalues of its own; their coordinates
+    are made of the group and of what it depends on, and move what depends on it.
+    """
+    m = len(A)
+    depends = (A != 0.0) | np.eye(m, dtype=bool)
+    for _ in range(max(m - 1, 1).bit_length()):
+        depends = depends @ depends
+    seen, moved = np.zeros((len(blocks), m), dtype=bool), np.zeros((len(blocks), m), dtype=bool)
+    tied = depends & depends.T
+    for i in range(m):
+        group = np.flatnonzero(tied[i])
+        if i != group[0]:
+            continue
+        for value in np.linalg.eigvals(A[np.ix_(group, group)]):
+            far = [np.abs(np.append(block, block.conj()) - value).min(initial=np.inf) for block in blocks]
+            near = np.array(far) <= max(min(far), _ALIKE * abs(value))
+            seen[near] |= depends[i]
+            moved[near] |= depends[:, i]
+    return seen, moved
+
+
+def _without_rounding(rows: np.ndarray, support: np.ndarray) -> np.ndarray:
+    """Rows whose entries outside of their support are nothing: exponentials would make something of their rounding."""
+    sizes = np.abs(rows)
+    is_rounding = ~support & (sizes < _TINY * sizes.max(axis=1, keepdims=True, initial=0.0))
+    return np.where(is_rounding, 0.0, rows)

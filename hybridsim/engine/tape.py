@@ -149,7 +149,6 @@ class TapeBuilder:
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         """1/(c + d e^u) and 1/cosh(u), which are nothing where the exponential is infinite, by q = e^-|u|."""
-
         found = _with_exponential(base)
         rest, factor, u = found or (None, None, base.args[0])
         exponent, one = self._emit(u, known, rows), self._constant(1.0)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
+from hybridsim.arguments import as_times
 from hybridsim.errors import UsageError
 from hybridsim.solution.in_tables import InTables
 from hybridsim.solution.solution import Solution
@@ -104,7 +105,7 @@ class ArraysResult(InTables):
 
     def _within(self, t: Any) -> np.ndarray:
         """Times (k,) out of a number or an array of them, all of which lie in the run."""
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = as_times(t)
         inside = (times >= self.t_start) & (times <= self.t_end)
         if not inside.all():
             bad = float(times[~inside][0])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from hybridsim.arguments import as_times
 from hybridsim.engine.packs import packed
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LOST
@@ -154,7 +155,7 @@ class MechanicalSolution(ArraysResult):
         t : a number or an array of times; without it ``sol.t``.
         """
         given = self.t if t is None else t
-        times = np.atleast_1d(np.asarray(given, dtype=float))
+        times = as_times(given)
         if name in self.names:
             values = self(times, side)[self.names.index(name)]
         else:

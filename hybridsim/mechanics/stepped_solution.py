@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.arguments import as_times
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.stepped_kernels import BOUNCES, STEPS, SWEEPS, UNSETTLED
@@ -123,7 +124,7 @@ class SteppedSolution(ArraysResult):
         t : a number or an array of times; without it ``sol.t``.
         """
         given = self.t if t is None else t
-        times = np.atleast_1d(np.asarray(given, dtype=float))
+        times = as_times(given)
         nc, names = len(self.model.contacts), [part.name for part in self._parts]
         speeds = {f"v_rel({c.name})": k for k, c in enumerate(self.model.contacts)}
         gaps = {f"gap({i.name})": nc + k for k, i in enumerate(self.model.impacts)}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.arguments import as_times
 from hybridsim.calls import refusing
 from hybridsim.engine.places import Frame, find_places
 from hybridsim.errors import UsageError, nearest
@@ -128,7 +129,7 @@ class Solution(InTables):
 
         side "+" is right-continuous, as x+ at an event; "-" gives x-.
         """
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = as_times(t)
         x = self._segments.states(*self._places(times, side))
         return x[0] if np.ndim(t) == 0 else x.T
 
@@ -155,7 +156,7 @@ class Solution(InTables):
             parts = [self._quantity(name, g, g.s, g.x) for g in self._segments]
             return np.concatenate(parts) if parts else np.zeros(0)
         given = self.t if t is None else t
-        times = np.atleast_1d(np.asarray(given, dtype=float))
+        times = as_times(given)
         out = np.empty(len(times))
         x, pieces = self._pieces(times, side)
         for segment, chosen, s in pieces:
