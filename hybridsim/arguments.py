@@ -303,7 +303,10 @@ def time_grid(
     grid = numbers(t_eval, "t_eval", "give times from t0 to t1")
     low, high = min(span), max(span)
     if len(grid) and not (grid.min() >= low and grid.max() <= high):
-        raise UsageError(f"t_eval does not lie within t_span {span}", remedy="give times from t0 to t1")
+        bad = float(grid[~((grid >= low) & (grid <= high))][0])
+        raise UsageError(
+            f"t_eval holds {bad!r}, which is not within t_span {span}", remedy="give times from t0 to t1"
+        )
     if keep.segments < math.inf and (np.abs(span[1] - grid) > keep.segments).any():
         raise UsageError(
             f"t_eval begins before the last {keep.segments:.9g} of the run, which is what save={save!r} keeps",

@@ -29,7 +29,6 @@ _ERROR, _SHARE = 0.1, 1e-6  # what the last terms of u may be; or of how far exp
 _SHORTEST = 1.0 / 64.0
 # halvings of a step, and pieces that are looked at: u has as many extrema as its order has, at most
 _DEEPEST, _MOST_PIECES = 40, 400
-_ROUNDING = 1e-15  # of the slope, in shares of the sum of its terms
 _POLISHED, _CLOSE = 60, 1e-12  # steps towards an extremum, and when it is near enough
 _HALVED = 40  # times, at most, between two parts
 
@@ -105,20 +104,19 @@ def _first_place(u: Any, order: int, h: float, kind: int, high: float, low: floa
     start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
     is_far = start > _FAINT and kind != ROOT
     a, stack = np.empty(order), np.empty((_DEEPEST + 2, order + 2))
-    power, size = 1.0, 0.0
+    power = 1.0
     for k in range(order):
-        a[k] = (k + 1.0) * u[k + 1] * power
-        size += abs(a[k])
         power *= h
+        a[k] = (k + 1.0) * u[k + 1] * power
     to_bernstein(a, stack[0, :order])
     stack[0, order], stack[0, order + 1] = 0.0, 1.0
     top = 1
     for _ in range(_MOST_PIECES):
-        if top == 0:
-            return h
         top -= 1
+        if top < 0:
+            return h
         left, width = stack[top, order], stack[top, order + 1]
-        changes, rises = _changes(stack[top, :order], _ROUNDING * size)
+        changes, rises = _changes(stack[top, :order])
         if changes > 1 and width > 2.0**-_DEEPEST:
             _halve(stack, top, order, a)
             top += 2
@@ -136,20 +134,19 @@ def _first_place(u: Any, order: int, h: float, kind: int, high: float, low: floa
             near = d
         if is_far and sign * _value(u, order, far) < low:
             return _becomes_near(u, order, sign, high, low, near, far)
-    return h
+    return max(stack[top, order], _SHORTEST) * h  # where rounding makes too many pieces
 
 
 @inlined
-def _changes(b: Any, rounding: float) -> tuple[int, bool]:
-    """How often Bernstein coefficients beyond rounding change their sign; whether they begin positive."""
+def _changes(b: Any) -> tuple[int, bool]:
+    """How often Bernstein coefficients change their sign, zeros left out; whether they begin positive."""
     changes, last, first = 0, 0.0, 0.0
     for i in range(b.shape[0]):
-        if abs(b[i]) > rounding:
-            if first == 0.0:
-                first = b[i]
-            if last * b[i] < 0.0:
-                changes += 1
+        if b[i] != 0.0:
+            changes += last * b[i] < 0.0
             last = 1.0 if b[i] > 0.0 else -1.0
+            if first == 0.0:
+                first = last
     return changes, first > 0.0
 
 

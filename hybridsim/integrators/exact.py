@@ -30,7 +30,7 @@ class Exact(Integrator):
     other is followed by lower bounds made of its Taylor polynomial and the largest remainder, so that no zero is jumped
     over, and its zeros are good to rounding. There is no step and no truncation: rtol and atol do not enter. A segment
     that holds something unusual (a monitor, an input, a question of rounding, time running backward) is taken by its
-    Taylor series to rounding, which converges everywhere.
+    Taylor series, which converges everywhere, to rounding of the states' nominal sizes: there atol enters.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """
