@@ -11,10 +11,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from hybridsim.engine.first_exit import to_bernstein
-from hybridsim.engine.jit import allocating_kernel, call_apart, inlined, kernel
+from hybridsim.engine.jit import call_apart, inlined, kernel
 
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
 # Where exp(u) changes by a factor of exp(8) or less within a step its series shows it.
@@ -29,7 +27,8 @@ _ERROR, _SHARE = 0.1, 1e-6  # what the last terms of u may be; or of how far exp
 _SHORTEST = 1.0 / 64.0
 # halvings of a step, and pieces that are looked at: u has as many extrema as its order has, at most
 _DEEPEST, _MOST_PIECES = 40, 400
-_POLISHED, _CLOSE = 60, 1e-12  # steps towards an extremum, and when it is near enough
+PIECES = _DEEPEST + 2  # that wait at once, at most
+_POLISHED, _CLOSE = 60, 1e-8  # steps towards an extremum, and when it is near enough
 _HALVED = 40  # times, at most, between two parts
 
 
@@ -62,14 +61,14 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
     return change, turn, before + size
 
 
-@kernel
-def where_it_ends(u: Any, kind: int, order: int, h: float) -> float:
+@inlined
+def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any) -> float:
     """How far a step of length h may go for a function of u, by its kind; u (order + 1,): the series.
 
-    h may be negative; order >= 2.
+    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: room.
     """
     if kind == ROOT:
-        return where_a_root_ends(u, order, h)
+        return call_apart(where_a_root_ends, (u, order, h, a, stack))
     change, turn, last = _sizes(u, order, h)
     if not change > _SEEN:
         return h
@@ -82,33 +81,39 @@ def where_it_ends(u: Any, kind: int, order: int, h: float) -> float:
     comes_near = start > _FAINT and start - change < low
     if not change > _SEEN or start - change > _NOTHING or (turn < abs(u[1] * h) and not comes_near):
         return h
-    return call_apart(_first_place, (u, order, h, kind, high, low))
+    if turn < abs(u[1] * h):  # it rises or falls all along
+        sign = 1.0 if u[0] > 0.0 else -1.0
+        if sign * _value(u, order, h) < low:
+            return call_apart(_becomes_near, (u, order, sign, high, low, 0.0, h))
+        return h
+    return call_apart(_first_place, (u, order, h, kind, high, low, a, stack))
 
 
 @kernel
-def where_a_root_ends(u: Any, order: int, h: float) -> float:
+def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any) -> float:
     """The same for sqrt(u): before u falls to less than a hundredth, if it rises again within the step."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
         return h
-    return call_apart(_first_place, (u, order, h, ROOT, high, low))
+    return call_apart(_first_place, (u, order, h, ROOT, high, low, a, stack))
 
 
-@allocating_kernel
-def _first_place(u: Any, order: int, h: float, kind: int, high: float, low: float) -> float:
+@kernel
+def _first_place(
+    u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any
+) -> float:
     """The first place in a step h at which it has to end, or h: from piece to piece on which u rises or falls.
 
     The slope is isolated in Bernstein form: where its coefficients change their sign at most once, so does it.
     """
     start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
     is_far = start > _FAINT and kind != ROOT
-    a, stack = np.empty(order), np.empty((_DEEPEST + 2, order + 2))
     power = 1.0
     for k in range(order):
         power *= h
         a[k] = (k + 1.0) * u[k + 1] * power
-    to_bernstein(a, stack[0, :order])
+    to_bernstein(a[:order], stack[0, :order])
     stack[0, order], stack[0, order + 1] = 0.0, 1.0
     top = 1
     for _ in range(_MOST_PIECES):
@@ -122,7 +127,9 @@ def _first_place(u: Any, order: int, h: float, kind: int, high: float, low: floa
             top += 2
             continue
         near, far = left * h, (left + width) * h
-        if changes > 0:
+        begins_low = (u[0] if left == 0.0 else _value(u, order, near)) < 0.0
+        may_matter = rises if begins_low else not rises or kind == EXPONENTIAL  # else |u| is largest there
+        if changes > 0 and may_matter:
             d = _extremum(u, order, near, far, rises)
             value = _value(u, order, d)
             if (is_far or (kind == ROOT and not rises)) and sign * value < low:
@@ -189,7 +196,7 @@ def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float
     return d
 
 
-@inlined
+@kernel
 def _becomes_near(u: Any, order: int, sign: float, high: float, low: float, far: float, near: float) -> float:
     """Where |u| is between high and low, between a place where it is larger and one where it is less."""
     d = near

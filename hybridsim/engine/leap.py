@@ -289,7 +289,8 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             for i in range(fading.shape[0]):
-                end = where_it_ends(guard_series[count + i], fading[i] % KINDS, order, d)
+                u = guard_series[count + i]
+                end = where_it_ends(u, fading[i] % KINDS, order, d, room.a, room.stack)
                 if end < d:
                     d, outcome = end, NEVER
             trials = 0

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import KINDS, where_it_ends
+from hybridsim.engine.faint_terms import KINDS, PIECES, where_it_ends
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
@@ -45,6 +45,7 @@ class TaylorStepper:
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.computed = np.array(computed_rates(flow.system, flow.z))
         self.fading = np.array(fading(flow.system, flow.z), dtype=np.int64)
+        self.pieces = np.empty(self.series.order), np.empty((PIECES, self.series.order + 2))
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
         # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
@@ -62,7 +63,8 @@ class TaylorStepper:
         h, coefficients = self.series.expand(self.s, self.x, longest)
         for number in self.fading:
             u = self.series.V[number // KINDS]
-            h = min(h, abs(where_it_ends(u, number % KINDS, self.series.order, direction * h)))
+            end = where_it_ends(u, number % KINDS, self.series.order, direction * h, *self.pieces)
+            h = min(h, abs(end))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
