@@ -95,8 +95,9 @@ def simulate(
         length takes the same memory.
     limits : mapping of str to float, optional
         What the run may cost, by name: "events", "steps", "seconds" by the clock, "megabytes" by which the
-        process grows. A run that has had its share stops soon after, with status "limit" and what it
-        computed; ``sol.resume()`` goes on from there, to the same digits as if it had never stopped.
+        process grows. A run that has had its share stops soon after (a compiled loop looks at them every 1024
+        events or 4096 steps), with status "limit" and what it computed; ``sol.resume()`` goes on from there, to
+        the same digits as if it had never stopped.
     progress : callable, optional
         Called with the finished fraction of the span, from time to time.
     **options : Any

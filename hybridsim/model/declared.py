@@ -45,12 +45,16 @@ class Declared(metaclass=_Refusing):
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
 
-    def _texts(self, *fields: str) -> None:
-        """See to it that names and words are texts; None stays None where it is the default."""
+    def _texts(self, *fields: str, known: Iterable[str] = ()) -> None:
+        """See to it that names and words are texts; None stays None where it is the default.
+
+        known: the words there are.
+        """
         for name in fields:
             value = getattr(self, name)
             if not (isinstance(value, str) or (value is None and self._has_default(name))):
-                raise self._fault(f"{name} is {value!r}", "give a text")
+                remedy = "give " + (", ".join(map(repr, known)) if known else "a text")
+                raise self._fault(f"{name} is {value!r}", remedy)
 
     def _expressions(self, *fields: str, functions: bool = False) -> None:
         """Parse what was given as text or number; None stays None where it is the default.

@@ -48,6 +48,8 @@ class Monitor(Declared):
     reset: Mapping[str, Expression] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
-        self._texts("name", "direction", "action")
+        self._texts("name")
+        self._texts("direction", known=DIRECTIONS)
+        self._texts("action", known=ACTIONS)
         self._expressions("expr", functions=True)
         self._maps("reset", functions=True)

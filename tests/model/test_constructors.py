@@ -34,6 +34,7 @@ X = hs.State("x", 0, "1")
         (lambda: hs.State("x", 0, "1", unit=3), "State x: unit is 3\ngive a text"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.Parameter("k", 4, unit=3), "Parameter k: unit is 3"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.Output("y", "x", unit=["m"]), r"Output y: unit is \['m'\]"),  # type: ignore[arg-type]  # the slip meant
+        (lambda: hs.Monitor("z", "x", direction=-1), "Monitor z: direction is -1\ngive 'up', 'down', 'both'"),  # type: ignore[arg-type]  # SciPy's way
         (lambda: hs.Model("a", [X], title=3), "Model a: title is 3"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.State("x", 0, "1", nominal="a"), "State x: nominal is 'a'"),
         (lambda: hs.Mode("m", guards={"g": "x"}), "Mode m: guards holds {'g': 'x'}"),
