@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.first_exit import to_bernstein
+from hybridsim.engine.first_exit import halve, to_bernstein
 from hybridsim.engine.jit import call_apart, inlined, kernel
 
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
@@ -123,7 +123,7 @@ def _first_place(
         left, width = stack[top, order], stack[top, order + 1]
         changes, rises = _changes(stack[top, :order])
         if changes > 1 and width > 2.0**-_DEEPEST:
-            _halve(stack, top, order, a)
+            halve(stack, top, order, a)
             top += 2
             continue
         near, far = left * h, (left + width) * h
@@ -155,21 +155,6 @@ def _changes(b: Any) -> tuple[int, bool]:
             if first == 0.0:
                 first = last
     return changes, first > 0.0
-
-
-@inlined
-def _halve(stack: Any, top: int, m: int, b: Any) -> None:
-    """The piece in a row of the stack in its two halves, the left one above the right one; b (m,): room."""
-    left, width = stack[top, m], 0.5 * stack[top, m + 1]
-    for i in range(m):
-        b[i] = stack[top, i]
-    for step in range(m):
-        stack[top + 1, step] = b[0]
-        stack[top, m - 1 - step] = b[m - 1 - step]
-        for i in range(m - 1 - step):
-            b[i] = 0.5 * (b[i] + b[i + 1])
-    stack[top, m], stack[top, m + 1] = left + width, width
-    stack[top + 1, m], stack[top + 1, m + 1] = left, width
 
 
 @inlined

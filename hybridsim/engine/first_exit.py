@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.jit import call_series, kernel, polynomial_kernel
+from hybridsim.engine.jit import call_series, inlined, kernel, polynomial_kernel
 
 NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, a question of rounding
 POSITIVE, NEGATIVE, WITHIN, ONCE, MIXED = range(5)  # what is known of the signs of a piece
@@ -31,6 +31,21 @@ def to_bernstein(a: Any, b: Any) -> None:
     for k in range(1, n + 1):  # from differences to values: sums over Pascal's triangle
         for j in range(n, k - 1, -1):  # backward, so that no sum waits for another
             b[j] += b[j - 1]
+
+
+@inlined
+def halve(stack: Any, top: int, m: int, b: Any) -> None:
+    """The piece in a row of the stack in its two halves, the left one above the right one; b (m,): room."""
+    left, width = stack[top, m], 0.5 * stack[top, m + 1]
+    for i in range(m):
+        b[i] = stack[top, i]
+    for step in range(m):
+        stack[top + 1, step] = b[0]
+        stack[top, m - 1 - step] = b[m - 1 - step]
+        for i in range(m - 1 - step):
+            b[i] = 0.5 * (b[i] + b[i + 1])
+    stack[top, m], stack[top, m + 1] = left + width, width
+    stack[top + 1, m], stack[top + 1, m + 1] = left, width
 
 
 @kernel
@@ -88,15 +103,7 @@ def first_exit(
             if touched < 0.0:
                 touched = left
             continue
-        for i in range(m):
-            b[i] = stack[top, i]
-        for step in range(m):
-            stack[top + 1, step] = b[0]
-            stack[top, m - 1 - step] = b[m - 1 - step]
-            for i in range(m - 1 - step):
-                b[i] = 0.5 * (b[i] + b[i + 1])
-        stack[top, m], stack[top, m + 1] = left + 0.5 * width, 0.5 * width
-        stack[top + 1, m], stack[top + 1, m + 1] = left, 0.5 * width
+        halve(stack, top, m, b)
         top += 2
     return (NEVER, 1.0) if touched < 0.0 else (OPEN, touched)
 
