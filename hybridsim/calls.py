@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
-from inspect import signature
-from typing import ParamSpec, TypeVar
+from inspect import Signature, signature
+from typing import Any, ParamSpec, TypeVar
 
 from hybridsim.errors import UsageError, near
 
@@ -21,23 +21,27 @@ def refusing(function: Callable[Given, Result]) -> Callable[Given, Result]:
         try:
             return function(*args, **keywords)
         except TypeError:
-            takes = signature(function)
-            try:
-                takes.bind(*args, **keywords)
-            except TypeError as error:
-                names = [name for name in takes.parameters if name != "self"]
-                raise refusal(function.__name__, names, keywords, error) from None
+            refuse_unless_taken(function.__name__, signature(function), args, keywords, "self")
             raise
 
     return call
 
 
-def refusal(title: str, names: list[str], keywords: Iterable[str], error: TypeError) -> UsageError:
-    """What is wrong with the arguments: an unknown one before a missing one, which may be the same."""
-    takes = f"it takes {', '.join(names)}"
-    for name in keywords:
-        if name not in names:
-            close = near(name, names)
-            remedy = f"did you mean '{close[0]}'? {takes}" if close else takes
-            return UsageError(f"{title} has no argument '{name}'", remedy=remedy)
-    return UsageError(f"{title}: {error}", remedy=takes)
+def refuse_unless_taken(
+    title: str, takes: Signature, args: Iterable[Any], keywords: Mapping[str, Any], unsaid: str
+) -> None:
+    """Say what is wrong with arguments, if anything is: an unknown one before a missing one, which may be the same.
+
+    unsaid: an argument that nobody has to know of.
+    """
+    try:
+        takes.bind(*args, **keywords)
+    except TypeError as error:
+        names = [name for name in takes.parameters if name != unsaid]
+        said = f"it takes {', '.join(names)}"
+        for name in keywords:
+            if name not in takes.parameters:
+                close = near(name, names)
+                remedy = f"did you mean '{close[0]}'? {said}" if close else said
+                raise UsageError(f"{title} has no argument '{name}'", remedy=remedy) from None
+        raise UsageError(f"{title}: {error}", remedy=said) from None

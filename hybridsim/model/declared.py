@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass, field
 from inspect import Signature, signature
 from typing import Any
 
-from hybridsim.calls import refusal
+from hybridsim.calls import refuse_unless_taken
 from hybridsim.errors import ExpressionError, ModelError, Place, UsageError
 from hybridsim.expr import Expression, of_function, parse
 from hybridsim.model.frozen_map import FrozenMap
@@ -26,12 +26,7 @@ class _Refusing(type):
         try:
             return super().__call__(*args, **keywords)
         except TypeError:
-            takes = signature(cls)
-            try:
-                takes.bind(*args, **keywords)
-            except TypeError as error:
-                names = [name for name in takes.parameters if name != "place"]
-                raise refusal(cls.__name__, names, [k for k in keywords if k != "place"], error) from None
+            refuse_unless_taken(cls.__name__, signature(cls), args, keywords, "place")
             raise
 
 
