@@ -33,9 +33,10 @@ def _fill_nan(out: Any) -> None:
 
 if ENABLED:
     import numba
-    from llvmlite import ir
+    from llvmlite import binding, ir
     from numba import types
-    from numba.core import cgutils, event
+    from numba.core import cgutils, compiler_lock, event
+    from numba.core.registry import cpu_target
     from numba.extending import intrinsic
     from numba.np.arrayobj import populate_array
 
@@ -53,14 +54,12 @@ if ENABLED:
     class _Compiling(event.Listener):
         """Adds up what each thread spends on compiling kernels, or on reading them from the cache; sets the effort.
 
-        With the second level of LLVM's passes the engine is ready an eighth sooner than with numba's default, the
-        third, and its kernels are as fast. Compiling holds numba's lock, so the setting, which is everybody's, is ours
-        meanwhile.
+        Compiling holds numba's lock, so the settings, which are everybody's, are ours meanwhile.
         """
 
         def __init__(self) -> None:
             self.of = _Spent()
-            self.levels: list[int] = []  # as they were before each of the kernels that are being compiled
+            self.others: list[Any] = []  # settings before each of the kernels that are being compiled
 
         def on_start(self, event: Any) -> None:
             """A kernel, or one that another needs."""
@@ -68,9 +67,9 @@ if ENABLED:
             if event.kind == _COMPILING:  # it was not in the cache
                 compiled = event.data["dispatcher"].py_func.__module__ or ""
                 so_far = of.spent + (time.perf_counter() - of.since if of.depth else 0.0)
-                self.levels.append(numba.config.OPT)
+                self.others.append(_settings())
                 if compiled.startswith("hybridsim."):
-                    numba.config.OPT = min(numba.config.OPT, type(numba.config.OPT)(_LEVEL))
+                    _set(_ours())
                     if so_far > _NOTICED:  # a part that no run has needed before, such as derivatives
                         _tell(f"hybridsim: compiling the engine for this, once (10 to 30 s); {_kept()} ...")
                 return
@@ -82,7 +81,7 @@ if ENABLED:
             """The kernel is ready."""
             of = self.of
             if event.kind == _COMPILING:
-                numba.config.OPT = self.levels.pop()
+                _set(self.others.pop())
                 return
             if of.depth == 0:
                 return
@@ -91,6 +90,33 @@ if ENABLED:
                 of.spent += time.perf_counter() - of.since
 
     _LEVEL = 2  # of LLVM's passes
+
+    def _settings() -> tuple[Any, Any]:
+        """Level of LLVM's passes, and the machine whose costs they go by."""
+        return numba.config.OPT, _codegen()._tm
+
+    def _set(settings: tuple[Any, Any]) -> None:
+        numba.config.OPT, _codegen()._tm = settings
+
+    def _codegen() -> Any:
+        return cpu_target.target_context.codegen()
+
+    @cache
+    def _plain_machine() -> Any:
+        """This machine with what it has, and the costs of none in particular."""
+        cpu = "x86-64" if binding.get_default_triple().startswith("x86_64") else "generic"
+        return binding.Target.from_default_triple().create_target_machine(
+            cpu=cpu, features=_codegen()._tm_features, jit=True
+        )
+
+    def _ours() -> tuple[Any, Any]:
+        """The settings for kernels.
+
+        At the second level the engine is ready an eighth sooner than at numba's default, the third, and is as fast. For
+        some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length by the dozen. Ours have two or three
+        turns: so unrolled, `exact` takes a fifth longer.
+        """
+        return min(numba.config.OPT, type(numba.config.OPT)(_LEVEL)), _plain_machine()
     _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # the first happens within the second
     _compiling = _Compiling()
     for _kind in (_COMPILING, _LOCKED):
@@ -190,10 +216,16 @@ if ENABLED:
         return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
 
     def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
-        made = _with_cache_folder(
-            str(kernel_folder()),
-            lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(function),
-        )
+        with compiler_lock.global_compiler_lock:
+            others = _settings()
+            _set(_ours())
+            try:
+                made = _with_cache_folder(
+                    str(kernel_folder()),
+                    lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(function),
+                )
+            finally:
+                _set(others)
         _reached.append(made)
         return int(made.address)
 
