@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.first_exit import halve, to_bernstein
-from hybridsim.engine.jit import call_apart, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
 # Where exp(u) changes by a factor of exp(8) or less within a step its series shows it.
@@ -62,13 +62,21 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 
 @inlined
-def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any) -> float:
+def may_end(u: Any, kind: int, size: float) -> bool:
+    """Whether a step h may have to end for a function of u; size: sum_k |u_k| h**k. Cheaper than to find where."""
+    return kind == ROOT or size - abs(u[0]) > _SEEN
+
+
+@kernel
+def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
     """How far a step of length h may go for a function of u, by its kind; u (order + 1,): the series.
 
-    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: room.
+    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: room. code: address of a
+    function that does `to_bernstein` for as many coefficients as the order (`hybridsim.engine.bernstein_code`), 0 for
+    none.
     """
     if kind == ROOT:
-        return call_apart(where_a_root_ends, (u, order, h, a, stack))
+        return call_apart(where_a_root_ends, (u, order, h, a, stack, code))
     change, turn, last = _sizes(u, order, h)
     if not change > _SEEN:
         return h
@@ -86,22 +94,22 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any) -
         if sign * _value(u, order, h) < low:
             return call_apart(_becomes_near, (u, order, sign, high, low, 0.0, h))
         return h
-    return call_apart(_first_place, (u, order, h, kind, high, low, a, stack))
+    return call_apart(_first_place, (u, order, h, kind, high, low, a, stack, code))
 
 
 @kernel
-def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any) -> float:
+def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
     """The same for sqrt(u): before u falls to less than a hundredth, if it rises again within the step."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
         return h
-    return call_apart(_first_place, (u, order, h, ROOT, high, low, a, stack))
+    return call_apart(_first_place, (u, order, h, ROOT, high, low, a, stack, code))
 
 
 @kernel
 def _first_place(
-    u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any
+    u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any, code: int
 ) -> float:
     """The first place in a step h at which it has to end, or h: from piece to piece on which u rises or falls.
 
@@ -113,7 +121,10 @@ def _first_place(
     for k in range(order):
         power *= h
         a[k] = (k + 1.0) * u[k + 1] * power
-    to_bernstein(a[:order], stack[0, :order])
+    if code != 0:
+        call_series(code, 0.0, 0.0, a, a, a, stack)
+    else:
+        to_bernstein(a[:order], stack[0, :order])
     stack[0, order], stack[0, order + 1] = 0.0, 1.0
     top = 1
     for _ in range(_MOST_PIECES):

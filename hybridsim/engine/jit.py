@@ -117,6 +117,7 @@ if ENABLED:
         turns: so unrolled, `exact` takes a fifth longer.
         """
         return min(numba.config.OPT, type(numba.config.OPT)(_LEVEL)), _plain_machine()
+
     _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # the first happens within the second
     _compiling = _Compiling()
     for _kind in (_COMPILING, _LOCKED):
@@ -190,6 +191,18 @@ if ENABLED:
         return kept.with_name(f"{kept.name}.{machine_name()}.o")
 
     @intrinsic
+    def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+        """a b + c of three doubles, rounded once where the processor can do so."""
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            double = ir.DoubleType()
+            kind = ir.FunctionType(double, [double] * 3)
+            function = cgutils.get_or_insert_function(builder.module, kind, "llvm.fmuladd.f64")
+            return builder.call(function, args)
+
+        return types.float64(types.float64, types.float64, types.float64), generate
+
+    @intrinsic
     def call_series(
         typingctx: Any, address: Any, s: Any, error: Any, x: Any, guards: Any, constants: Any, out: Any
     ) -> Any:
@@ -222,7 +235,9 @@ if ENABLED:
             try:
                 made = _with_cache_folder(
                     str(kernel_folder()),
-                    lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(function),
+                    lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(
+                        function
+                    ),
                 )
             finally:
                 _set(others)
@@ -325,6 +340,10 @@ else:
     def is_kept(kept: Path) -> bool:
         """Nothing is kept."""
         return False
+
+    def fused(a: float, b: float, c: float) -> float:
+        """a b + c."""
+        return a * b + c
 
     def call_series(
         address: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any

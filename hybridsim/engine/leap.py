@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import KINDS, where_it_ends
+from hybridsim.engine.faint_terms import KINDS, may_end, where_it_ends
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
@@ -28,7 +28,7 @@ from hybridsim.engine.steps_ahead import (
     seems_straight,
     values_at,
 )
-from hybridsim.engine.taylor import SLACK, advance, expand, reach
+from hybridsim.engine.taylor import SLACK, advance, expand, reach, sum_sizes
 from hybridsim.engine.timepair import phase_of
 
 AT_TARGET, STOPPED, FULL = 0, 1, 2
@@ -289,10 +289,15 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             for i in range(fading.shape[0]):
-                u = guard_series[count + i]
-                end = where_it_ends(u, fading[i] % KINDS, order, d, room.a, room.stack)
-                if end < d:
-                    d, outcome = end, NEVER
+                u, kind = guard_series[count + i], fading[i] % KINDS
+                if sizes_code == 0:
+                    totals[count + i] = sum_sizes(guard_series, count + i, order, powers)
+                if may_end(u, kind, totals[count + i]):
+                    end = call_apart(
+                        where_it_ends, (u, kind, order, d, room.a, room.stack, codes.bernstein[1])
+                    )
+                    if end < d:
+                        d, outcome = end, NEVER
             trials = 0
             first_look = len(BETWEEN)
             if seems_straight(tapes.computed[k], coefficients, order, powers, rtol, atol):

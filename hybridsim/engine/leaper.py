@@ -339,7 +339,7 @@ class TaylorLeaper(Leaper):
                 W=np.zeros((registers, order + 1)),
                 guard_series=np.zeros((guards + most_fading(system), order + 1)),
                 ahead=np.empty(room_ahead(order, n, guards)),
-                sizes=np.empty(order + 1 + guards),
+                sizes=np.empty(order + 1 + guards + most_fading(system)),
                 numbers=np.arange(guards, dtype=np.int64),
                 everyone=np.arange(n, dtype=np.int64),
                 a=np.empty(order + 1),

@@ -60,6 +60,9 @@ declare double @llvm.cos.f64(double)
 declare double @llvm.exp.f64(double)
 declare double @llvm.sqrt.f64(double)
 declare double @llvm.fabs.f64(double)
+declare double @llvm.fmuladd.f64(double, double, double)
+declare <4 x double> @llvm.fabs.v4f64(<4 x double>)
+declare <4 x double> @llvm.fmuladd.v4f64(<4 x double>, <4 x double>, <4 x double>)
 declare double @c_tan(double)
 declare double @c_tanh(double)
 """
@@ -132,24 +135,110 @@ class Lines:
         place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
         self.put(f"  store double {value}, ptr {place}")
 
-    def powers(self, a: str, order: int) -> list[str]:
-        """a**k for k = 0..order, as `tabulate` of `hybridsim.engine.taylor` makes them."""
-        found = [ONE, a]
-        for k in range(2, order + 1):
-            found.append(self.op("fmul", found[k // 2], found[k - k // 2]))
-        return found
-
-    def in_two_lines(self, terms: list[str]) -> str:
-        """The sum of two terms or more: every other one, and the rest, beside each other."""
-        sums = terms[:2]
-        for k, term in enumerate(terms[2:]):
-            sums[k % 2] = self.op("fadd", sums[k % 2], term)
-        return self.op("fadd", *sums)
+    def fused(self, a: str, b: str, c: str) -> str:
+        """a b + c."""
+        return self.value("call double @llvm.fmuladd.f64(double {}, double {}, double {})", a, b, c)
 
     def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
         """One of two values, by a comparison of a and b."""
         is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
         return self.value("select i1 {}, double {}, double {}", is_so, then, otherwise)
+
+
+class Powers:
+    """a**k for k = 0..order as `tabulate` of `hybridsim.engine.taylor` makes them, and sums of series with them.
+
+    Powers and terms are worked out four at a time, from the last ones on; the first order % 4 are by themselves.
+    """
+
+    def __init__(self, code: Lines, a: str, order: int) -> None:
+        self.code, self.order = code, order
+        square = code.op("fmul", a, a)
+        self._first = [ONE, a, square, code.op("fmul", a, square), code.op("fmul", square, square)]
+        self._fourth = self._vector([self._first[4]] * 4)
+        self._fours: dict[int, str] = {1: self._vector(self._first[1:])}
+        self.begins = list(range(order - 3, 0, -4))
+
+    def _vector(self, elements: list[str]) -> str:
+        vector = "poison"
+        for i, element in enumerate(elements):
+            vector = self.code.value(
+                "insertelement <4 x double> {}, double {}, i64 " + str(i), vector, element
+            )
+        return vector
+
+    def _constants(self, values: list[float]) -> str:
+        return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
+
+    def four(self, k: int) -> str:
+        """Powers k to k + 3."""
+        if k not in self._fours and k > 4:
+            self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
+        elif k not in self._fours:
+            places = ", ".join(f"i32 {k - 1 + i}" for i in range(4))
+            form = "shufflevector <4 x double> {}, <4 x double> {}, <4 x i32> <" + places + ">"
+            self._fours[k] = self.code.value(form, self.four(1), self.four(5))
+        return self._fours[k]
+
+    def store(self, array: str) -> None:
+        """Write all powers."""
+        for k in range(self.order % 4 + 1):
+            self.code.store(self._first[k], array, k)
+        for k in self.begins:
+            place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(k), array)
+            self.code.put(f"  store <4 x double> {self.four(k)}, ptr {place}, align 8")
+
+    def _load(self, array: str, i: int) -> str:
+        place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
+        return self.code.value("load <4 x double>, ptr {}, align 8", place)
+
+    def _of_two(self, name: str, a: str, b: str) -> str:
+        return self.code.value(name + " <4 x double> {}, {}", a, b)
+
+    def _fused(self, a: str, b: str, c: str) -> str:
+        form = "call <4 x double> @llvm.fmuladd.v4f64(<4 x double> {}, <4 x double> {}, <4 x double> {})"
+        return self.code.value(form, a, b, c)
+
+    def _size(self, a: str) -> str:
+        return self.code.value("call <4 x double> @llvm.fabs.v4f64(<4 x double> {})", a)
+
+    def _together(self, a: str) -> str:
+        """The sum of the four of a vector."""
+        form = "shufflevector <4 x double> {}, <4 x double> poison, <2 x i32> <i32 {first}, i32 {second}>"
+        halves = [self.code.value(form.format("{}", first=i, second=i + 1), a) for i in (0, 2)]
+        two = self.code.value("fadd <2 x double> {}, {}", *halves)
+        return self.code.op(
+            "fadd", *(self.code.value("extractelement <2 x double> {}, i64 " + str(i), two) for i in (0, 1))
+        )
+
+    def sum(self, array: str, at: int, is_size: bool) -> str:
+        """sum_k c_k a**k, or of |c_k|, over k > 0, of the series that begins at a place of an array."""
+        code, total = self.code, self._constants([0.0] * 4)
+        for k in self.begins:
+            c = self._load(array, at + k)
+            total = self._fused(self._size(c) if is_size else c, self.four(k), total)
+        found = self._together(total)
+        for k in range(self.order % 4, 0, -1):
+            c = code.load(array, at + k)
+            c = code.call("llvm.fabs.f64", c) if is_size else c
+            found = code.fused(c, self._first[k], found)
+        return found
+
+    def terms(self, array: str, at: int) -> tuple[str, str, str]:
+        """Over k > 0 the sums of the terms c_k a**k, of k times them, and of their sizes."""
+        code, zero = self.code, self._constants([0.0] * 4)
+        value, slope, size = zero, zero, zero
+        for k in self.begins:
+            term = self._of_two("fmul", self._load(array, at + k), self.four(k))
+            value = self._of_two("fadd", value, term)
+            slope = self._fused(self._constants([k + i for i in range(4)]), term, slope)
+            size = self._of_two("fadd", size, self._size(term))
+        value, slope, size = self._together(value), self._together(slope), self._together(size)
+        for k in range(self.order % 4, 0, -1):
+            term = code.op("fmul", code.load(array, at + k), self._first[k])
+            value, slope = code.op("fadd", value, term), code.fused(number(k), term, slope)
+            size = code.op("fadd", size, code.call("llvm.fabs.f64", term))
+        return value, slope, size
 
 
 @dataclass(frozen=True)
@@ -215,33 +304,46 @@ class _Expansion(Lines):
             return self.series[r][k]
         return self.load("%c", r * self.stride) if k == 0 else ZERO
 
+    def _weight(self, a: int, i: int, weighted: bool) -> str:
+        return self.op("fmul", self.at(a, i), number(i)) if weighted else self.at(a, i)
+
     def _pair(self, a: int, b: int, i: int, j: int, weighted: bool) -> str:
-        first, second = self.at(a, i), self.at(a, j)
-        if weighted:
-            first, second = self.op("fmul", first, number(i)), self.op("fmul", second, number(j))
+        first, second = self._weight(a, i, weighted), self._weight(a, j, weighted)
         return self.op("fadd", self.op("fmul", first, self.at(b, j)), self.op("fmul", second, self.at(b, i)))
 
+    def _twice(self, a: int, i: int) -> str:
+        return self.op("fmul", self.at(a, i), number(2.0))
+
     def _inner(self, a: int, b: int, k: int, weighted: bool = False) -> str:
-        total, m = ZERO, k // 2
+        total, other, m = ZERO, ZERO, k // 2
         if k > 0 and k % 2 == 0:
-            first = self.op("fmul", self.at(a, m), number(m)) if weighted else self.at(a, m)
-            total = self.op("fmul", first, self.at(b, m))
+            total = self.op("fmul", self._weight(a, m, weighted), self.at(b, m))
         for i in range((k - 1) // 2, 0, -1):
-            total = self.op("fadd", total, self._pair(a, b, i, k - i, weighted))
-        return total
+            if k <= EXACTLY:
+                total = self.op("fadd", total, self._pair(a, b, i, k - i, weighted))
+            elif a == b and not weighted:
+                total = self.fused(self._twice(a, i), self.at(a, k - i), total)
+            else:
+                total = self.fused(self._weight(a, i, weighted), self.at(b, k - i), total)
+                other = self.fused(self._weight(a, k - i, weighted), self.at(b, i), other)
+        return total if other == ZERO else self.op("fadd", total, other)
 
     def _product(self, a: int, b: int, k: int) -> str:
         if k == 0:
             return self.op("fmul", self.at(a, 0), self.at(b, 0))
-        return self.op("fadd", self._inner(a, b, k), self._pair(a, b, 0, k, False))
+        inner = self._inner(a, b, k)
+        if k <= EXACTLY:
+            return self.op("fadd", inner, self._pair(a, b, 0, k, False))
+        if a == b:
+            return self.fused(self._twice(a, 0), self.at(a, k), inner)
+        return self.fused(self.at(a, 0), self.at(b, k), self.fused(self.at(a, k), self.at(b, 0), inner))
 
     def _rise(self, a: int, b: int, k: int) -> str:
-        newest, part = self.op("fmul", self.at(a, k), number(k)), number(1.0 / k)
+        inner, part = self._inner(a, b, k, True), number(1.0 / k)
         if k <= EXACTLY:
-            last = self.op("fmul", newest, self.at(b, 0))
-            return self.op("fmul", self.op("fadd", self._inner(a, b, k, True), last), part)
-        last = self.op("fmul", self.at(a, k), self.at(b, 0))
-        return self.op("fadd", self.op("fmul", self._inner(a, b, k, True), part), last)
+            last = self.op("fmul", self._weight(a, k, True), self.at(b, 0))
+            return self.op("fmul", self.op("fadd", inner, last), part)
+        return self.fused(self.at(a, k), self.at(b, 0), self.op("fmul", inner, part))
 
     def _factor(self, flags: int, b: int, c: int) -> str:
         """What flags make of two constants; see `hybridsim.engine.high_orders`."""
@@ -261,7 +363,7 @@ class _Expansion(Lines):
         """Coefficient k of a constant over b."""
         part = self.op("fdiv", ONE, self.at(b, 0))
         factor = self.op("fmul", self.op("fmul", self.at(out, 0), part), self._factor(flags ^ NEGATIVE, 0, c))
-        return self.op("fsub", self.op("fmul", a, factor), self.op("fmul", self._inner(out, b, k), part))
+        return self.fused(a, factor, self.negative(self.op("fmul", self._inner(out, b, k), part)))
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
         """Coefficient k of an operation, and of its companion."""
@@ -296,9 +398,12 @@ class _Expansion(Lines):
         if op in (DIVIDE_BY, DIV):
             if k == 0:
                 return (self.op("fdiv", u, self.at(b, 0)),)
-            if op == DIV:
+            if op == DIV and k <= EXACTLY:
                 first = self.op("fmul", self.at(out, 0), self.at(b, k))
                 u = self.op("fsub", u, self.op("fadd", self._inner(out, b, k), first))
+            elif op == DIV:
+                rest = self.op("fsub", u, self._inner(out, b, k))
+                u = self.fused(self.negative(self.at(out, 0)), self.at(b, k), rest)
             return (self.op("fmul", u, self.op("fdiv", ONE, self.at(b, 0))),)
         return (self._exponential(a, out, k) if op == EXP else self._root(a, out, k),)
 
@@ -385,26 +490,23 @@ class _Ahead(_Expansion):
         Lines.__init__(self, "u")
         self.tape, self.order, self.stride, self.is_known = tape, 0, order + 1, False
         n, count, size = len(tape.states), len(tape.guards), order + 1
-        powers = self.powers("%e", order)
+        powers = Powers(self, "%e", order)
         x, slopes, changes = [], [], []
         for i in range(n):
-            c = [self.load("%x", i * size + k) for k in range(size)]
-            terms = [self.op("fmul", c[k], powers[k]) for k in range(order, 0, -1)]
-            x.append(self.op("fadd", c[0], self.in_two_lines(terms)))
-            terms = [c[1], *(self.op("fmul", c[k], powers[k - 1]) for k in range(2, size))]
-            slopes.append(
-                self.in_two_lines([c[1], *(self.op("fmul", number(k), terms[k - 1]) for k in range(2, size))])
-            )
-            changes.append(self.in_two_lines([self.call("llvm.fabs.f64", term) for term in terms]))
+            value, slope, change = powers.terms("%x", i * size)
+            x.append(self.op("fadd", self.load("%x", i * size), value))
+            slopes.append(slope)
+            changes.append(change)
         self.expand(self.op("fadd", "%s", "%e"), x)
-        sums = []
-        for j in range(count):
-            terms = [self.op("fmul", self.load("%g", j * size + k), powers[k]) for k in range(1, size)]
-            sums.append(self.in_two_lines([self.load("%g", j * size), *terms]))
+        sums = [
+            self.op("fadd", self.load("%g", j * size), powers.sum("%g", j * size, is_size=False))
+            for j in range(count)
+        ]
         values = [self.at(r, 0) for r in tape.guards]
         rates = [self.at(r, 0) for r in tape.rates]
-        for i, value in enumerate((*powers, *x, *rates, *slopes, *changes, *values, *sums)):
-            self.store(value, "%out", i)
+        powers.store("%out")
+        for i, value in enumerate((*x, *rates, *slopes, *changes, *values, *sums)):
+            self.store(value, "%out", size + i)
 
 
 def ahead_function(name: str, tape: ModeTape, order: int) -> str:
@@ -438,17 +540,13 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def sizes_function(name: str, guards: int, order: int) -> str:
-    """The function of h that writes its powers, and for each guard sum_k |c_k| h**k: even and odd terms apart."""
+    """The function of h that writes its powers, and for each guard sum_k |c_k| h**k."""
     code, size = Lines(), order + 1
-    powers = code.powers("%s", order)
-    for k, power in enumerate(powers):
-        code.store(power, "%out", k)
+    powers = Powers(code, "%s", order)
+    powers.store("%out")
     for j in range(guards):
-        terms = [
-            code.op("fmul", code.call("llvm.fabs.f64", code.load("%g", j * size + k)), power)
-            for k, power in enumerate(powers)
-        ]
-        code.store(code.in_two_lines(terms), "%out", size + j)
+        first = code.call("llvm.fabs.f64", code.load("%g", j * size))
+        code.store(code.op("fadd", first, powers.sum("%g", j * size, is_size=True)), "%out", size + j)
     return function(name, code.lines)
 
 
@@ -489,6 +587,6 @@ def series_text(tape: ModeTape, order: int) -> str:
         series_function("series_0", tape, order),
         values_function("values_0", tape, order + 1),
         ahead_function("ahead_0", tape, order),
-        sizes_function("sizes_0", len(tape.guards), order),
+        sizes_function("sizes_0", len(tape.guards) + len(tape.fading), order),
     )
     return DECLARATIONS + "".join(parts)

@@ -1,7 +1,7 @@
 """What is ahead of Taylor series, at a distance d: the state there, its rates, and whether the series still hold.
 
-It is one array: the powers d**k, k = 0..order; of n states their values there, their rates, the slopes of their series,
-and sum_k |c_k| d**(k - 1); of the watched functions their values there, and those of their series.
+It is one array: the powers d**k, k = 0..order; of n states their values there, their rates, the slopes of their series
+times d, and sum_k |c_k| d**k, k > 0; of the watched functions their values there, and those of their series.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
+from hybridsim.engine.jit import call_apart, call_series, fused, inlined, kernel
 from hybridsim.engine.taylor import advance, tabulate
 
 _DEFECT = 100.0  # as in the taylor integrator
@@ -31,14 +31,15 @@ def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any,
 
 @inlined
 def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
-    """Value of the series in a row of U, for the powers of a distance, order >= 1; even and odd terms side by side."""
-    even, odd = U[r, 0], U[r, 1] * powers[1]
-    for k in range(2, order, 2):
-        even += U[r, k] * powers[k]
-        odd += U[r, k + 1] * powers[k + 1]
-    if order % 2 == 0:
-        even += U[r, order] * powers[order]
-    return even + odd
+    """Value of the series in a row of U, for the powers of a distance: as `sum_sizes` of `hybridsim.engine.taylor`."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(order - 3, 0, -4):
+        a, b = fused(U[r, k], powers[k], a), fused(U[r, k + 1], powers[k + 1], b)
+        c, d = fused(U[r, k + 2], powers[k + 2], c), fused(U[r, k + 3], powers[k + 3], d)
+    total = (a + c) + (b + d)
+    for k in range(order % 4, 0, -1):
+        total = fused(U[r, k], powers[k], total)
+    return U[r, 0] + total
 
 
 @inlined
@@ -70,6 +71,12 @@ def _interpreted_values(
 
 
 @inlined
+def _together(four: tuple[float, float, float, float]) -> float:
+    """The sum of four, as of a vector whose halves are added first."""
+    return (four[0] + four[2]) + (four[1] + four[3])
+
+
+@inlined
 def look_ahead(
     code: int,
     rows: Any,
@@ -94,27 +101,25 @@ def look_ahead(
     tabulate(d, order, ahead)
     x, rates, values, sums = parts_of(ahead, order, n, count)
     for i in range(n):
-        # each sum in two lines, which do not wait for each other; what is least comes first
-        change = series[i, order] * ahead[order]
-        other = series[i, order - 1] * ahead[order - 1]
-        for k in range(order - 2, 0, -2):
-            change += series[i, k] * ahead[k]
-            if k > 1:
-                other += series[i, k - 1] * ahead[k - 1]
-        x[i] = series[i, 0] + (change + other)
-        term = series[i, 2] * ahead[1]
-        slope, other_slope = series[i, 1], 2.0 * term
-        change, other = abs(series[i, 1]), abs(term)
-        for k in range(3, order + 1, 2):
-            term = series[i, k] * ahead[k - 1]
-            slope += k * term
-            change += abs(term)
-            if k < order:
-                term = series[i, k + 1] * ahead[k]
-                other_slope += (k + 1) * term
-                other += abs(term)
-        ahead[order + 1 + 2 * n + i] = slope + other_slope
-        ahead[order + 1 + 3 * n + i] = change + other
+        values_of_four, slopes, sizes = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
+        for k in range(order - 3, 0, -4):  # four sums side by side, from the last terms on
+            one, two = series[i, k] * ahead[k], series[i, k + 1] * ahead[k + 1]
+            three, four = series[i, k + 2] * ahead[k + 2], series[i, k + 3] * ahead[k + 3]
+            a, b, c, e = values_of_four
+            values_of_four = a + one, b + two, c + three, e + four
+            a, b, c, e = slopes
+            slopes = (
+                fused(float(k), one, a), fused(k + 1.0, two, b), fused(k + 2.0, three, c), fused(k + 3.0, four, e)
+            )  # fmt: skip
+            a, b, c, e = sizes
+            sizes = a + abs(one), b + abs(two), c + abs(three), e + abs(four)
+        value, slope, size = _together(values_of_four), _together(slopes), _together(sizes)
+        for k in range(order % 4, 0, -1):
+            term = series[i, k] * ahead[k]
+            value, slope, size = value + term, fused(float(k), term, slope), size + abs(term)
+        x[i] = series[i, 0] + value
+        ahead[order + 1 + 2 * n + i] = slope
+        ahead[order + 1 + 3 * n + i] = size
     for j in range(count):
         sums[j] = sum_at(U, j, order, ahead)
     call_apart(_interpreted_values, (rows, places, s + d, x, watched, W, values, rates))
@@ -126,8 +131,8 @@ def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, a
     x = order + 1
     for i in range(x, x + n):
         rate, slope, change = ahead[i + n], ahead[i + 2 * n], ahead[i + 3 * n]
-        scale = atol[i - x] + rtol * (max(abs(x0[i - x]), abs(ahead[i])) + change * d)
-        if not abs(d * (slope - rate)) <= _DEFECT * scale:
+        scale = atol[i - x] + rtol * (max(abs(x0[i - x]), abs(ahead[i])) + change)
+        if not abs(slope - d * rate) <= _DEFECT * scale:
             return False
     return True
 

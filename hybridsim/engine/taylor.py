@@ -5,7 +5,8 @@ doi:10.1080/10586458.2005.10128904), over the lean tape and without the error bo
 
 Sums run from the middle of a convolution outward: what is newest, at both ends, comes last, so that little waits for
 it. What is divided by an order, or at higher orders by one and the same number, is multiplied by the reciprocal. The
-generated code of `hybridsim.engine.series_code` and `hybridsim.engine.jets` do each operation alike, to the last bit.
+generated code of `hybridsim.engine.series_code` does each operation alike, to the last bit, and so does
+`hybridsim.engine.jets` up to the order by which events are judged; beyond it products and sums are fused.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from hybridsim.engine.high_orders import (
     OVER_C,
     RECIPROCAL,
 )
-from hybridsim.engine.jit import call_apart, call_series, inlined, kernel, polynomial_kernel
+from hybridsim.engine.jit import call_apart, call_series, fused, inlined, kernel, polynomial_kernel
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -78,9 +79,18 @@ _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 def _inner(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=1}^{k-1} a_i b_{k-i}."""
     total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
+    if k <= EXACTLY:
+        for i in range((k - 1) // 2, 0, -1):
+            total += V[a, i] * V[b, k - i] + V[a, k - i] * V[b, i]
+        return total
+    if a == b:
+        for i in range((k - 1) // 2, 0, -1):
+            total = fused(2.0 * V[a, i], V[a, k - i], total)
+        return total
+    other = 0.0  # beside it, so that neither waits for the other
     for i in range((k - 1) // 2, 0, -1):
-        total += V[a, i] * V[b, k - i] + V[a, k - i] * V[b, i]
-    return total
+        total, other = fused(V[a, i], V[b, k - i], total), fused(V[a, k - i], V[b, i], other)
+    return total + other
 
 
 @inlined
@@ -88,16 +98,27 @@ def _product(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=0}^{k} a_i b_{k-i}."""
     if k == 0:
         return V[a, 0] * V[b, 0]
-    return call_apart(_inner, (V, a, b, k)) + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
+    inner = call_apart(_inner, (V, a, b, k))
+    if k <= EXACTLY:
+        return inner + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
+    if a == b:
+        return fused(2.0 * V[a, 0], V[a, k], inner)
+    return fused(V[a, 0], V[b, k], fused(V[a, k], V[b, 0], inner))
 
 
 @kernel
 def _weighted(V: Any, a: int, b: int, k: int) -> float:
     """sum_{i=1}^{k-1} i a_i b_{k-i}."""
     total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
+    if k <= EXACTLY:
+        for i in range((k - 1) // 2, 0, -1):
+            total += i * V[a, i] * V[b, k - i] + (k - i) * V[a, k - i] * V[b, i]
+        return total
+    other = 0.0
     for i in range((k - 1) // 2, 0, -1):
-        total += i * V[a, i] * V[b, k - i] + (k - i) * V[a, k - i] * V[b, i]
-    return total
+        total = fused(i * V[a, i], V[b, k - i], total)
+        other = fused((k - i) * V[a, k - i], V[b, i], other)
+    return total + other
 
 
 @inlined
@@ -105,7 +126,7 @@ def _rise(V: Any, a: int, b: int, k: int) -> float:
     """Coefficient k of the integral of a' b; at high orders the newest product waits for nothing but its sum."""
     if k <= EXACTLY:
         return _slope(V, a, b, k) * (1.0 / k)
-    return call_apart(_weighted, (V, a, b, k)) * (1.0 / k) + V[a, k] * V[b, 0]
+    return fused(V[a, k], V[b, 0], call_apart(_weighted, (V, a, b, k)) * (1.0 / k))
 
 
 @inlined
@@ -245,7 +266,11 @@ def advance(rows: Any, V: Any, k: int) -> None:
             if k == 0:
                 V[out, 0] = V[a, 0] / V[b, 0]
             else:
-                rest = V[a, k] - (call_apart(_inner, (V, out, b, k)) + V[out, 0] * V[b, k])
+                inner = call_apart(_inner, (V, out, b, k))
+                if k <= EXACTLY:
+                    rest = V[a, k] - (inner + V[out, 0] * V[b, k])
+                else:
+                    rest = fused(-V[out, 0], V[b, k], V[a, k] - inner)
                 V[out, k] = rest * (1.0 / V[b, 0])
         elif op == NEG:
             V[out, k] = -V[a, k]
@@ -257,8 +282,8 @@ def advance(rows: Any, V: Any, k: int) -> None:
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
         elif op >= RECIPROCAL:
             part = 1.0 / V[b, 0]
-            newest = V[a, k] * (V[out, 0] * part * _factor((op - RECIPROCAL) ^ NEGATIVE, V, 0, c))
-            V[out, k] = newest - call_apart(_inner, (V, out, b, k)) * part
+            factor = V[out, 0] * part * _factor((op - RECIPROCAL) ^ NEGATIVE, V, 0, c)
+            V[out, k] = fused(V[a, k], factor, -(call_apart(_inner, (V, out, b, k)) * part))
         elif op >= INTEGRATE:
             if k + 1 < V.shape[1]:
                 V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
@@ -297,30 +322,33 @@ def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: A
 
 @inlined
 def tabulate(h: float, order: int, powers: Any) -> None:
-    """powers[k] = h**k for k = 0..order, order >= 1; each of its halves, so that the last waits for few."""
+    """powers[k] = h**k for k = 0..order, order >= 1; from the fifth on four at a time."""
     powers[0], powers[1] = 1.0, h
-    for k in range(2, order + 1):
+    for k in range(2, min(order, 4) + 1):
         powers[k] = powers[k // 2] * powers[k - k // 2]
+    for k in range(5, order + 1):
+        powers[k] = powers[k - 4] * powers[4]
 
 
 @inlined
 def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
-    """sum_k |U[r, k]| h**k, the powers given."""
-    even, odd = 0.0, 0.0
-    for k in range(0, order, 2):
-        even += abs(U[r, k]) * powers[k]
-        odd += abs(U[r, k + 1]) * powers[k + 1]
-    if order % 2 == 0:
-        even += abs(U[r, order]) * powers[order]
-    return even + odd
+    """sum_k |U[r, k]| h**k, the powers given: four sums side by side, from the last terms on."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(order - 3, 0, -4):
+        a, b = fused(abs(U[r, k]), powers[k], a), fused(abs(U[r, k + 1]), powers[k + 1], b)
+        c, d = fused(abs(U[r, k + 2]), powers[k + 2], c), fused(abs(U[r, k + 3]), powers[k + 3], d)
+    total = (a + c) + (b + d)
+    for k in range(order % 4, 0, -1):
+        total = fused(abs(U[r, k]), powers[k], total)
+    return abs(U[r, 0]) + total
 
 
 @inlined
 def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
     """Powers of h, and for the series in the watched rows of U what `sum_sizes` makes of them.
 
-    code: address of a function that does so where these are all rows, and where the totals follow on the powers in
-    memory (`sizes` of `hybridsim.engine.series_code`); 0 for none.
+    code: address of a function that does so for all rows, where the totals follow on the powers in memory (`sizes` of
+    `hybridsim.engine.series_code`); 0 for none.
     """
     if code != 0:
         call_series(code, h, 0.0, U, U, U, powers)

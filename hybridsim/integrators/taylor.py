@@ -63,7 +63,7 @@ class TaylorStepper:
         h, coefficients = self.series.expand(self.s, self.x, longest)
         for number in self.fading:
             u = self.series.V[number // KINDS]
-            end = where_it_ends(u, number % KINDS, self.series.order, direction * h, *self.pieces)
+            end = where_it_ends(u, number % KINDS, self.series.order, direction * h, *self.pieces, 0)
             h = min(h, abs(end))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected

@@ -143,11 +143,12 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
         called(ahead, 0.1, d, C, U, constants, found)
         looked(run.lean.rows, run.places, order, 0.1, d, watched, expected, guards, interpreted, want)
         np.testing.assert_array_equal(found, want)
-        measured = np.empty(order + 1 + len(watched))
-        called(sizes, d, 0.0, C, U, constants, measured)
+        measured = np.empty(order + 1 + len(with_fading))
+        called(sizes, d, 0.0, C, with_fading, constants, measured)
         for code in (0, sizes):
-            both = np.empty(order + 1 + len(watched))
-            sized(code, U, np.arange(len(watched)), order, d, both[: order + 1], both[order + 1 :])
+            both = np.empty_like(measured)
+            rows = np.arange(len(with_fading))
+            sized(code, with_fading, rows, order, d, both[: order + 1], both[order + 1 :])
             np.testing.assert_array_equal(measured, both)
         # from there, where order 0 is known, and by itself
         x1 = found[order + 1 : order + 1 + n].copy()
