@@ -102,7 +102,7 @@ def _is_over(system: System, leapt: Leapt) -> bool:
         return False
     if leapt.events == 0:
         return True
-    fires = leapt.rows.fires[leapt.first : leapt.first + leapt.events]
+    fires = leapt.fires
     last = system.owner[fires[-1]]
     if not system.has_surface[last] and may_be_hidden(system, leapt.after(), leapt.crossings or ()):
         return False
@@ -124,7 +124,7 @@ def carried_out(
     leaper = plan.leaper()
     assert leaper is not None
     try:
-        leapt = leaper.leapt = leaper.go(plan.origin, *start, plan.end)
+        leapt = leaper.leapt = leaper.go(plan.origin, start, plan.end)
     except (KeyboardInterrupt, StepFailure) as error:
         return ModeLoop(system, method, task, None, cast("Leaps", _BrokenOff(leaper.place, error))).run()
     if leapt is None or not _is_over(system, leapt) or not (keep.segments or leaper.forget_segments(leapt)):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.jit import kernel
+from hybridsim.engine.jit import Door, kernel
 from hybridsim.engine.pieces import Occurrence
 from hybridsim.engine.timepair import Instant
 
@@ -48,6 +48,9 @@ def _times_at(instants: Any, places: Any, first: int, component: int, times: Any
     return count
 
 
+_take_part, _times_of_one = Door(_taking_part), Door(_times_at)
+
+
 class Crossings(Sequence[Occurrence]):
     """E events in arrays; each is an occurrence for every component that changes its mode or is reset.
 
@@ -72,12 +75,12 @@ class Crossings(Sequence[Occurrence]):
         self._before, self._after, self._states = before, after, states
         self._first = 0
         places = np.empty((2, len(fired)), dtype=np.int64)
-        found = _taking_part(fired, before, after, system.owner, system.has_surface, places)
+        found = _take_part(fired, before, after, system.owner, system.has_surface, places)
         self._count, self._is_plain = found
-        if self._count > len(fired):
+        if self._count != len(fired):
             places = np.empty((2, self._count), dtype=np.int64)
-            _taking_part(fired, before, after, system.owner, system.has_surface, places)
-        self._all_places = places[:, : self._count]
+            _take_part(fired, before, after, system.owner, system.has_surface, places)
+        self._all_places = places
 
     def __len__(self) -> int:
         return self._count - self._first
@@ -100,13 +103,11 @@ class Crossings(Sequence[Occurrence]):
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Times of those of a component; all are transitions, or changes of a corner's side."""
-        automata = self._system.automata
-        for c, automaton in enumerate(automata):
+        for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
-                if len(automata) == 1:
-                    return self.times
                 times = np.empty(len(self))
-                return times[: _times_at(self._instants, self._all_places, self._first, c, times)]
+                count = _times_of_one(self._instants, self._all_places, self._first, c, times)
+                return times if count == len(times) else times[:count]
         return np.empty(0)
 
     def kinds(self) -> Counter[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -17,57 +16,31 @@ _NONE, _NO_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # there are no mon
 _REAL, _WHOLE = ("x", "x_error", "p", "floors"), ("z", "sides", "orders")
 
 
-class Desk(NamedTuple):
-    """The state, the same as kernels take it, room for events, scratch arrays of the kernel.
+class Laid(NamedTuple):
+    """What holds at an instant as a desk has it: arrays one behind the other, real numbers in `real` and whole ones in
+    `whole`, each filled up with zeros, so that they are copied in two pieces."""
 
-    The arrays of the state lie one behind the other, real numbers in `real` and whole ones in `whole`, each filled up
-    with zeros: so they are copied in two pieces.
-    """
-
-    state: State
-    as_packed: Any
-    work: Any
-    room: Any
     real: np.ndarray
     whole: np.ndarray
     slices: dict[str, slice]
 
-    @classmethod
-    def of(cls, outcome: Outcome, p: np.ndarray, work: Any, room: Any) -> Desk:
-        """A desk for states like this one."""
-        fields = _fields(outcome, p)
-        slices = {**_slices(fields, _REAL), **_slices(fields, _WHOLE)}
-        real = np.zeros(sum(filled_up(len(fields[name])) for name in _REAL))
-        whole = np.zeros(sum(filled_up(len(fields[name])) for name in _WHOLE), dtype=np.int64)
-        parts = {name: (real if name in _REAL else whole)[part] for name, part in slices.items()}
-        state = State(**parts)
-        return cls(state, packed(state), work, room, real, whole, slices)
+    def part(self, name: str) -> np.ndarray:
+        """One of the arrays."""
+        return (self.real if name in _REAL else self.whole)[self.slices[name]]
 
-    def take_up(self, outcome: Outcome, p: np.ndarray) -> None:
-        """Begin where an outcome holds; p is the run-time vector there."""
-        state = self.state
-        state.x[:], state.x_error[:], state.p[:], state.floors[:] = (
-            outcome.x,
-            outcome.x_error,
-            p,
-            outcome.guard_floors,
-        )
-        state.z[:], state.sides[:], state.orders[:] = outcome.z, outcome.sides, outcome.orders
+    def copy(self) -> Laid:
+        """The same with arrays of its own."""
+        return Laid(self.real.copy(), self.whole.copy(), self.slices)
 
-    def leave(self) -> tuple[np.ndarray, Callable[[], Outcome]]:
-        """The modes where the loop has ended, and what makes all that holds there, from copies."""
-        real, whole, slices = self.real.copy(), self.whole.copy(), self.slices
-
-        def outcome() -> Outcome:
-            x, x_error, p, floors = (real[slices[name]] for name in _REAL)
-            z, sides, orders = (whole[slices[name]] for name in _WHOLE)
-            return Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, _NO_FLOORS)
-
-        return whole[slices["z"]], outcome
+    def outcome(self) -> Outcome:
+        """The same as everybody else takes it, in the same memory."""
+        x, x_error, p, floors, z, sides, orders = map(self.part, (*_REAL, *_WHOLE))
+        return Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, _NO_FLOORS)
 
 
-def _fields(outcome: Outcome, p: np.ndarray) -> dict[str, np.ndarray]:
-    return {
+def laid_out(outcome: Outcome, p: np.ndarray) -> Laid:
+    """What holds, copied, for a desk; p is the run-time vector there."""
+    fields = {
         "x": outcome.x,
         "x_error": outcome.x_error,
         "p": p,
@@ -76,6 +49,40 @@ def _fields(outcome: Outcome, p: np.ndarray) -> dict[str, np.ndarray]:
         "sides": outcome.sides,
         "orders": outcome.orders,
     }
+    slices = {**_slices(fields, _REAL), **_slices(fields, _WHOLE)}
+    real = np.zeros(sum(filled_up(len(fields[name])) for name in _REAL))
+    whole = np.zeros(sum(filled_up(len(fields[name])) for name in _WHOLE), dtype=np.int64)
+    laid = Laid(real, whole, slices)
+    for name, values in fields.items():
+        laid.part(name)[:] = values
+    return laid
+
+
+class Desk(NamedTuple):
+    """The state, the same as kernels take it, room for events, scratch arrays of the kernel; clock and target (2,)."""
+
+    laid: Laid
+    state: State
+    as_packed: Any
+    work: Any
+    room: Any
+    clock: np.ndarray
+    target: np.ndarray
+
+    @classmethod
+    def of(cls, like: Laid, work: Any, room: Any) -> Desk:
+        """A desk for states like this one."""
+        laid = like.copy()
+        state = State(**{name: laid.part(name) for name in laid.slices})
+        return cls(laid, state, packed(state), work, room, *np.zeros((2, 2)))
+
+    def take_up(self, laid: Laid) -> None:
+        """Begin where this holds."""
+        self.laid.real[:], self.laid.whole[:] = laid.real, laid.whole
+
+    def leave(self) -> Laid:
+        """What holds where the loop has ended."""
+        return self.laid.copy()
 
 
 def _slices(fields: dict[str, np.ndarray], names: tuple[str, ...]) -> dict[str, slice]:

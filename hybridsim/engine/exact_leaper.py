@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from hybridsim.engine.closed_form_block import ClosedFormBlock
-from hybridsim.engine.desk import Desk
+from hybridsim.engine.desk import Desk, Laid, laid_out
 from hybridsim.engine.event_work import work_space
 from hybridsim.engine.exact_leap import Record, leap_at_address, reach_leap, room_for
 from hybridsim.engine.jit import Door
@@ -23,7 +23,6 @@ from hybridsim.engine.trajectory import Trajectory
 
 _SEGMENTS = 1024  # room for one call
 _NONE = np.zeros(0, dtype=np.int64)
-_OF_SEGMENTS = dict.fromkeys(("ends", "rows", "vectors", "coordinates"))  # arrays of a record
 
 _leap = Door(leap_at_address)
 
@@ -68,13 +67,13 @@ class ExactLeaper:
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]
 
-    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt | None:
+    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
         """Call the kernel; None where there are no tables."""
         system, shelf = self.system, self.shelf
-        shelf.surround(outcome.z)
+        shelf.surround(laid.part("z"))
         tapes, inputs = shelf.tapes, system.registers.inputs
         horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(system, tapes.modes, p, horizon)
+        found = tables_of(system, tapes.modes, laid.part("p"), horizon)
         if found is None:
             self.horizon = horizon
             return None
@@ -87,9 +86,9 @@ class ExactLeaper:
             desk = spare.pop()
         except IndexError:
             work = work_space(system, len(tables.kinds), len(tables.factors))
-            desk = Desk.of(outcome, p, work, room_for(system, tables))
+            desk = Desk.of(laid, work, room_for(system, tables))
             reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
-        desk.take_up(outcome, p)
+        desk.take_up(laid)
         room = desk.room
         room.rates[:], room.longest[0] = system.rates, self.longest
         room.times[:] = *target, *origin
@@ -98,24 +97,18 @@ class ExactLeaper:
         began = perf_counter()
         code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
         seconds = perf_counter() - began
-        z, after = desk.leave()
-        clock, count, beside = (
-            room.times[2:].tolist(),
-            int(room.committed[0]),
-            (tables, horizon, hints.copy()),
-        )
+        end, clock, count = desk.leave(), room.times[2:].tolist(), int(room.committed[0])
+        beside = (tables, horizon, hints.copy())
         spare.append(desk)
-        shelf.surround(z)
+        shelf.surround(end.part("z"))
         has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
-        return Leapt(
-            system, self.sheet.rows(memory), 0, code, count, count, z, clock, after, has_news, seconds, beside
-        )
+        return Leapt(system, self.sheet, memory, 0, code, count, count, clock, end, has_news, seconds, beside)
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
-        leapt, self.leapt = self.leapt or self.go(origin, outcome, p, target), None
+        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
         if leapt is None:
             return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
         _, self.horizon, self.hints = leapt.beside
@@ -132,7 +125,7 @@ class ExactLeaper:
 
     def forget_segments(self, leapt: Leapt) -> bool:
         """Let go of all segments but the end of the last one."""
-        leapt.forget_segments(_OF_SEGMENTS)
+        leapt.forget_segments()
         return True
 
     def _sheet(self, tables: LinearTables) -> Sheet:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.desk import Desk
+from hybridsim.engine.desk import Desk, laid_out
 from hybridsim.engine.event_work import MOST, work_space
 from hybridsim.engine.exact_leap import Record, reach_leap, room_for
 from hybridsim.engine.fleet_run import NEXT, SEGMENTS, Runs, run_fleet
@@ -185,7 +185,7 @@ class _Ship:
             np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
             np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
         )  # fmt: skip
-        desk = Desk.of(blank, p, work, room_for(system, tables))
+        desk = Desk.of(laid_out(blank, p), work, room_for(system, tables))
         size = 2 * SEGMENTS
         record = Record(
             ends=np.empty(size),

@@ -15,7 +15,7 @@ import numpy as np
 from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import SegmentBlock
 from hybridsim.engine.code_shelf import CodeShelf
-from hybridsim.engine.desk import Desk
+from hybridsim.engine.desk import Desk, Laid, laid_out
 from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.jit import Door
 from hybridsim.engine.leap import Record, Room, leap
@@ -49,7 +49,6 @@ _SEGMENTS = 1024  # room for one call
 _ROOM, _FEWEST = LARGEST // 8, 64
 _GROWTH, _LONGEST = 8, 1 << 23  # of that room, for a segment that is longer
 _NONE = np.zeros(0, dtype=np.int64)
-_OF_SEGMENTS = dict.fromkeys(("steps", "series", "segments", "vectors"))  # arrays of a record
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
 
@@ -195,18 +194,20 @@ class Leaper(ABC):
             self._renew()
         self.used = (rows, segments)
 
-    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt:
+    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt:
         """Call the kernel."""
-        self.shelf.surround(outcome.z)
-        clock, to = np.array(origin), np.array(target)
+        self.shelf.surround(laid.part("z"))
         try:
             desk = self.spare.pop()
         except IndexError:
-            desk = Desk.of(outcome, p, work_space(self.system), self._room())
+            desk = Desk.of(laid, work_space(self.system), self._room())
             reach_settling(
                 self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, desk.as_packed, desk.work
             )
-        desk.take_up(outcome, p)
+        desk.take_up(laid)
+        clock, to = desk.clock, desk.target
+        clock[0], clock[1] = origin
+        to[0], to[1] = target
         # before the leap: another thread may put the very modes on the shelf that this one lacks
         known = len(self.shelf.tapes.modes)
         rows, began = self._rows(), perf_counter()
@@ -215,36 +216,36 @@ class Leaper(ABC):
         self.shelf.look()
         self.codes.look(*self.taken)
         cost = self._cost(desk.room)
-        z, after = desk.leave()
+        end, at = desk.leave(), clock.tolist()
         self.spare.append(desk)
-        self.shelf.surround(z)
+        self.shelf.surround(end.part("z"))
         has_news = len(self.shelf.tapes.modes) != known
         assert self.memory is not None
-        rows, beside = self.sheet.rows(self.memory), (self.memory, self.used[0], cost)
+        first_step, first = self.used
         return Leapt(
             self.system,
-            rows,
-            self.used[1],
+            self.sheet,
+            self.memory,
+            first,
             code,
             steps,
             count,
-            z,
-            clock.tolist(),
-            after,
+            at,
+            end,
             has_news,
             seconds,
-            beside,
+            (first_step, cost),
         )
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
-        leapt, self.leapt = self.leapt or self.go(origin, outcome, p, target), None
+        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
         while True:
-            self.memory = leapt.beside[0]
+            self.memory = leapt.memory
             self.count(leapt, record.counters)
             is_too_long = leapt.is_full and leapt.count == 0 and self.used == (0, 0)  # a single segment
             if is_too_long and self.steps * _GROWTH * self.system.n * self.columns <= _LONGEST:
@@ -258,8 +259,7 @@ class Leaper(ABC):
                 self._renew()
             if is_full or not leapt.has_news:
                 break
-            outcome = leapt.after()
-            leapt = self.go(Instant(*leapt.clock), outcome, outcome.p, target)
+            leapt = self.go(Instant(*leapt.clock), leapt.end, target)
         end = PAUSED if is_full else (ARRIVED if leapt.is_at_target else BEFORE_SOMETHING)
         if len(instants) == 1:
             return Landing(Instant(*leapt.clock), leapt.after, end, instants[0], owners[0])
@@ -271,14 +271,14 @@ class Leaper(ABC):
     def count(self, leapt: Leapt, counters: Counters) -> None:
         """Add what a call has cost."""
         leapt.count_in(counters)
-        self._count(counters, leapt.steps, leapt.beside[2])
+        self._count(counters, leapt.steps, leapt.beside[1])
 
     def forget_segments(self, leapt: Leapt) -> bool:
         """Let go of all segments but the end of the last one, unless their steps are looked at."""
         if self.is_looked_at:
             return False
-        leapt.forget_segments(_OF_SEGMENTS)
-        leapt.beside, self.memory = (None, *leapt.beside[1:]), None
+        leapt.forget_segments()
+        self.memory = None
         return True
 
     def _rows(self) -> Any:
@@ -290,7 +290,7 @@ class Leaper(ABC):
 
     def segments_of(self, leapt: Leapt) -> SegmentBlock:
         """The segments of a call that has some, and has let go of none."""
-        first_step, first = leapt.beside[1], leapt.first
+        first_step, first = leapt.beside[0], leapt.first
         lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
         steps, begun = slice(first_step, first_step + leapt.steps), slice(first, first + leapt.count)
         ends[first] = 0
@@ -306,7 +306,7 @@ class Leaper(ABC):
 
     def _commit(self, leapt: Leapt, record: Trajectory) -> None:
         """Leave what one call has written to the trajectory: its segments and events."""
-        self.used = (leapt.beside[1] + leapt.steps, leapt.first + leapt.count + 1)
+        self.used = (leapt.beside[0] + leapt.steps, leapt.first + leapt.count + 1)
         if record.segments.is_end_alone and not self.is_looked_at:
             record.segments.keep_only(leapt.last_end)
         else:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,9 @@ from hybridsim.engine.pieces import Segment, end_point
 from hybridsim.engine.timepair import Instant
 
 if TYPE_CHECKING:
+    from hybridsim.engine.desk import Laid
     from hybridsim.engine.outcome import Outcome
+    from hybridsim.engine.packs import Sheet
     from hybridsim.engine.stepping import Counters
     from hybridsim.engine.system import System
 
@@ -25,10 +27,10 @@ class Leapt:
 
     Parameters
     ----------
-    rows : arrays of the record, a named tuple; of its segments those from `first` on were written.
+    sheet, memory : what the record is laid out by, and its blocks, that of the segments and that of the events; None
+        once the segments are let go of. What comes from row `first` on was written.
     code, steps, count : what the kernel returned: why it ended, and how many steps and segments there are.
-    z, clock : the modes and the instant (high, low) where it ended.
-    after : makes what holds there.
+    clock, end : the instant (high, low) where it ended, and what holds there.
     has_news : modes have been met on the way that were not known before, so that it may go on.
     seconds : in compiled code.
     beside : what else its leaper keeps of it.
@@ -36,27 +38,39 @@ class Leapt:
     """
 
     system: System
-    rows: Any
+    sheet: Sheet
+    memory: tuple[np.ndarray, ...] | None
     first: int
     code: int
     steps: int
     count: int
-    z: np.ndarray
     clock: list[float]
-    after: Callable[[], Outcome]
+    end: Laid
     has_news: bool
     seconds: float
     beside: Any
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        rows, first, count = self.rows, self.first, self.count
+        assert self.memory is not None
+        self._happened = rows = self.sheet.rows((None, self.memory[1]))
+        first, count = self.first, self.count
         self.events = 0  # how many of the segments an event ended: all but the last one in any case
         if count:  # else there may be no row left
             last = first + count  # where a segment ends is written where the next one would begin
-            rows.clocks[last], rows.modes[last] = self.clock, self.z
+            rows.clocks[last], rows.modes[last] = self.clock, self.end.part("z")
             self.events = count if rows.fires[last - 1] >= 0 else count - 1
         self._crossings: Crossings | None = None
+
+    @cached_property
+    def rows(self) -> Any:
+        """All arrays of the record, a named tuple."""
+        assert self.memory is not None
+        return self.sheet.rows(self.memory)
+
+    def after(self) -> Outcome:
+        """What holds where it ended."""
+        return self.end.outcome()
 
     @property
     def is_at_target(self) -> bool:
@@ -71,18 +85,23 @@ class Leapt:
     @property
     def instants(self) -> np.ndarray:
         """Instants of the events (E, 2)."""
-        return self.rows.clocks[self.first + 1 : self.first + 1 + self.events]
+        return self._happened.clocks[self.first + 1 : self.first + 1 + self.events]
 
     @property
     def owners(self) -> np.ndarray:
         """Components whose guards these events are (E,)."""
-        return self.system.owner[self.rows.fires[self._ended]]
+        return self.system.owner[self.fires]
+
+    @property
+    def fires(self) -> np.ndarray:
+        """Numbers of these guards (E,)."""
+        return self._happened.fires[self._ended]
 
     @property
     def crossings(self) -> Crossings | None:
         """The events; None if there are none."""
         if self._crossings is None and self.events:
-            rows, ended = self.rows, self._ended
+            rows, ended = self._happened, self._ended
             after = slice(ended.start + 1, ended.stop + 1)
             self._crossings = Crossings(
                 self.system,
@@ -109,14 +128,17 @@ class Leapt:
     @property
     def last_end(self) -> Segment:
         """The end of the last segment."""
-        rows, last = self.rows, self.first + self.count - 1
-        vector = rows.vectors[last] if self.vector is None else self.vector
+        rows, last = self._happened, self.first + self.count - 1
+        vector = self.rows.vectors[last] if self.vector is None else self.vector
         return end_point(Instant(*self.clock), rows.modes[last], vector, rows.jumps[last, -2])
 
-    def forget_segments(self, names: dict[str, None]) -> None:
-        """Let go of the arrays of these names; of the segments there is the end alone then."""
-        self.vector = self.rows.vectors[self.first + self.count - 1].copy()
-        self.rows = self.rows._replace(**names)
+    def forget_segments(self) -> None:
+        """Let go of the memory of the segments; there is the end of the last one alone then."""
+        assert self.memory is not None
+        self.vector = self.sheet.row(self.memory, "vectors", self.first + self.count - 1)
+        vars(self).pop("rows", None)
+        self.sheet.take_back(self.memory[0])
+        self.memory = None
 
     @property
     def _ended(self) -> slice:

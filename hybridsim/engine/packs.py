@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from hybridsim.engine.lent_memory import Lender
 _WORDS = 6  # of an array in the table: its address, and up to five lengths
 ALIGNED = 64  # bytes; numbers of any kind may begin there
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
+_RETURNED = 2  # first blocks that a sheet keeps at hand
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -158,6 +159,11 @@ def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, tab
     return address
 
 
+@lru_cache(64)
+def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
+    return np.array(numbers, dtype=np.int64)
+
+
 class Sheet:
     """Arrays of rows that lie one behind the other in a few blocks of memory.
 
@@ -188,16 +194,23 @@ class Sheet:
         self._lenders = [Lender(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
         form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
         self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
+        self._returned: list[np.ndarray] = []
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
 
     def blank(self) -> tuple[np.ndarray, ...]:
         """Blocks that nobody holds, with anything in them."""
-        return tuple(
-            [
-                np.empty(size, dtype=np.uint8) if lender is None else lender.block()
-                for size, lender in zip(self._sizes, self._lenders, strict=True)
-            ]
-        )
+        if self._returned:
+            return self._returned.pop(), *map(self._block, range(1, len(self._sizes)))
+        return tuple(map(self._block, range(len(self._sizes))))
+
+    def _block(self, k: int) -> np.ndarray:
+        lender = self._lenders[k]
+        return np.empty(self._sizes[k], dtype=np.uint8) if lender is None else lender.block()
+
+    def take_back(self, block: np.ndarray) -> None:
+        """A first block of which nobody holds any part: the next one."""
+        if len(self._returned) < _RETURNED:
+            self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
         """The arrays as kernels take them, without so many rows of each at the beginning."""
@@ -205,11 +218,21 @@ class Sheet:
             arrays = self.rows(blocks)
             first = skipped or self._from_the_first
             return self._kind(*(a[k:] for a, k in zip(arrays, first, strict=True)))
-        rows = self._from_the_first if skipped is None else np.array(skipped)
+        rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
         table = np.empty_like(self._words)
         address = _lay_out(self._words, self._steps, self._owners, rows, blocks, table)
         return Packed(None, table, self._type, address)
 
-    def rows(self, blocks: tuple[np.ndarray, ...]) -> Any:
-        """The arrays."""
-        return self._kind(*[np.ndarray(shape, d, blocks[k], offset) for shape, d, k, offset in self._places])
+    def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
+        """The arrays; None in place of those of blocks that are missing."""
+        return self._kind(
+            *[
+                None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
+                for shape, dtype, k, offset in self._places
+            ]
+        )
+
+    def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
+        """A copy of a row of the array of a name."""
+        shape, dtype, k, offset = self._places[self._kind._fields.index(name)]
+        return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()

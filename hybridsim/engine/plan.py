@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.desk import Laid, laid_out
 from hybridsim.engine.standing import Standing
 from hybridsim.engine.start import settled_start
 from hybridsim.engine.timepair import Instant
@@ -31,6 +32,7 @@ class Plan:
         self._pattern = self._leaper()
         self.begins_silently = False  # known after `start`: nothing is to be recorded there
         self._start: tuple[Outcome, np.ndarray] | None = None
+        self._laid: Laid | None = None  # the same
 
     def _leaper(self) -> Leaps | None:
         """The compiled loop, where method and model allow it."""
@@ -44,14 +46,16 @@ class Plan:
         return None if self._pattern is None else self._pattern.anew()
 
     @property
-    def silent_start(self) -> tuple[Outcome, np.ndarray] | None:
-        """What holds at the start, with the run-time vector there, and nobody may change; known from the second run on.
+    def silent_start(self) -> Laid | None:
+        """What holds at the start, which nobody may change; known from the second run on.
 
         None where something is to be recorded there, or at times known beforehand, or where there is no compiled loop.
         """
         system = self.system
         is_free = self._pattern is not None and not system.model.schedules and not system.signals
-        return self._start if is_free and self.begins_silently else None
+        if self._laid is None and is_free and self.begins_silently and self._start is not None:
+            self._laid = laid_out(*self._start)
+        return self._laid
 
     def start(self, due: tuple[int, ...]) -> Standing:
         """What holds just after the start, the schedules due then applied."""

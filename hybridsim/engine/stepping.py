@@ -13,6 +13,7 @@ from hybridsim.engine.system import System
 
 if TYPE_CHECKING:
     from hybridsim.engine.blocks import SegmentBlock
+    from hybridsim.engine.desk import Laid
     from hybridsim.engine.leapt import Leapt
     from hybridsim.engine.outcome import Outcome
     from hybridsim.engine.timepair import Instant
@@ -230,7 +231,7 @@ class Leaps(Protocol):
     ) -> Landing:
         """As far as ordinary events and the room for them go."""
 
-    def go(self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant) -> Leapt | None:
+    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
         """Call the kernel, and leave it at that; None where it cannot be called."""
 
     def count(self, leapt: Leapt, counters: Counters) -> None:

@@ -68,10 +68,11 @@ from hybridsim.engine.tape import (
 EXACTLY = 3  # order of states up to which events are judged: they are divided by their order
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
-_SHORTER = 0.5  # factor on a step over which a guard's series does not reach, at least
+_SHORTER = 0.5  # factor on a step over which a guard's series does not reach, where nothing tells more
 # Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
 SLACK = 1.5
 _TRIALS = 60  # halvings: down to nothing
+_FIRST, _SURELY = 4, 0.99  # terms that are looked at for a shorter step; share of it that serves surely
 _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 
 
@@ -383,6 +384,22 @@ def rough_inverse_root(x: float, n: int) -> float:
     return power * np.int64((np.int64(whole) + 1023) << 52).view(np.float64)
 
 
+@inlined
+def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
+    """A step below h over which the last term of a series is below rtol of one of its first four, or half of h.
+
+    is_before: the last but one, which is larger. One of the first four is the largest, or not much less, over a step
+    that serves: of exp(w t) with rtol = 1e-12 and order 24 the fourth. They tell the step at once.
+    """
+    last = order - 1 if is_before else order
+    found = 0.0
+    for k in range(min(_FIRST, last)):
+        if U[r, k] != 0.0:
+            found = max(found, rough_inverse_root(abs(U[r, last]) / (rtol * abs(U[r, k])), last - k))
+    found *= _SURELY
+    return found if 0.0 < found < h else _SHORTER * h
+
+
 @kernel
 def reach(
     code: int,
@@ -436,7 +453,7 @@ def reach(
             largest = max(largest, other)
             if term <= slack * rtol * largest:
                 break
-            h *= max(_SHORTER, 0.9 * _root(rtol * largest / term, order)) if largest > 0.0 else _SHORTER
+            h = shorter_reach(U, r, order, slack * rtol, h, abs(U[r, order]) * powers[order] < term)
             measure(code, U, watched, order, h, powers, totals)
     return h
 
