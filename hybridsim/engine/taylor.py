@@ -72,7 +72,7 @@ _SHORTER = 0.5  # factor on a step over which a guard's series does not reach, w
 # Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
 SLACK = 1.5
 _TRIALS = 60  # halvings: down to nothing
-_FIRST, _SURELY = 4, 0.99  # terms that are looked at for a shorter step; share of it that serves surely
+_FIRST, _SURELY = 4, 0.9  # terms that are looked at for a shorter step; share of it that serves surely
 _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
 
 
@@ -453,7 +453,7 @@ def reach(
             largest = max(largest, other)
             if term <= slack * rtol * largest:
                 break
-            h = shorter_reach(U, r, order, slack * rtol, h, abs(U[r, order]) * powers[order] < term)
+            h = shorter_reach(U, r, order, rtol, h, abs(U[r, order]) * powers[order] < term)
             measure(code, U, watched, order, h, powers, totals)
     return h
 
