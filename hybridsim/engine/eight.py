@@ -120,6 +120,16 @@ if ENABLED:
         return signature(_eight, _eight, _eight), generate
 
     @intrinsic
+    def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
+        """Whether each number of one is larger than that of the other."""
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
+            return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(WIDTH), (1 << WIDTH) - 1))
+
+        return signature(types.boolean, _eight, _eight), generate
+
+    @intrinsic
     def size(typingctx: Any, value: Any) -> Any:
         """Absolute values."""
 
@@ -155,6 +165,10 @@ else:
     def larger(value: Any, other: Any) -> Any:
         """The larger of two, the other where one is no number."""
         return np.where(value > other, value, other)
+
+    def all_larger(value: Any, other: Any) -> bool:
+        """Whether each number of one is larger than that of the other."""
+        return bool((value > other).all())
 
     def size(value: Any) -> Any:
         """Absolute values."""

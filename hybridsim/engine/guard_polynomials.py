@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.eight import WIDTH, all_larger, load, splat
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import inlined, polynomial_kernel
 from hybridsim.engine.linear_guards import TERMS
@@ -115,41 +116,31 @@ def _term(terms: Any, i: int, power: float) -> float:
 
 
 @inlined
-def stays_positive(terms: Any, first: int, rest: float, d: float, backward: Any) -> bool:
+def stays_positive(terms: Any, first: int, rest: float, d: float) -> bool:
     """Whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], m the number of terms.
 
-    By its coefficients in Bernstein form there. backward: room for them.
+    By its coefficients in Bernstein form there, which are two vectors.
     """
-    for j in range(TERMS):
-        backward[j] = 0.0
-    power, total = 1.0, 0.0
-    for i in range(0, TERMS, 4):  # four at a time: the sums are fetched and stored a quarter as often
-        u, v, w, z = (
-            _term(terms, first + i, power),
-            _term(terms, first + i + 1, power * d),
-            _term(terms, first + i + 2, power * d * d),
-            _term(terms, first + i + 3, power * d * d * d),
-        )
-        power *= d * d * d * d
-        total += abs(u) + abs(v) + abs(w) + abs(z)
-        for j in range(i, TERMS):  # the ones before have no part of these
-            backward[j] += (
-                _BERNSTEIN[i, j] * u
-                + _BERNSTEIN[i + 1, j] * v
-                + _BERNSTEIN[i + 2, j] * w
-                + _BERNSTEIN[i + 3, j] * z
-            )
+    low, also_low, high, also_high = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    power, square, total, at = 1.0, d * d, 0.0, 0
+    for i in range(0, TERMS, 2):  # two beside each other, which do not wait for each other
+        u, v = _term(terms, first + i, power), _term(terms, first + i + 1, power * d)
+        power *= square
+        total += abs(u) + abs(v)
+        x, y = splat(u), splat(v)
+        if i < WIDTH:  # of the later ones the first half has no part
+            low, also_low = low + load(_BERNSTEIN, at) * x, also_low + load(_BERNSTEIN, at + TERMS) * y
+        high = high + load(_BERNSTEIN, at + WIDTH) * x
+        also_high = also_high + load(_BERNSTEIN, at + TERMS + WIDTH) * y
+        at += 2 * TERMS
     count, square = TERMS - first, d
     while count > 0:  # rest d**count, by squares
         if count % 2 == 1:
             rest *= square
         square *= square
         count //= 2
-    lowest = rest + 2.0 * TERMS * UNIT * total
-    for j in range(TERMS):
-        if not backward[j] > lowest:
-            return False
-    return True
+    lowest = splat(rest + 2.0 * TERMS * UNIT * total)
+    return all_larger(low + also_low, lowest) and all_larger(high + also_high, lowest)
 
 
 @inlined

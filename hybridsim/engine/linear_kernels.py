@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.eight import WIDTH, load, splat, store
 from hybridsim.engine.few import few
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.guard_polynomials import (
@@ -282,15 +283,20 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
     The latter holds from here on as long as no block grows: |gamma| |B**m| |c|/m!, block by block.
     """
     size, rest = 0.0, 0.0
-    for i in range(TERMS):
-        terms[i] = 0.0
+    first, second = splat(0.0), splat(0.0)  # TERMS are two vectors
+    at = (k * lin.terms.shape[1] + g) * lin.terms.shape[2] * 2 * TERMS
     for j in range(lin.counts[k]):
+        few()
         real, imaginary = c[j].real, c[j].imag
         modulus = abs(real) + abs(imaginary)
         size += lin.sizes[k, g, j] * modulus
         rest += lin.rests[k, g, j] * modulus
-        for i in range(TERMS):
-            terms[i] += lin.terms[k, g, j, 0, i] * real - lin.terms[k, g, j, 1, i] * imaginary
+        x, y = splat(real), splat(imaginary)
+        first = first + (load(lin.terms, at) * x - load(lin.terms, at + TERMS) * y)
+        second = second + (load(lin.terms, at + WIDTH) * x - load(lin.terms, at + TERMS + WIDTH) * y)
+        at += 2 * TERMS
+    store(terms, 0, first)
+    store(terms, WIDTH, second)
     return size, rest
 
 
@@ -348,7 +354,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         return OPEN, 0.0
     farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
     is_due = 0.0 < hint <= min(bound, farthest)
-    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, lower):
+    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound):
         return NEVER, bound
     if is_due:
         moved(lin, k, c, hint, v)
@@ -358,9 +364,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         d = zero_of_terms(terms, rest_there, size_there, lower)
         if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
             width = falls_over(terms, rest_there, min(hint, _BACK * farthest))
-            if abs(d) < width and (
-                width == hint or stays_positive(start, order, grown * rest, hint - width, lower)
-            ):
+            if abs(d) < width and (width == hint or stays_positive(start, order, grown * rest, hint - width)):
                 return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
     for i in range(TERMS):
         terms[i] = start[i]
@@ -371,7 +375,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         room.points[0] += widest * widest
         reach = min(bound - s, farthest)
         d = past_dip(terms, order, reach, error, lower)
-        if d == 0.0 or not stays_positive(terms, order, grown * rest, d, lower):
+        if d == 0.0 or not stays_positive(terms, order, grown * rest, d):
             d = safe_step(terms, order, grown * rest, reach, lower)
         if d >= bound - s:
             return NEVER, bound
