@@ -365,7 +365,7 @@ def _root(x: float, n: int) -> float:
     return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
 
 
-@inlined
+@polynomial_kernel
 def rough_inverse_root(x: float, n: int) -> float:
     """x**(-1/n) for x >= 0, to three digits: cheaper than a power.
 
@@ -444,15 +444,16 @@ def reach(
             largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
             if term <= slack * rtol * largest or term == 0.0:
                 break
-            other = 0.0
-            for k in range(2, order - 2, 2):
-                largest = max(largest, abs(U[r, k]) * powers[k])
-                other = max(other, abs(U[r, k + 1]) * powers[k + 1])
-            if order % 2 == 0:
-                largest = max(largest, abs(U[r, order - 2]) * powers[order - 2])
-            largest = max(largest, other)
-            if term <= slack * rtol * largest:
-                break
+            if not term > slack * rtol * totals[j]:  # else none of them is large enough
+                a, b, c = 0.0, 0.0, 0.0
+                for k in range(2, order - 3, 3):  # three lines, which do not wait for each other
+                    a = max(a, abs(U[r, k]) * powers[k])
+                    b = max(b, abs(U[r, k + 1]) * powers[k + 1])
+                    c = max(c, abs(U[r, k + 2]) * powers[k + 2])
+                for k in range(max(order - 3, 2), order - 1):
+                    a = max(a, abs(U[r, k]) * powers[k])
+                if term <= slack * rtol * max(max(largest, a), max(b, c)):
+                    break
             h = shorter_reach(U, r, order, rtol, h, abs(U[r, order]) * powers[order] < term)
             measure(code, U, watched, order, h, powers, totals)
     return h
