@@ -92,21 +92,23 @@ if ENABLED:
     _LEVEL = 2  # of LLVM's passes
 
     def _settings() -> tuple[Any, Any]:
-        """Level of LLVM's passes, and the machine whose costs they go by."""
-        return numba.config.OPT, _codegen()._tm
+        """Level of LLVM's passes, and the machine whose costs they go by; None where numba does not tell it."""
+        return numba.config.OPT, getattr(cpu_target.target_context.codegen(), "_tm", None)
 
     def _set(settings: tuple[Any, Any]) -> None:
-        numba.config.OPT, _codegen()._tm = settings
-
-    def _codegen() -> Any:
-        return cpu_target.target_context.codegen()
+        numba.config.OPT, machine = settings
+        if machine is not None:
+            cpu_target.target_context.codegen()._tm = machine
 
     @cache
     def _plain_machine() -> Any:
-        """This machine with what it has, and the costs of none in particular."""
+        """This machine with what it has, and the costs of none in particular; None where numba does not tell it."""
+        features = getattr(cpu_target.target_context.codegen(), "_tm_features", None)
+        if features is None or _settings()[1] is None:
+            return None
         cpu = "x86-64" if binding.get_default_triple().startswith("x86_64") else "generic"
         return binding.Target.from_default_triple().create_target_machine(
-            cpu=cpu, features=_codegen()._tm_features, jit=True
+            cpu=cpu, features=features, jit=True
         )
 
     def _ours() -> tuple[Any, Any]:
