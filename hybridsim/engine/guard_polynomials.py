@@ -48,11 +48,12 @@ def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[
 
 
 @inlined
-def safe_step(terms: Any, first: int, rest: float, longest: float, lower: Any) -> float:
+def safe_step(terms: Any, first: int, rest: float, longest: float, error: float, lower: Any) -> float:
     """A step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] > 0, m the number of terms.
 
     Positive terms after the first negative one are left out, so that the bound has one zero (Descartes' rule), and is
-    positive before every point at which it is. lower: room for its terms.
+    positive before every point at which it is. lower: room for its terms. error: of a guard that begins away from zero,
+    above which it stays if it is there.
     """
     m = TERMS - first
     is_down = False
@@ -60,6 +61,8 @@ def safe_step(terms: Any, first: int, rest: float, longest: float, lower: Any) -
         a = terms[first + i]
         is_down = is_down or a < 0.0
         lower[m - 1 - i] = min(a, 0.0) if is_down else a
+    if first == 0:
+        lower[m - 1] -= min(error, 0.5 * lower[m - 1])
     d = longest
     a, b, c = lower[m - 1], lower[m - 2], lower[m - 3]
     if b < 0.0 or c < 0.0:  # the zero of three terms is a good guess
@@ -116,10 +119,11 @@ def _term(terms: Any, i: int, power: float) -> float:
 
 
 @inlined
-def stays_positive(terms: Any, first: int, rest: float, d: float) -> bool:
+def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) -> bool:
     """Whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], m the number of terms.
 
-    By its coefficients in Bernstein form there, which are two vectors.
+    By its coefficients in Bernstein form there, which are two vectors. error: of the guard itself, which times
+    x**first this is; it counts as at the end.
     """
     low, also_low, high, also_high = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     power, square, total, at = 1.0, d * d, 0.0, 0
@@ -139,7 +143,9 @@ def stays_positive(terms: Any, first: int, rest: float, d: float) -> bool:
             rest *= square
         square *= square
         count //= 2
-    lowest = splat(rest + 2.0 * TERMS * UNIT * total)
+    for _ in range(first):
+        error /= d
+    lowest = splat(rest + 2.0 * TERMS * UNIT * total + error)
     return all_larger(low + also_low, lowest) and all_larger(high + also_high, lowest)
 
 

@@ -354,7 +354,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         return OPEN, 0.0
     farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
     is_due = 0.0 < hint <= min(bound, farthest)
-    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound):
+    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, margin * size):
         return NEVER, bound
     if is_due:
         moved(lin, k, c, hint, v)
@@ -364,7 +364,9 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         d = zero_of_terms(terms, rest_there, size_there, lower)
         if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
             width = falls_over(terms, rest_there, min(hint, _BACK * farthest))
-            if abs(d) < width and (width == hint or stays_positive(start, order, grown * rest, hint - width)):
+            if abs(d) < width and (
+                width == hint or stays_positive(start, order, grown * rest, hint - width, margin * size)
+            ):
                 return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
     for i in range(TERMS):
         terms[i] = start[i]
@@ -375,8 +377,8 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         room.points[0] += widest * widest
         reach = min(bound - s, farthest)
         d = past_dip(terms, order, reach, error, lower)
-        if d == 0.0 or not stays_positive(terms, order, grown * rest, d):
-            d = safe_step(terms, order, grown * rest, reach, lower)
+        if d == 0.0 or not stays_positive(terms, order, grown * rest, d, margin * size):
+            d = safe_step(terms, order, grown * rest, reach, margin * size, lower)
         if d >= bound - s:
             return NEVER, bound
         if not s + d > s:

@@ -220,15 +220,32 @@ def _before(
 
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
-) -> tuple[np.ndarray, int]:
-    """The pattern of a piece of one sign, where its values come to within what rounding may have made of them all.
+) -> np.ndarray:
+    """The pattern of a piece with open stretches where its values come to within what rounding may have made of them.
 
     A misfit tells of roundings that differ from sample to sample; one that is common to them, such as that of the steps
-    before, shifts the dip unseen. At the ends of a step rounding has its own rules.
+    before, shifts the dip unseen. At the ends of a step rounding has its own rules, and where the sign changes the
+    pattern tells already.
     """
     found, count = sign_pattern(coefficients, bounds)
-    at_an_end = (is_first and found[0, 2] == 0) or (is_last and found[count - 1, 2] == 0)
-    return (rows, 1) if at_an_end else (found, count)
+    signs = [None, *found[:count, 2].tolist(), None]
+    if (is_first and signs[1] == 0) or (is_last and signs[-2] == 0):
+        return rows
+    touches = [
+        (left, right)
+        for (left, right, sign), before, after in zip(
+            found[:count].tolist(), signs[:-2], signs[2:], strict=True
+        )
+        if sign == 0 and (before is None or after is None or before == after)
+    ]
+    parts = []
+    for left, right, sign in rows.tolist():
+        for begin, end in touches if sign else ():
+            if left <= begin and end <= right:
+                parts += [(left, begin, sign), (begin, end, 0.0)]
+                left = end
+        parts.append((left, right, sign))
+    return np.array([part for part in parts if part[0] < part[1]])
 
 
 def find_roots(
@@ -286,9 +303,10 @@ def find_roots(
         bounds = np.full(DEGREE + 1, max(error, floor))
         n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
         rows, count = sign_pattern(coefficients[:n], bounds[:n])
-        if count == 1 and rows[0, 2] and n > DEGREE and (rows[0, 2] * coefficients).min() <= touching:
+        if n > DEGREE and (count > 1 or (rows[0, 2] and (rows[0, 2] * coefficients).min() <= touching)):
             bounds = np.maximum(bounds, _ROUNDINGS_BEFORE * rounding())
-            rows, count = _with_touches(coefficients, bounds, rows, a == 0.0, b == 1.0)
+            rows = _with_touches(coefficients, bounds, rows[:count], a == 0.0, b == 1.0)
+            count = len(rows)
         for left, right, sign in rows[:count]:
             x, y = a + (b - a) * left, a + (b - a) * right
             if sign == 0:
