@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.jit import allocating_kernel, kernel
+from hybridsim.engine.jit import allocating_kernel, call, kernel
 from hybridsim.engine.stepping import Dense
+
+_DEFECT = 100.0  # times the tolerance: by how much a step may miss the flow between its ends, over its length
 
 
 @cache
@@ -37,11 +39,12 @@ def bernstein_weights(count: int) -> np.ndarray:
 
 
 class Hermite(NamedTuple):
-    """The matrices of one K: `shift_matrix`, `right_system`, `bernstein_weights`."""
+    """The matrices of one K: `shift_matrix`, `right_system`, `bernstein_weights`, `middle_weights`."""
 
     shift: np.ndarray
     inverse: np.ndarray
     weights: np.ndarray
+    middle: np.ndarray
 
 
 @kernel
@@ -78,6 +81,61 @@ def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack:
             total += abs(out[i, k])
         power *= h
     return total < math.inf
+
+
+@cache
+def middle_weights(count: int) -> np.ndarray:
+    """Of the terms of the left series at theta = 1 in the value of the polynomial at theta = 1/2, and in its slope.
+
+    Terms of the right series, theta running backward from there, have the same weights; in the slope with other signs.
+    """
+    found, lack = np.empty((2, count)), np.empty(count)
+    for k in range(count):
+        left, right, out = np.eye(count)[[k]], np.zeros((1, count)), np.empty((1, 2 * count))
+        fit(left, right, 1.0, shift_matrix(count), right_system(count), lack, out)
+        polynomial = np.polynomial.Polynomial(out[0])
+        found[:, k] = polynomial(0.5), polynomial.deriv()(0.5)
+    return found
+
+
+@kernel
+def holds_between(
+    flow: Any,
+    weights: Any,
+    s: float,
+    h: float,
+    left: Any,
+    right: Any,
+    p: Any,
+    z: Any,
+    tolerances: Any,
+    x: Any,
+    dx: Any,
+) -> bool:
+    """Whether in the middle of a step the polynomial meets the flow as well as the tolerances ask for.
+
+    The ends tell nothing of that: where a step ends before a sharp bend of the flow, such as that of a friction
+    smoothed over a small velocity, its last derivatives are those of the bend, and the polynomial is far off between
+    ends that are right. tolerances: rtol, atol. weights: `middle_weights`. x, dx (n,): room.
+    """
+    rtol, atol = tolerances
+    n, count = left.shape
+    for i in range(n):
+        value, power, sign = 0.0, 1.0, 1.0
+        for k in range(count):
+            value += weights[0, k] * power * (left[i, k] + sign * right[i, k])
+            power, sign = power * h, -sign
+        x[i] = value
+    call(flow, s + 0.5 * h, x, p, z, dx)
+    for i in range(n):
+        change, power, sign = 0.0, 1.0, 1.0
+        for k in range(count):
+            change += weights[1, k] * power * (left[i, k] - sign * right[i, k])
+            power, sign = power * h, -sign
+        size = max(abs(x[i]), max(abs(left[i, 0]), abs(right[i, 0])))
+        if abs(change - h * dx[i]) > _DEFECT * (atol[i] + rtol * size):
+            return False
+    return True
 
 
 @allocating_kernel

@@ -13,7 +13,7 @@ from typing import Any
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
-from hybridsim.engine.hermite import fit_in_time
+from hybridsim.engine.hermite import fit_in_time, holds_between
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
@@ -356,6 +356,12 @@ def rk_leap(
                 room.counts[1] += 1
                 h = min(h, _HALF * d) if error <= 1.0 else h
                 continue
+            if not holds_between(
+                functions.flow, hermite.middle, s, d, left, right, p, z, tolerances, room.ahead, slopes
+            ):
+                room.counts[1] += 1
+                h = _HALF * d
+                continue
             if is_linear:
                 outcome, g, at = first_linear_guard(tapes, k, watched.shape[0], d, hermite, room)
             elif fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, room.polynomial):
@@ -376,6 +382,10 @@ def rk_leap(
                 )  # fmt: skip
                 if code == LOST:
                     return STOPPED, first_step, n_segments
+                if code != REJECTED and not holds_between(
+                    functions.flow, hermite.middle, s, at, left, right, p, z, tolerances, room.ahead, slopes
+                ):
+                    code = REJECTED
                 if code == REJECTED:
                     room.counts[1] += 1
                     h = _HALF * at

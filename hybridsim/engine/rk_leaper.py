@@ -9,7 +9,14 @@ import numpy as np
 
 from hybridsim.engine.ends_shelf import EndsShelf
 from hybridsim.engine.guard_parts import GuardParts
-from hybridsim.engine.hermite import Hermite, bernstein_weights, fit_all, right_system, shift_matrix
+from hybridsim.engine.hermite import (
+    Hermite,
+    bernstein_weights,
+    fit_all,
+    middle_weights,
+    right_system,
+    shift_matrix,
+)
 from hybridsim.engine.jit import Door
 from hybridsim.engine.leaper import NOT_LINEAR, Leaper
 from hybridsim.engine.packs import packed
@@ -23,7 +30,9 @@ from hybridsim.engine.system import System
 TERMS = 4  # coefficients of the flow at each end of a step: the dense output has degree 7
 
 
-_HERMITE = packed(Hermite(shift_matrix(TERMS), right_system(TERMS), bernstein_weights(TERMS)))
+_HERMITE = packed(
+    Hermite(shift_matrix(TERMS), right_system(TERMS), bernstein_weights(TERMS), middle_weights(TERMS))
+)
 
 
 class Room(NamedTuple):
@@ -175,8 +184,8 @@ class RungeKuttaLeaper(Leaper):
     def _count(self, counters: Counters, steps: int, cost: tuple[int, int]) -> None:
         tries, rejected = cost
         counters.rejected += rejected
-        # the slope comes with the series
-        counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + steps
+        # the slope comes with the series; one more in the middle
+        counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + 2 * steps
 
     def _block(self, *arrays: np.ndarray) -> HermiteBlock:
         return HermiteBlock(self.system, *arrays)

@@ -87,6 +87,10 @@ class OneStepStepper(ABC):
     def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         """Dense output of an accepted step."""
 
+    def _holds(self, start: Point, end: Point) -> bool:
+        """Whether the dense output of a step that is right at its end is so on the way."""
+        return True
+
     def step(self) -> Step:
         """The next accepted step."""
         direction, start = math.copysign(1.0, self.bound), self.here
@@ -100,11 +104,14 @@ class OneStepStepper(ABC):
             trial = self._attempt(start, direction * h)
             self.h = next_length(h, trial.error, self.error_order, self._memory)
             if trial.error <= 1.0:
-                break
+                s = self.bound if last else start.s + direction * h
+                end = self._point(s, self.flow.landed(s, trial.x))
+                if self._holds(start, end):
+                    break
+                self.h = _SHORTER * h
             self.flow.counters.rejected += 1
-        s = self.bound if last else start.s + direction * h
-        self.here = self._point(s, self.flow.landed(s, trial.x))
-        return Step(start.s, s, start.x, self.here.x, self._dense(start, self.here, trial))
+        self.here = end
+        return Step(start.s, s, start.x, end.x, self._dense(start, end, trial))
 
     def restep(self, step: Step, s: float) -> Step:
         """The step up to s in one step of exactly that length, or a shorter one where its error asks for it.

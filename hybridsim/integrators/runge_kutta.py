@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.hermite import hermite
+from hybridsim.engine.hermite import hermite, holds_between, middle_weights
 from hybridsim.engine.leaper import compile_leaps
 from hybridsim.engine.rk_leaper import RungeKuttaLeaper
 from hybridsim.engine.rk_step import Tableau, attempt
@@ -57,6 +57,16 @@ class RungeKuttaStepper(OneStepStepper):
             out,
         )
         return Trial(out, error)
+
+    def _holds(self, start: Point, end: Point) -> bool:
+        flow, (x, dx) = self.flow, np.empty((2, self.flow.n))
+        if not flow.system.has_tape:  # its derivatives are differences, and less than the tolerances ask for
+            return True
+        flow.counters.rhs_evaluations += 1
+        weights, ends = middle_weights(start.series.shape[1]), (start.series, end.series)
+        return holds_between(
+            self._address, weights, start.s, end.s - start.s, *ends, flow.p, flow.z, self.control, x, dx
+        )
 
     def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         made: list[Dense] = []

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.engine.hermite import hermite
+from hybridsim.engine.hermite import hermite, middle_weights
 
 
 def taylor(coefficients: list[Fraction], at: Fraction, count: int) -> list[Fraction]:
@@ -63,3 +63,19 @@ def test_it_meets_its_ends_where_the_local_times_are_not_representable_multiples
     dense = hermite(s0, s1, np.array([[0.3, 1.0]]), np.array([[0.7, -1.0]]))
     assert dense(np.array([s0]))[0, 0] == 0.3
     assert dense(np.array([s1]))[0, 0] == 0.7
+
+
+def test_the_middle() -> None:
+    """Weights of both ends in value and slope there, against the polynomial of random ends."""
+    draw = np.random.default_rng(5)
+    for count in (2, 3, 4):
+        left, right = draw.normal(size=(2, 1, count))
+        h, signs = 0.7, (-1.0) ** np.arange(count)
+        value, slope = middle_weights(count) @ (h ** np.arange(count) * left[0])
+        value += middle_weights(count)[0] @ (h ** np.arange(count) * signs * right[0])
+        slope -= middle_weights(count)[1] @ (h ** np.arange(count) * signs * right[0])
+        dense = hermite(0.0, h, left, right)
+        near = 1e-4
+        assert dense(np.array([0.5 * h]))[0, 0] == pytest.approx(value, rel=1e-12)
+        difference = np.diff(dense(np.array([0.5 * h - near, 0.5 * h + near]))[:, 0])[0] / (2.0 * near)
+        assert slope / h == pytest.approx(difference, rel=1e-5, abs=1e-5)

@@ -412,3 +412,13 @@ def test_a_dip_that_rounding_has_shifted_is_flagged(width: float) -> None:
     assert [g.theta for g in dips.grazings] == [pytest.approx(theta, abs=1e-7)]
     clear = Search(lambda x: ((x - theta) ** 2 + 1e-12) / width**2, side=1, rounding=UNIT)
     assert (clear.crossings, clear.grazings) == ([], [])
+
+
+def test_a_dip_within_rounding_before_a_zero_on_the_same_piece() -> None:
+    """A rounding that is common to all values lifts it above zero; it is told all the same."""
+    search = Search(lambda s: ((s - 0.3) ** 2 + 4.0 * UNIT) * (0.7 - s), side=1, stop=-1)
+    assert search.samples < 100  # the step is one piece
+    assert search.roots == pytest.approx([0.7], abs=1e-15)
+    assert [g.theta for g in search.grazings] == pytest.approx([0.3], abs=1e-5)
+    far = Search(lambda s: ((s - 0.3) ** 2 + 1e-9) * (0.7 - s), side=1, stop=-1)
+    assert far.grazings == [] and far.roots == pytest.approx([0.7], abs=1e-15)
