@@ -98,7 +98,7 @@ _leads_nowhere = Door(leads_nowhere)
 
 def _is_over(system: System, leapt: Leapt) -> bool:
     """Whether the call is all of the run for certain: its events have no limit, and hide no bounces."""
-    if not leapt.is_at_target or leapt.has_news:
+    if not leapt.is_at_target or leapt.has_news or not leapt.count:
         return False
     if leapt.events == 0:
         return True

@@ -4,7 +4,8 @@ Of a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) no term is seen far
 step begins, and may be at its end, with all of the pulse between. The argument u is seen all the way. A step ends where
 |u| becomes small, beyond which the series show what comes, and where exp(u) is largest inside of a step, at which the
 look at the end of the step shows it. The same holds for hyperbolic functions, which differ from their limits by
-exponentials, and for roots: v/sqrt(v**2 + w**2) is 1 or -1 far away, and its series shows no change of sign.
+exponentials, and for roots: v/sqrt(v**2 + w**2) is 1 or -1 far away, and its series shows no change of sign. A power
+of an exponential fades as much sooner: u is looked at times the power.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from hybridsim.engine.first_exit import halve, to_bernstein
 from hybridsim.engine.jit import call_apart, call_series, inlined, kernel
 
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
+MOST_POWER = 64  # that is told apart
 # Where exp(u) changes by a factor of exp(8) or less within a step its series shows it.
 _SEEN = 8.0
 # |u| from which on exp(u) is faint, and where in between the step ends that comes from there; from farther away it ends
@@ -30,6 +32,18 @@ _DEEPEST, _MOST_PIECES = 40, 400
 PIECES = _DEEPEST + 2  # that wait at once, at most
 _POLISHED, _CLOSE = 60, 1e-8  # steps towards an extremum, and when it is near enough
 _HALVED = 40  # times, at most, between two parts
+
+
+@inlined
+def register_of(number: int) -> int:
+    """The register that a number of `hybridsim.engine.mode_code.fading` is of."""
+    return number // (KINDS * MOST_POWER)
+
+
+@inlined
+def power_of(number: int) -> int:
+    """The power to which what fades is raised, at most: u times as much is the argument of what it comes to."""
+    return number // KINDS % MOST_POWER + 1
 
 
 @inlined

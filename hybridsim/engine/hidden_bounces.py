@@ -140,7 +140,7 @@ def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Dep
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
         if abs(value) <= bound and curve < 0.0 < rate:
-            return _Departure(rate, -rate / curve, -4.0 * curve * bound / rate**2)
+            return _Departure(rate, -rate / curve, -4.0 * (curve / rate) * (bound / rate))
     return None
 
 

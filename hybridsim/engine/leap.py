@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import KINDS, may_end, where_it_ends
+from hybridsim.engine.faint_terms import KINDS, may_end, power_of, register_of, where_it_ends
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
@@ -126,7 +126,7 @@ def series_at(
             U[j, k] = V[watched[j], k]
     for j in range(fading.shape[0]):
         for k in range(order + 1):
-            U[watched.shape[0] + j, k] = V[fading[j] // KINDS, k]
+            U[watched.shape[0] + j, k] = V[register_of(fading[j]), k]
 
 
 @inlined
@@ -289,9 +289,13 @@ def leap(
             if outcome == OPEN:
                 return STOPPED, first_step, n_segments
             for i in range(fading.shape[0]):
-                u, kind = guard_series[count + i], fading[i] % KINDS
+                u, kind, power = guard_series[count + i], fading[i] % KINDS, power_of(fading[i])
                 if sizes_code == 0:
                     totals[count + i] = sum_sizes(guard_series, count + i, order, powers)
+                if power > 1:
+                    totals[count + i] *= power
+                    for j in range(order + 1):
+                        u[j] *= power
                 if may_end(u, kind, totals[count + i]):
                     end = call_apart(
                         where_it_ends, (u, kind, order, d, room.a, room.stack, codes.bernstein[1])

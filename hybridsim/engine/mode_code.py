@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.bounds_code import Given
-from hybridsim.engine.faint_terms import EXPONENTIAL, HYPERBOLIC, KINDS, ROOT
-from hybridsim.engine.lean_tape import PAIRED
+from hybridsim.engine.faint_terms import EXPONENTIAL, HYPERBOLIC, KINDS, MOST_POWER, ROOT, register_of
+from hybridsim.engine.lean_tape import PAIRED, arguments_of
 from hybridsim.engine.series_code import ModeTape
-from hybridsim.engine.tape import EXP, LESS, SELECT, SINHCOSH, SQRT, TANGENT
+from hybridsim.engine.tape import EXP, LESS, MUL, SELECT, SINHCOSH, SQRT, TANGENT
 
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
@@ -34,7 +34,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
         states=tuple(tape["states"]),
         rates=tuple(lean.derivatives.tolist()),
         guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
-        fading=tuple(number // KINDS for number in fading(system, z)),
+        fading=tuple(register_of(number) for number in fading(system, z)),
         holding=frozenset(_holding(system, z)),
     )
 
@@ -64,9 +64,28 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Arguments of what may fade, as numbers KINDS r + kind of registers r; see `hybridsim.engine.faint_terms`."""
+    """Arguments of what may fade, as numbers of register, power and kind; see `hybridsim.engine.faint_terms`."""
     rows = _rows(system.lean_tape(z).rows)
-    return list(dict.fromkeys(KINDS * a + _KIND[op] for op, a, b, *_ in rows if _may_fade(op, b)))
+    found: dict[tuple[int, int], int] = {}
+    for op, a, b, _, out in rows:
+        if _may_fade(op, b):
+            power = 1 if op == SQRT else _highest_power(rows, out, 2 if op in PAIRED else 1)
+            found[a, _KIND[op]] = max(found.get((a, _KIND[op]), 1), power)
+    return [KINDS * (MOST_POWER * a + power - 1) + kind for (a, kind), power in found.items()]
+
+
+def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> int:
+    """To which power so many registers from the first on are raised by products, at most; by quotients the larger."""
+    powers = dict.fromkeys(range(first, first + count), 1)
+    for row in rows:
+        op, out = row[0], row[4]
+        if out in powers:
+            continue
+        known = [powers.get(a, 0) for a in arguments_of(row)]
+        power = sum(known) if op == MUL else max(known, default=0)
+        for k in range(2 if op in PAIRED else 1):
+            powers[out + k] = min(power, MOST_POWER)
+    return max(powers.values())
 
 
 def most_fading(system: System) -> int:

@@ -36,6 +36,7 @@ _CLOSEST = 40  # halvings toward the start of a step in search of a value that r
 # of the largest value on a step: a dip to below that is held against the rounding of the values
 _TOUCHING = 2.0**-40
 _ROUNDINGS_BEFORE = 8.0  # times the rounding of one step: what those before it may have left
+_TINY = 1e-290  # size of values below which rounding is no longer relative
 _NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
 
 # Chebyshev points of the second kind on [0, 1]
@@ -295,7 +296,7 @@ def find_roots(
             undefined = min(undefined, b if np.isfinite(samples[0]) else a)
             last, open_from, low = 0, -1.0, math.inf
             continue
-        resolved = error <= _ACCEPT * largest or depth == _DEEPEST or _GROWTH * largest <= floor
+        resolved = error <= _ACCEPT * largest or depth == _DEEPEST or _GROWTH * largest <= max(floor, _TINY)
         if not resolved and not (depth >= _ROUNDING_DEPTH and error <= _GROWTH * rounding()):
             middle = 0.5 * (a + b)
             waiting += [(middle, b, None, depth + 1), (a, middle, None, depth + 1)]

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.faint_terms import KINDS, PIECES, where_it_ends
+from hybridsim.engine.faint_terms import KINDS, PIECES, power_of, register_of, where_it_ends
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
 from hybridsim.engine.series import SeriesRun
@@ -62,7 +62,7 @@ class TaylorStepper:
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
         for number in self.fading:
-            u = self.series.V[number // KINDS]
+            u = power_of(number) * self.series.V[register_of(number)]
             end = where_it_ends(u, number % KINDS, self.series.order, direction * h, *self.pieces, 0)
             h = min(h, abs(end))
         smallest = _SMALLEST * math.ulp(abs(self.bound))

@@ -156,6 +156,10 @@ A, B = "((t - 0.45)/0.003)", "((t - 0.47)/0.01)"
         f"1e22*exp(-50 - {B}**2)",
         "1e22*exp(-1e4/(200 - 700*(t - 0.47)**2))",
         f"1/cosh({A})**2",
+        f"1/cosh({A})**16",  # powers fade as much sooner
+        f"1/cosh({B})**24",
+        f"(1 - tanh({A})**2)**8",
+        f"exp(-{A}**2)**8",
         f"1/(1 + sinh({B})**2)",
         f"tanh({A})**2*(1 - tanh({A})**2)",  # zero where the argument is
         f"{A}**2*exp(-{A}**2)",
@@ -259,3 +263,24 @@ def test_a_pulse_at_each_of_several_zeros(u: str, slopes: tuple[float, ...], rto
         hs.Model("one", [hs.State("x", 0, f"exp(-({u})**2/{w}**2)")]), (0, 20), integrator="taylor", rtol=rtol
     )
     assert sol.y[0, -1] == pytest.approx(sum(w * math.sqrt(math.pi) / s for s in slopes), rel=2e-5)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("power", [8, 24])
+def test_a_power_in_a_guard_and_of_a_state(power: int, rtol: float) -> None:
+    """1/cosh((x - c)/w)**n - 1/2 has its zeros at c - w acosh(2**(1/n)) and beyond; x' = 1."""
+    centre, width = 5.3, 0.01
+    guard = f"1/cosh((x - {centre})/{width})**{power} - 0.5"
+    modes = [
+        hs.Mode("low", guards=[hs.Guard("up", f"-({guard})", "high")]),
+        hs.Mode("high", guards=[hs.Guard("down", guard, "low")]),
+    ]
+    model = hs.Model("pair", [hs.State("x", 0, "1")], components=[hs.Component("c", modes, initial="low")])
+    half = width * math.acosh(2.0 ** (1.0 / power))
+    sol = hs.simulate(model, (0, 10), integrator="taylor", rtol=rtol)
+    assert sol.event_times("c") == pytest.approx([centre - half, centre + half], abs=10 * rtol)
+    # v' = 1 + 3/cosh(v/w)**n from v = -1: v = 1 after the integral of dv/v'
+    rate = hs.Model("slow", [hs.State("v", -1, f"1 + 3/cosh(v/{width})**{power}")])
+    needed = integral(lambda v: 1 / (1 + 3 / math.cosh(min(abs(v) / width, 20)) ** power), 1, [0], width)
+    sol = hs.simulate(rate, (0, 2 * needed), integrator="taylor", rtol=rtol)
+    assert sol.y[0, -1] == pytest.approx(1.0, abs=100 * rtol)
