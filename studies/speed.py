@@ -3,7 +3,8 @@
     python studies/speed.py [--scenes P1,belt] [--methods exact,heyoka] [--turns 15] [--out DIR]
 
 One run, one process; calls of all methods of a scene take turns. All give the same: once the events and the states at
-them, once the states at 2000 times besides. Writes docs/studies/speed.md and its pictures (or DIR).
+them, once the states at 2000 times besides. Writes docs/studies/speed.md and its pictures (or DIR). Needs what the
+tests need (pip install '.[test]'); rivals that are installed take part: pip install heyoka diffrax jax casadi pathsim.
 """
 
 from __future__ import annotations
@@ -34,9 +35,12 @@ def main() -> None:
     every, lacking = methods()
     if options.methods:
         wanted = options.methods.split(",")
+        names = [method.name for method in every]
         every = [method for method in every if any(method.name.startswith(name) for name in wanted)]
+        if not every:
+            raise SystemExit(f"no method begins with {options.methods!r}; there are {', '.join(names)}")
     if lacking:
-        print("not installed, left out:", ", ".join(lacking))
+        print("not installed, left out:", ", ".join(lacking), f"(pip install {' '.join(lacking)})")
     began = time.perf_counter()
     scenes, truths, found = {}, {}, {}
     for name in options.scenes.split(","):
@@ -64,6 +68,11 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=ROOT / "docs", help="where studies/ and images/ are")
     parser.add_argument("--truth", type=Path, default=None, help="folder where exact motions are kept")
     options = parser.parse_args()
+    unknown = [name for name in options.scenes.split(",") if name not in NAMES]
+    if unknown:
+        parser.error(f"there is no scene {unknown[0]!r}; there are {', '.join(NAMES)}")
+    if (options.methods or options.scenes != ",".join(NAMES)) and options.out == ROOT / "docs":
+        parser.error("a part of the study does not replace the page of the whole: give a folder with --out")
     options.out = options.out.resolve()
     options.truth = options.truth and options.truth.resolve()
     return options

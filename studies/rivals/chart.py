@@ -72,9 +72,10 @@ def _picture(
     wrong: str,
     point: Callable[[Line], tuple[float, float] | None],
 ) -> Path:
-    rows = math.ceil(len(found) / 2)
-    figure = style.figure(11.5, 3.4 * rows + 0.5)
-    panels = figure.subplots(rows, 2, squeeze=False).ravel()
+    columns = min(len(found), 2)
+    rows = math.ceil(len(found) / columns)
+    figure = style.figure(5.75 * columns, 3.4 * rows + 0.5)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
     drawn: list[tuple[Any, list[tuple[float, float, str, str]]]] = []
     for panel, (name, lines) in zip(panels, found.items()):
         points = []
@@ -98,6 +99,13 @@ def _picture(
         panel.set_xscale("log")
         panel.set_yscale("log")
         panel.margins(x=0.16, y=0.12)
+        for numbers, bounds in (
+            ([p[0] for p in points], panel.set_xlim),
+            ([p[1] for p in points], panel.set_ylim),
+        ):
+            if numbers and max(numbers) < 12.0 * min(numbers):  # two numbers at least stand along the axis
+                low, high = math.log10(0.8 * min(numbers)), math.log10(1.25 * max(numbers))
+                bounds(10.0 ** math.floor(low), 10.0 ** math.ceil(high))
         style.dress(panel)
         panel.set_title(scenes[name].title, fontsize=10, loc="left")
         panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
@@ -124,7 +132,13 @@ def _picture(
         linewidth=0,
         label=wrong,
     )
-    figure.legend(handles=[*handles, hollow], loc="outside upper left", ncols=5, frameon=False, fontsize=9)
+    figure.legend(
+        handles=[*handles, hollow],
+        loc="outside upper left",
+        ncols=5 if columns > 1 else 2,
+        frameon=False,
+        fontsize=9,
+    )
     FigureCanvasAgg(figure).draw()
     for panel, points in drawn:
         _name(panel, points)

@@ -19,12 +19,13 @@ _LIBRARIES = ("numpy", "numba", "scipy", "scikit-sundae", "heyoka", "jax", "diff
 def page(
     scenes: Mapping[str, Scene], truths: Mapping[str, Truth], found: Found, lacking: Sequence[str], text: str
 ) -> str:
-    """The whole page; `text` holds {machine}, {ratios}, {overhead} and {scenes}."""
+    """The whole page; `text` holds {machine}, {missed}, {ratios}, {overhead} and {scenes}."""
     tables = [_scene_table(scenes[name], truths[name], lines) for name, lines in found.items()]
     missing = f" Not installed: {', '.join(lacking)}." if lacking else ""
     return text.format(
         machine=machine() + missing,
         ratios=_ratios(found),
+        missed=_missed(found),
         wrong=_wrong(found),
         overhead=_overhead(found),
         scenes="\n\n".join(tables),
@@ -95,13 +96,21 @@ def _scene_table(scene: Scene, exact: Truth, lines: Sequence[Line]) -> str:
 
 
 def _ratios(found: Found) -> str:
-    rows = ["| ratio | aim | scene | times | ratio | of medians | |", "| --- " * 7 + "|"]
+    rows = ["| ratio | aim | scene | times | ratio | of medians | met | |", "| --- " * 8 + "|"]
     for r in ratios(found):
         times = f"{seconds(r.second)} / {seconds(r.first)}"
-        rows.append(
-            f"| {r.what} | {r.asked} | {r.scene} | {times} | {r.value:.3g} | {r.of_medians:.3g} | {r.note} |"
-        )
+        cells = (r.what, r.asked, r.scene, times, f"{r.value:.3g}", f"{r.of_medians:.3g}", r.verdict, r.note)
+        rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows)
+
+
+def _missed(found: Found) -> str:
+    """A sentence on the aims that are not met."""
+    with_aim = [r for r in ratios(found) if r.asked]
+    missed = [f"{r.what} on {r.scene} ({r.verdict.strip('*')})" for r in with_aim if r.verdict != "yes"]
+    if not missed:
+        return f"All {len(with_aim)} aims are met in this run, by the least times and by the medians."
+    return f"Of {len(with_aim)} aims {len(missed)} are not met in every way: {'; '.join(missed)}."
 
 
 def _wrong(found: Found) -> str:

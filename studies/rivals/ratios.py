@@ -31,6 +31,25 @@ class Ratio:
         """The second over the first."""
         return self.second / self.first
 
+    def meets(self, value: float) -> bool:
+        """Whether a ratio is what is aimed at; without an aim any is."""
+        if not self.asked:
+            return True
+        words, bound = self.asked.rsplit(maxsplit=1)
+        if words == "above":
+            return value > float(bound)
+        return value <= float(bound) if words == "at most" else value >= float(bound)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the aim is met, by the least times and by the medians."""
+        by = (self.meets(self.value), self.meets(self.of_medians))
+        if not self.asked:
+            return ""
+        return {(True, True): "yes", (True, False): "not by medians", (False, True): "by medians alone"}.get(
+            by, "**no**"
+        )
+
 
 def ratios(found: Found) -> list[Ratio]:
     """All that can be formed; times are the least, with events alone."""
