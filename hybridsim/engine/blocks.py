@@ -82,6 +82,9 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Times of those of a component, and of one kind if that is given."""
 
+    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
+        """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
+
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""
 
@@ -172,8 +175,15 @@ class OccurrenceList(list[Occurrence]):
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Times of those of a component and kind."""
-        found = [o.instant for o in self if o.component == component and kind in (None, o.kind)]
-        return np.array([float(instant) for instant in found])
+        return np.array([float(o.instant) for o in self._of(component, kind)])
+
+    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
+        """States (k, n) at the same, before (side 0) or after (1) them."""
+        found = [(o.x_minus, o.x_plus)[side] for o in self._of(component, kind)]
+        return np.array(found) if found else np.empty((0, 0))
+
+    def _of(self, component: str, kind: str | None) -> list[Occurrence]:
+        return [o for o in self if o.component == component and kind in (None, o.kind)]
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""

@@ -110,6 +110,17 @@ class Crossings(Sequence[Occurrence]):
                 return times if count == len(times) else times[:count]
         return np.empty(0)
 
+    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
+        """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
+        automata = self._system.automata
+        for c, automaton in enumerate(automata):
+            if automaton.name == component and kind in (None, automaton.kind):
+                if self._is_plain and len(automata) == 1:
+                    return self._states[self._first :, side].copy()
+                events, components = self._places
+                return self._states[events[components == c], side]
+        return np.empty((0, self._system.n))
+
     def kinds(self) -> Counter[str]:
         """How many there are of each kind."""
         found: Counter[str] = Counter()

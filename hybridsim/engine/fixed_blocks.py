@@ -159,10 +159,17 @@ class StepOccurrences(Sequence[Occurrence]):
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Times of those of a component; all are transitions."""
+        return self.times[self._are_of(component, kind)]
+
+    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
+        """States (k, n) at the same: nothing jumps."""
+        return self._x[self._are_of(component, kind)]
+
+    def _are_of(self, component: str, kind: str | None) -> np.ndarray:
         names = [a.name for a in self._system.automata]
         if component not in names or kind not in (None, "transition"):
-            return np.empty(0)
-        return self.times[self._components == names.index(component)]
+            return np.zeros(len(self), dtype=bool)
+        return self._components == names.index(component)
 
     def kinds(self) -> Counter[str]:
         """How many there are of each kind: all are transitions."""

@@ -300,6 +300,24 @@ class Solution(InTables):
     @refusing
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
+        found = [block.times_of(component, kind) for block in self._blocks_with(component)]
+        return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
+
+    @refusing
+    def event_states(self, component: str, kind: str | None = None, side: str = "+") -> np.ndarray:
+        """States (m, n) at the m events of one component, in the order of `event_times`.
+
+        side "+" is x+, just after each, "-" is x-; columns are in the order of ``sol.names``. The same as in
+        ``sol.events``, without an object for each event.
+        """
+        if side not in ("+", "-"):
+            raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+        found = [block.states_of(component, kind, "-+".index(side)) for block in self._blocks_with(component)]
+        found = [states for states in found if len(states)]
+        return found[0] if len(found) == 1 else np.concatenate([np.empty((0, self._system.n)), *found])
+
+    def _blocks_with(self, component: str) -> list[Any]:
+        """All blocks of what happened, once it is known that the component is one that may be heard of."""
         self._require_events()
         if component not in self._system.heard:
             known = list(self._system.heard)
@@ -307,8 +325,7 @@ class Solution(InTables):
                 f"the model has no component, monitor or schedule {component!r}",
                 remedy=nearest(component, known, kind="names"),
             )
-        found = [b.times_of(component, kind) for b in self._trajectory.occurrences.blocks]
-        return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
+        return self._trajectory.occurrences.blocks
 
     @property
     def components(self) -> tuple[Component, ...]:

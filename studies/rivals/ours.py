@@ -32,12 +32,14 @@ def method(
 
         def events() -> Any:
             sol = hs.simulate(model, span, save="events", **keywords)
-            found = sol.events if objects else [sol.event_times(name) for name in components]
-            return sol, found, None
+            return sol, sol.events if objects else happened(sol), None
 
         def on_grid() -> Any:
             sol = hs.simulate(model, span, t_eval=grid, **keywords)
-            return sol, [sol.event_times(name) for name in components], sol.y
+            return sol, happened(sol), sol.y
+
+        def happened(sol: hs.Solution) -> list[Any]:
+            return [(sol.event_times(name), sol.event_states(name)) for name in components]
 
         try:
             events()
