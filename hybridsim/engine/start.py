@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 
 from hybridsim.engine.outcome import Outcome, Situation
@@ -10,6 +13,7 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task
 
+_CLOSE = 1e-9  # of the largest state: by how much a surface may be missed where a mode is said to be on it
 _MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
 
 
@@ -24,7 +28,28 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
         # a corner has no side to change before it has found one
         known.changes = [change for change in known.changes if not system.is_corner[change.component]]
+        known.warnings = [*known.warnings, *_contradictions(system, task, p, known.z)]
         if len(system.starts) >= _MOST:
             system.starts.clear()
         system.starts[key] = known
     return known
+
+
+def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:
+    """A sentence for each mode that was asked for and that the state at the start rules out."""
+    told = [c for c in system.surface_of if task.z0[c] >= 0]
+    if not told:
+        return
+    x, z = task.x0[None], z.copy()
+    for c in system.surface_of:  # where a surface holds, the state would be looked at as it is put onto it
+        z[c] = system.automata[c].above
+    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x, p, z)[0].tolist()
+    near = _CLOSE * np.abs(task.x0).max(initial=0.0)
+    for c, value in zip(system.surface_of, values, strict=True):
+        automaton, mode = system.automata[c], task.z0[c]
+        wanted = {automaton.hold: 0.0, automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
+        if mode >= 0 and (abs(value) > near if wanted == 0.0 else value * wanted < -near):
+            yield (
+                f"{automaton.name} begins in mode {automaton.modes[mode]}, as it was told to, though the state at the "
+                f"start has its surface at {value:.6g}: the state was put onto the surface"
+            )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,13 +32,19 @@ def draw_orbit(
 ) -> Axes:
     """Draw `up` against `across` in the colours of the modes; held pieces thick, jumps dashed.
 
-    With several components, a colour stands for the mode of the first one, and a piece is held where any is.
+    With several components they are the modes of those that the quantities are of: a contact whose force or velocity is
+    drawn. Where there are none, or more than one, a colour stands for the mode of the first one, and a piece is held
+    where any is.
     """
     units = unit_of(solution, across), unit_of(solution, up)
     window = window_of(solution, t_span)
     pieces = pieces_of(solution, (across, up), window)
     if axes is None:
         axes = style.figure(6.2, 4.6).subplots()
+    concerned = _concerned(solution, {across, up})
+    pieces = [
+        replace(piece, modes={c: m for c, m in piece.modes.items() if c in concerned}) for piece in pieces
+    ]
     colours = style.mode_colours(solution.components)
     surfaces = {c.name: c.surface.hold for c in solution.components if c.surface}
     held_modes = set(surfaces.values())
@@ -65,6 +72,7 @@ def draw_orbit(
     style.dress(axes)
     for axis, name, unit, span in zip((axes.xaxis, axes.yaxis), (across, up), units, spans):
         label_axis(axis, name, unit, *span)
+    is_one_of_several = len(concerned) == 1 < len(solution.components)
     handles = [
         Line2D(
             [],
@@ -73,7 +81,7 @@ def draw_orbit(
             linewidth=(_HELD if mode in held_modes else _FREE) if mode in lines else 0,
             marker="o" if mode in dots else "",
             markersize=_DOT,
-            label=style.literal(mode),
+            label=style.literal(f"{concerned[0]}: {mode}" if is_one_of_several else mode),
         )
         for mode in colours
         if mode in lines or mode in dots
@@ -85,6 +93,13 @@ def draw_orbit(
     model = solution.model
     style.head(axes, model.title or model.name, window.note)
     return axes
+
+
+def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
+    """The components that the drawn quantities are of; all of them where none is."""
+    forces = [contact.name for contact in solution.model.contacts if contact.name in drawn]
+    moved = [contact.name for contact in solution.model.contacts if drawn & contact.velocity.names]
+    return forces or moved or [component.name for component in solution.components]
 
 
 def _stretches(

@@ -180,3 +180,23 @@ def test_save(tmp_path, suffix: str) -> None:
     assert path.stat().st_size > 10_000
     save(phase_portrait(ball()), path)
     save(phase_portrait(ball()).figure, path)
+
+
+def test_of_several_contacts_the_modes_are_those_of_the_one_that_is_drawn() -> None:
+    """The second of two bodies never sticks while the first one always does."""
+    states = [hs.State(f"{kind}{j}", 0, f"v{j}" if kind == "x" else None) for j in (1, 2) for kind in "x"]
+    states += [hs.State("v1", 0, "0 - f1"), hs.State("v2", 1, "-x2 + 20*cos(t) - f2")]
+    contacts = [
+        hs.Contact(f"f{j}", velocity=f"v{j}", normal="1", law="coulomb", arguments={"mu": 0.5})
+        for j in (1, 2)
+    ]
+    sol = hs.simulate(hs.Model("two", states=states, contacts=contacts), (0.0, 20.0))
+    assert {i.mode for i in sol.modes["f1"]} == {"stick"}
+    for axes, own in (
+        (phase_portrait(sol, "x2", "v2"), "f2"),
+        (friction_loop(sol, "f2", "x2"), "f2"),
+        (phase_portrait(sol, "x1", "v1"), "f1"),
+    ):
+        labels = [text.get_text() for text in axes.get_legend().get_texts()]
+        modes = {"jump", *(f"{own}: {i.mode}" for i in sol.modes[own])}
+        assert set(labels) <= modes and labels, (labels, modes)

@@ -1,0 +1,46 @@
+"""A mode at the start that the state there rules out is taken, and said so."""
+
+from __future__ import annotations
+
+import pytest
+
+import hybridsim as hs
+
+BELT = hs.Model(
+    "belt",
+    states=[hs.State("x", 0, "v"), hs.State("v", 0, "-x - f")],
+    contacts=[hs.Contact("f", velocity="v - 1", normal="1", law="coulomb", arguments={"mu": 0.5})],
+)
+
+
+@pytest.mark.parametrize(
+    "x0, z0, is_told",
+    [
+        ({"v": 1.0}, {"f": "stick"}, False),
+        ({"v": 0.0}, {"f": "stick"}, True),
+        ({"v": 2.0}, {"f": "slip-"}, True),
+        ({"v": 2.0}, {"f": "slip+"}, False),
+        ({"v": 1.0}, {"f": "slip-"}, False),
+        ({"v": 2.0}, None, False),
+    ],
+)
+@pytest.mark.parametrize("integrator", ["exact", "dop853", "scipy-dop853"])
+def test_a_contact(x0: dict[str, float], z0: dict[str, str] | None, is_told: bool, integrator: str) -> None:
+    for _ in range(2):  # the second time the start is known
+        sol = hs.simulate(BELT, (0.0, 0.01), x0=x0, z0=z0, integrator=integrator)
+        said = [text for text in sol.warnings if "as it was told to" in text]
+        assert sol.success and len(said) == is_told
+        assert all("f begins in mode" in text for text in said)
+
+
+def test_a_gap() -> None:
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", 1, "v"), hs.State("v", 0, "-9.81 + p")],
+        impacts=[hs.Impact("p", gap="h", restitution=0.5)],
+    )
+    assert not hs.simulate(ball, (0.0, 0.1), z0={"p": "open"}).warnings
+    assert any(
+        "p begins in mode closed" in text
+        for text in hs.simulate(ball, (0.0, 0.1), z0={"p": "closed"}).warnings
+    )
