@@ -9,8 +9,8 @@ from functools import cache
 from typing import Any
 
 from hybridsim.engine.cache import model_folder
+from hybridsim.engine.code_lines import Lines, function, number
 from hybridsim.engine.jit import compile_series
-from hybridsim.engine.series_code import Lines, function, number
 
 LEADING = 4  # so many numbers of leading coefficients that are zero by decree
 

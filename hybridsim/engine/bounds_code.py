@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hybridsim.engine.code_lines import DECLARATIONS, INF, NAN, ONE, ZERO, Lines, function, number
 from hybridsim.engine.lean_tape import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -20,19 +21,7 @@ from hybridsim.engine.lean_tape import (
     SINCOS_LINEAR,
     SUB_CONSTANT,
 )
-from hybridsim.engine.series_code import (
-    DECLARATIONS,
-    INF,
-    KNOWN,
-    NAN,
-    ONE,
-    TWINS,
-    ZERO,
-    Lines,
-    ModeTape,
-    function,
-    number,
-)
+from hybridsim.engine.series_code import KNOWN, TWINS, ModeTape
 from hybridsim.engine.tape import ADD, COPY, DIV, EXP, LESS, LESS_EQUAL, MUL, NEG, SELECT, SUB, TANGENT
 
 _UNIT = 2.0**-53  # unit roundoff of a double

@@ -14,11 +14,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hybridsim.engine.code_lines import TooLong
 from hybridsim.engine.jit import ENABLED, compile_series, is_kept
 from hybridsim.engine.mode_code import KNOWN, NEVER, WORTH, kept, mode_tape
 from hybridsim.engine.mode_tables import Tapes
 from hybridsim.engine.packs import packed
-from hybridsim.engine.series_code import ModeTape, TooLong
+from hybridsim.engine.series_code import ModeTape
 from hybridsim.engine.system import System
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.bounds_code import bounds_text, can_bound
+from hybridsim.engine.code_lines import TooLong
 from hybridsim.engine.jit import ENABLED, compile_series, is_kept
 from hybridsim.engine.mode_code import (
     KNOWN,
@@ -26,7 +27,6 @@ from hybridsim.engine.mode_code import (
 )
 from hybridsim.engine.modes_index import index_of
 from hybridsim.engine.packs import packed
-from hybridsim.engine.series_code import TooLong
 from hybridsim.engine.system import System
 
 _ALL = 27  # vectors of modes, as of three contacts: so many are on a shelf from the first on

@@ -15,10 +15,10 @@ constants, out), x the states, or along a step their coefficients.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from hybridsim.engine.code_lines import DECLARATIONS, INF, NAN, ONE, ZERO, Lines, function, number
 from hybridsim.engine.high_orders import (
     FACTOR,
     HAS_B,
@@ -38,15 +38,12 @@ from hybridsim.engine.lean_tape import (
     SUB_CONSTANT,
     needed_rows,
 )
+from hybridsim.engine.power_sums import Powers
 from hybridsim.engine.tape import ADD, COPY, DIV, EXP, LESS, MUL, NEG, SELECT, SINCOS, SQRT, SUB, TANGENT
 from hybridsim.engine.taylor import EXACTLY
 
-# A function of so many lines is compiled in half a second; a longer one is left to the interpreter.
-_LONGEST = 12000
 TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # they keep a companion series in the next register
 _COSTLY = (*TWINS, EXP)  # of which order 0 takes as long as all other orders
-_COMMUTES = ("fadd", "fmul")
-ZERO, ONE, NAN, INF = "0.0", "1.0", "0x7FF8000000000000", "0x7FF0000000000000"
 KNOWN = frozenset(
     (
         COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
@@ -54,191 +51,10 @@ KNOWN = frozenset(
     )
 )  # fmt: skip
 
-DECLARATIONS = """
-declare double @llvm.sin.f64(double)
-declare double @llvm.cos.f64(double)
-declare double @llvm.exp.f64(double)
-declare double @llvm.sqrt.f64(double)
-declare double @llvm.fabs.f64(double)
-declare double @llvm.fmuladd.f64(double, double, double)
-declare <4 x double> @llvm.fabs.v4f64(<4 x double>)
-declare <4 x double> @llvm.fmuladd.v4f64(<4 x double>, <4 x double>, <4 x double>)
-declare double @c_tan(double)
-declare double @c_tanh(double)
-"""
-
 
 def _results(op: int) -> int:
     """How many registers an operation fills."""
     return 2 if op in TWINS else 1
-
-
-class TooLong(Exception):
-    """The code of a tape would take too long to compile."""
-
-
-def number(value: float) -> str:
-    """A double as LLVM writes it, exactly."""
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
-
-
-class Lines:
-    """The lines of one function, each value once."""
-
-    def __init__(self, prefix: str = "v") -> None:
-        self.lines: list[str] = []
-        self._prefix = prefix  # of the names of values
-        self._known: dict[tuple[str, ...], str] = {}
-
-    def put(self, line: str) -> None:
-        """A line that gives no value."""
-        self.lines.append(line)
-        if len(self.lines) > _LONGEST:
-            raise TooLong
-
-    def value(self, form: str, *parts: str) -> str:
-        """The value that a line gives; its parts are put for the braces of its form."""
-        key = (form, *parts)
-        if key not in self._known:
-            name = f"%{self._prefix}{len(self._known)}"
-            self.put(f"  {name} = {form.format(*parts)}")
-            self._known[key] = name
-        return self._known[key]
-
-    def op(self, name: str, a: str, b: str) -> str:
-        """Arithmetic of two doubles."""
-        if name in _COMMUTES and b < a:
-            a, b = b, a
-        return self.value(name + " double {}, {}", a, b)
-
-    def negative(self, a: str) -> str:
-        """-a."""
-        return self.value("fneg double {}", a)
-
-    def call(self, name: str, a: str) -> str:
-        """A function of one double."""
-        return self.value("call double @" + name + "(double {})", a)
-
-    def over(self, a: str, k: int) -> str:
-        """a / k, as states have it."""
-        if k == 1:
-            return a
-        return self.op("fdiv", a, number(k)) if k <= EXACTLY else self.op("fmul", a, number(1.0 / k))
-
-    def load(self, array: str, i: int) -> str:
-        """An element of an array that nobody writes to."""
-        place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
-        return self.value("load double, ptr {}", place)
-
-    def store(self, value: str, array: str, i: int) -> None:
-        """Write an element."""
-        place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
-        self.put(f"  store double {value}, ptr {place}")
-
-    def fused(self, a: str, b: str, c: str) -> str:
-        """a b + c."""
-        return self.value("call double @llvm.fmuladd.f64(double {}, double {}, double {})", a, b, c)
-
-    def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
-        """One of two values, by a comparison of a and b."""
-        is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
-        return self.value("select i1 {}, double {}, double {}", is_so, then, otherwise)
-
-
-class Powers:
-    """a**k for k = 0..order as `tabulate` of `hybridsim.engine.taylor` makes them, and sums of series with them.
-
-    Powers and terms are worked out four at a time, from the last ones on; the first order % 4 are by themselves.
-    """
-
-    def __init__(self, code: Lines, a: str, order: int) -> None:
-        self.code, self.order = code, order
-        square = code.op("fmul", a, a)
-        self._first = [ONE, a, square, code.op("fmul", a, square), code.op("fmul", square, square)]
-        self._fourth = self._vector([self._first[4]] * 4)
-        self._fours: dict[int, str] = {1: self._vector(self._first[1:])}
-        self.begins = list(range(order - 3, 0, -4))
-
-    def _vector(self, elements: list[str]) -> str:
-        vector = "poison"
-        for i, element in enumerate(elements):
-            vector = self.code.value(
-                "insertelement <4 x double> {}, double {}, i64 " + str(i), vector, element
-            )
-        return vector
-
-    def _constants(self, values: list[float]) -> str:
-        return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
-
-    def four(self, k: int) -> str:
-        """Powers k to k + 3."""
-        if k not in self._fours and k > 4:
-            self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
-        elif k not in self._fours:
-            places = ", ".join(f"i32 {k - 1 + i}" for i in range(4))
-            form = "shufflevector <4 x double> {}, <4 x double> {}, <4 x i32> <" + places + ">"
-            self._fours[k] = self.code.value(form, self.four(1), self.four(5))
-        return self._fours[k]
-
-    def store(self, array: str) -> None:
-        """Write all powers."""
-        for k in range(self.order % 4 + 1):
-            self.code.store(self._first[k], array, k)
-        for k in self.begins:
-            place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(k), array)
-            self.code.put(f"  store <4 x double> {self.four(k)}, ptr {place}, align 8")
-
-    def _load(self, array: str, i: int) -> str:
-        place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
-        return self.code.value("load <4 x double>, ptr {}, align 8", place)
-
-    def _of_two(self, name: str, a: str, b: str) -> str:
-        return self.code.value(name + " <4 x double> {}, {}", a, b)
-
-    def _fused(self, a: str, b: str, c: str) -> str:
-        form = "call <4 x double> @llvm.fmuladd.v4f64(<4 x double> {}, <4 x double> {}, <4 x double> {})"
-        return self.code.value(form, a, b, c)
-
-    def _size(self, a: str) -> str:
-        return self.code.value("call <4 x double> @llvm.fabs.v4f64(<4 x double> {})", a)
-
-    def _together(self, a: str) -> str:
-        """The sum of the four of a vector."""
-        form = "shufflevector <4 x double> {}, <4 x double> poison, <2 x i32> <i32 {first}, i32 {second}>"
-        halves = [self.code.value(form.format("{}", first=i, second=i + 1), a) for i in (0, 2)]
-        two = self.code.value("fadd <2 x double> {}, {}", *halves)
-        return self.code.op(
-            "fadd", *(self.code.value("extractelement <2 x double> {}, i64 " + str(i), two) for i in (0, 1))
-        )
-
-    def sum(self, array: str, at: int, is_size: bool) -> str:
-        """sum_k c_k a**k, or of |c_k|, over k > 0, of the series that begins at a place of an array."""
-        code, total = self.code, self._constants([0.0] * 4)
-        for k in self.begins:
-            c = self._load(array, at + k)
-            total = self._fused(self._size(c) if is_size else c, self.four(k), total)
-        found = self._together(total)
-        for k in range(self.order % 4, 0, -1):
-            c = code.load(array, at + k)
-            c = code.call("llvm.fabs.f64", c) if is_size else c
-            found = code.fused(c, self._first[k], found)
-        return found
-
-    def terms(self, array: str, at: int) -> tuple[str, str, str]:
-        """Over k > 0 the sums of the terms c_k a**k, of k times them, and of their sizes."""
-        code, zero = self.code, self._constants([0.0] * 4)
-        value, slope, size = zero, zero, zero
-        for k in self.begins:
-            term = self._of_two("fmul", self._load(array, at + k), self.four(k))
-            value = self._of_two("fadd", value, term)
-            slope = self._fused(self._constants([k + i for i in range(4)]), term, slope)
-            size = self._of_two("fadd", size, self._size(term))
-        value, slope, size = self._together(value), self._together(slope), self._together(size)
-        for k in range(self.order % 4, 0, -1):
-            term = code.op("fmul", code.load(array, at + k), self._first[k])
-            value, slope = code.op("fadd", value, term), code.fused(number(k), term, slope)
-            size = code.op("fadd", size, code.call("llvm.fabs.f64", term))
-        return value, slope, size
 
 
 @dataclass(frozen=True)
@@ -442,12 +258,6 @@ class _Expansion(Lines):
         self.series[out].append(self._rise(a, out + 1, k))
         w = self._product(out, out, k)
         return self.series[out].pop(), w if b == 0 else self.negative(w)
-
-
-def function(name: str, lines: Iterable[str]) -> str:
-    """A function of these lines."""
-    arguments = "double %s, double %e, ptr noalias %x, ptr noalias %g, ptr noalias %c, ptr noalias %out"
-    return "\n".join((f"define void @{name}({arguments}) {{", *lines, "  ret void", "}", ""))
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
