@@ -74,7 +74,8 @@ def simulate(
         Initial values that replace the declared ones, by name (states and discrete states) or as a whole
         sequence.
     z0 : mapping of str to str, optional
-        Initial modes by component; where a surface decides, the engine finds the mode from x0.
+        Initial modes by component; where a surface decides, the engine finds the mode from x0 if none is given. One
+        that x0 rules out is taken all the same, the state is put onto the surface, and ``sol.warnings`` says so.
     integrator : str, optional
         A name from `list_integrators`; "auto" takes ``exact`` where all modes are linear in the states,
         ``rodas5p`` where they are stiff at the start, else ``taylor`` below rtol = 1e-10 and ``dop853``;
