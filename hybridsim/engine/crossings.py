@@ -48,6 +48,18 @@ def _times_at(instants: Any, places: Any, first: int, component: int, times: Any
     return count
 
 
+@kernel
+def _states_at(states: Any, places: Any, first: int, component: int, side: int, out: Any) -> int:
+    """States at the occurrences of a component, from that number on, on one side, and how many there are."""
+    count = 0
+    for i in range(first, places.shape[1]):
+        if places[1, i] == component:
+            for j in range(out.shape[1]):
+                out[count, j] = states[places[0, i], side, j]
+            count += 1
+    return count
+
+
 _take_part, _times_of_one = Door(_taking_part), Door(_times_at)
 
 
@@ -112,13 +124,12 @@ class Crossings(Sequence[Occurrence]):
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
         """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
-        automata = self._system.automata
-        for c, automaton in enumerate(automata):
+        for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
-                if self._is_plain and len(automata) == 1:
-                    return self._states[self._first :, side].copy()
-                events, components = self._places
-                return self._states[events[components == c], side]
+                states = np.empty((len(self), self._system.n))
+                # by no door: of some loops the states are a part of longer rows
+                count = _states_at(self._states, self._all_places, self._first, c, side, states)
+                return states if count == len(states) else states[:count]
         return np.empty((0, self._system.n))
 
     def kinds(self) -> Counter[str]:

@@ -313,8 +313,9 @@ class Solution(InTables):
         if side not in ("+", "-"):
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
         found = [block.states_of(component, kind, "-+".index(side)) for block in self._blocks_with(component)]
-        found = [states for states in found if len(states)]
-        return found[0] if len(found) == 1 else np.concatenate([np.empty((0, self._system.n)), *found])
+        if len(found) == 1 and len(found[0]):
+            return found[0]
+        return np.concatenate([np.empty((0, self._system.n)), *(states for states in found if len(states))])
 
     def _blocks_with(self, component: str) -> list[Any]:
         """All blocks of what happened, once it is known that the component is one that may be heard of."""

@@ -9,6 +9,8 @@ import hybridsim as hs
 
 CASES = [
     ("dfcs", 0.4, {}),
+    ("dfcs", 0.4, {"integrator": "taylor"}),  # whose record has other rows than that of exact
+    ("dfcs", 0.3, {"integrator": "exact"}),
     ("bouncing-ball", 3.0, {}),
     ("clutches", 5.0, {}),
     ("dfcs", 0.2, {"integrator": "rk4-dichotomy", "step": 1e-4}),
