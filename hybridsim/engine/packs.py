@@ -199,9 +199,11 @@ class Sheet:
 
     def blank(self) -> tuple[np.ndarray, ...]:
         """Blocks that nobody holds, with anything in them."""
-        if self._returned:
-            return self._returned.pop(), *map(self._block, range(1, len(self._sizes)))
-        return tuple(map(self._block, range(len(self._sizes))))
+        try:
+            first = self._returned.pop()
+        except IndexError:  # asked beforehand, another thread may take the last one
+            first = self._block(0)
+        return first, *map(self._block, range(1, len(self._sizes)))
 
     def _block(self, k: int) -> np.ndarray:
         lender = self._lenders[k]

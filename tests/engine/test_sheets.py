@@ -95,3 +95,12 @@ def test_a_door_leads_to_the_same_kernel() -> None:
     door = Door(_number)
     assert [door(packed(arrays)), door(packed(arrays))] == [103, 103]
     assert arrays.numbers.tolist() == [[0.0, 1.0], [2.0, 3.0]]
+
+
+def test_a_block_that_is_taken_back_is_the_next_one() -> None:
+    sheet = Sheet(Rows, FIELDS)
+    first, _ = sheet.blank()
+    assert sheet.blank()[0] is not first
+    sheet.take_back(first)
+    assert sheet.blank()[0] is first
+    assert sheet.blank()[0] is not first
