@@ -60,6 +60,17 @@ class _Cluster:
     folded: bool  # real eigenvalues are
 
 
+class _Block(NamedTuple):
+    """A cluster's triangular block, for the basis `vectors @ rotation`.
+
+    vectors: an orthonormal basis of its invariant subspace, a real one where it is folded.
+    """
+
+    triangular: np.ndarray
+    vectors: np.ndarray
+    rotation: np.ndarray
+
+
 class Modals(NamedTuple):
     """Block diagonal forms of many matrices: the fields of `Modal` one behind the other, filled up with zeros.
 
@@ -91,11 +102,12 @@ def modals(
     balanced = A * scales[:, None, :] / scales[:, :, None]
     values, vectors = np.linalg.eig(balanced)
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
-    inverses = _inverses(vectors)
-    # the norm of Frobenius bounds that which makes the condition; each eigenvector has norm 1
+    # Real and imaginary part of an eigenvector stand for it and its conjugate: inverted in complex arithmetic the two
+    # would be each other's conjugates only to within the condition of the basis.
+    inverses = _inverses(np.where((values.imag < 0.0)[:, None, :], -vectors.imag, vectors.real))
+    # the norm of Frobenius bounds that which makes the condition; no column's norm is above 1
     with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
-        squares = (inverses.real**2 + inverses.imag**2).sum(axis=(1, 2))
-        is_diagonal = A.shape[1] * squares <= _CONDITION**2
+        is_diagonal = A.shape[1] * (inverses**2).sum(axis=(1, 2)) <= _CONDITION**2
     others = {
         int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k])
         for k in np.flatnonzero(~is_diagonal)
@@ -146,7 +158,8 @@ def _diagonal(
             twice = 2.0 if value.imag > 0.0 else 1.0
             for m in range(size):
                 out.full_basis[k, m, j] = twice * vectors[k, m, i] * scales[k, m]
-                out.inverse[k, j, m] = inverses[k, i, m] / scales[k, m]
+                imaginary = inverses[k, i + 1, m] if value.imag > 0.0 else 0.0
+                out.inverse[k, j, m] = complex(inverses[k, i, m], -imaginary) / (twice * scales[k, m])
             out.values[k, j], out.ends[k, j], out.growth[k, j] = value, j + 1, value.real
             out.speeds[k, j] = abs(value)
             out.powers[k, j] = out.speeds[k, j] ** exponent
@@ -157,10 +170,12 @@ def _by_blocks(balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, sc
     """Eigenvalues in common blocks until the basis is well conditioned."""
     partners = _partners(values)
     clusters = [_Cluster((i,), partners[i] == i) for i in range(len(values)) if values[i].imag >= 0.0]
-    blocks = [(np.array([[values[i]]]), vectors[:, [i]]) for (i,) in (c.members for c in clusters)]
-    known: dict[
-        _Cluster, tuple[np.ndarray, np.ndarray]
-    ] = {}  # one of two is merged at a time, the others stay
+    blocks = [
+        _Block(np.array([[values[i]]]), vectors[:, [i]].real if c.folded else vectors[:, [i]], np.eye(1))
+        for c in clusters
+        for i in c.members
+    ]
+    known: dict[_Cluster, _Block] = {}  # one of two is merged at a time, the others stay
     while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _merged(clusters, values)
         for cluster in clusters:
@@ -223,17 +238,17 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
                 break
 
 
-def _full(clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """The whole basis: that of each block, and after it the conjugate of one that is not its own."""
+def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:
+    """The whole basis: that of each block, real and imaginary parts of one that is not its own conjugate."""
     parts = [
-        vectors if c.folded else np.concatenate([vectors, vectors.conj()], axis=1)
-        for c, (_, vectors) in zip(clusters, blocks, strict=True)
+        b.vectors if c.folded else np.concatenate([b.vectors.real, b.vectors.imag], axis=1)
+        for c, b in zip(clusters, blocks, strict=True)
     ]
     return np.concatenate(parts, axis=1)
 
 
-def _condition(clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]]) -> float:
-    basis = _full(clusters, blocks)
+def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
+    basis = _columns(clusters, blocks)
     return float(np.linalg.cond(basis)) if basis.shape[0] == basis.shape[1] else np.inf
 
 
@@ -256,48 +271,58 @@ def _merged(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
     return [*(c for k, c in enumerate(clusters) if k not in pair), joined]
 
 
-def _block(
-    A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The triangular block of a cluster, and an orthonormal basis of its invariant subspace."""
-    from scipy.linalg import schur
+def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]) -> _Block:
+    """The triangular block of a cluster; an empty one where it cannot be told from the others."""
+    from scipy.linalg import rsf2csf, schur
 
     members = list(cluster.members)
     if cluster.folded:
         members += [partners[i] for i in members if partners[i] != i]
     others = [i for i in range(len(A)) if i not in members]
 
-    def inside(value: complex) -> bool:
-        far = np.abs(values - value)
+    def inside(real: complex, imaginary: float = 0.0) -> bool:
+        far = np.abs(values - (real + 1j * imaginary))
         return not others or bool(far[members].min() < far[others].min())
 
-    triangular, vectors, count = schur(A.astype(complex), output="complex", sort=inside)
-    return triangular[:count, :count], vectors[:, :count]
+    try:
+        if not cluster.folded:
+            triangular, vectors, count = schur(A.astype(complex), output="complex", sort=inside)
+            return _Block(triangular[:count, :count], vectors[:, :count], np.eye(count))
+        triangular, vectors, count = schur(A, output="real", sort=inside)
+    except np.linalg.LinAlgError:  # rounding does not tell them from the others
+        return _Block(np.empty((0, 0)), np.empty((len(A), 0)), np.empty((0, 0)))
+    triangular, rotation = rsf2csf(triangular[:count, :count], np.eye(count))
+    return _Block(triangular, vectors[:, :count], rotation)
 
 
-def _joined(
-    A: np.ndarray, clusters: list[_Cluster], blocks: list[tuple[np.ndarray, np.ndarray]], scale: np.ndarray
-) -> Modal:
+def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale: np.ndarray) -> Modal:
     """All blocks as arrays, one for each pair of conjugates."""
-    inverse = np.linalg.inv(_full(clusters, blocks))
-    seen, moved = _supports(A, [np.diag(block) for block, _ in blocks])
-    kept = sum(len(block) for block, _ in blocks)
+    inverse = np.linalg.inv(_columns(clusters, blocks))
+    seen, moved = _supports(A, [np.diag(b.triangular) for b in blocks])
+    kept = sum(len(b.triangular) for b in blocks)
     values, ends = np.empty(kept, dtype=complex), np.empty(kept, dtype=np.int64)
     upper = np.zeros((kept, kept), dtype=complex)
     basis, rows = np.empty((len(scale), kept), dtype=complex), np.empty((kept, len(scale)), dtype=complex)
     growth, speeds = np.empty(kept), np.empty(kept)
     at = source = 0
-    for b, (cluster, (block, vectors)) in enumerate(zip(clusters, blocks, strict=True)):
+    for b, (cluster, (block, vectors, rotation)) in enumerate(zip(clusters, blocks, strict=True)):
         size = len(block)
         if size == 0:  # two orders of arithmetic tell eigenvalues that nearly coincide apart differently
             continue
         here = slice(at, at + size)
         values[here], ends[here], upper[here, here] = np.diag(block), at + size, np.triu(block, 1)
-        basis[:, here] = _without_rounding(vectors.T, moved[b]).T * (1.0 if cluster.folded else 2.0)
-        rows[here] = _without_rounding(inverse[source : source + size], seen[b])
+        columns, own = vectors @ rotation, inverse[source : source + size]
+        source += size
+        if cluster.folded:
+            own = rotation.conj().T @ own
+        else:
+            columns, own = 2.0 * columns, 0.5 * (own - 1j * inverse[source : source + size])
+            source += size
+        basis[:, here] = _without_rounding(columns.T, moved[b]).T
+        rows[here] = _without_rounding(own, seen[b])
         growth[here] = np.linalg.eigvalsh(0.5 * (block + block.conj().T)).max()
         speeds[here] = np.linalg.norm(block, 2)
-        at, source = at + size, source + (size if cluster.folded else 2 * size)
+        at += size
     return Modal(values, upper, ends, basis * scale[:, None], rows / scale[None, :], growth, speeds)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from reference.random_models import matrix
 
 from hybridsim.engine.jit import kernel
 from hybridsim.engine.linear_kernels import moved, states_of, to_modal
@@ -113,6 +114,19 @@ def test_a_basis_is_well_conditioned_and_its_inverse_is_one() -> None:
         flow = modal(A)
         assert np.real(flow.full_basis @ flow.inverse) == pytest.approx(np.eye(len(A)), abs=1e-12), kind
         assert len(flow.values) == len(flow.ends) == flow.full_basis.shape[1]
+
+
+@pytest.mark.parametrize(
+    "seed", [1, 576, 1439, 1734, 2659]
+)  # all but the first were lost by complex arithmetic
+def test_half_of_the_basis_is_enough_near_defective_matrices(seed: int) -> None:
+    """Of nearly parallel eigenvectors too: what is kept of a pair stands for both to what the rounding of it costs."""
+    draw = np.random.default_rng(seed)
+    n = 2 + seed % 7
+    A = matrix("nearly defective", n, draw)
+    flow = modal(A, 16.0)
+    lost = np.abs(np.real(flow.full_basis @ flow.inverse) - np.eye(n))
+    assert (lost <= 64.0 * UNIT * (np.abs(flow.full_basis) @ np.abs(flow.inverse)).max()).all()
 
 
 def test_eigenvalues_that_two_factorisations_tell_apart_differently() -> None:
