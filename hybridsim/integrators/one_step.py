@@ -87,7 +87,7 @@ class OneStepStepper(ABC):
     def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         """Dense output of an accepted step."""
 
-    def _holds(self, start: Point, end: Point) -> bool:
+    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
         """Whether the dense output of a step that is right at its end is so on the way."""
         return True
 
@@ -106,7 +106,7 @@ class OneStepStepper(ABC):
             if trial.error <= 1.0:
                 s = self.bound if last else start.s + direction * h
                 end = self._point(s, self.flow.landed(s, trial.x))
-                if self._holds(start, end):
+                if self._holds(start, end, trial):
                     break
                 self.h = _SHORTER * h
             self.flow.counters.rejected += 1

@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from hybridsim.engine.rosenbrock_step import RosenbrockTableau, linearise, rosenbrock_attempt
+from hybridsim.engine.rosenbrock_step import RosenbrockTableau, linearise, rosenbrock_attempt, solve
 from hybridsim.engine.stepping import Flow, Tolerances
 from hybridsim.engine.taylor import advance
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
+
+_DEFECT = 100.0  # times the tolerance, as for Runge-Kutta methods: by how much a step may miss the flow in its middle
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,12 @@ class StageDense:
         out = self.x0 + theta * ((self.x1 - self.x0) + (1.0 - theta) * inner)
         out[theta[:, 0] == 1.0] = self.x1
         return out
+
+    def middle_slope(self) -> np.ndarray:
+        """Rate of change (n,) at theta = 1/2."""
+        orders = np.arange(len(self.K))
+        inner = (orders * 0.5 ** (orders - 1.0)) @ self.K
+        return ((self.x1 - self.x0) + 0.25 * inner) / (self.s1 - self.s0)
 
 
 class RosenbrockStepper(OneStepStepper):
@@ -93,6 +101,23 @@ class RosenbrockStepper(OneStepStepper):
             out,
         )
         return Trial(out, error, stages)
+
+    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+        """Whether in the middle the dense output meets the flow as well as the tolerances ask for.
+
+        What it misses by is weighed as an error of the step is, h (1 - gamma h J)^-1 (f(x) - x'): of a stiff component
+        that the flow brings back at once little is left.
+        """
+        flow, tableau = self.flow, self.tableau
+        dense = self._dense(start, end, trial)
+        x = dense(np.array([0.5 * (start.s + end.s)]))[0]
+        flow.counters.rhs_evaluations += 1
+        missed = flow.rhs(0.5 * (start.s + end.s), x) - dense.middle_slope()
+        matrix, pivots, _ = self._room
+        solve(matrix, pivots, missed)
+        rtol, atol = self.control
+        size = np.maximum(np.abs(x), np.abs(start.x))
+        return not (np.abs(missed) > tableau.gamma * _DEFECT * (atol + rtol * size)).any()
 
     def _dense(self, start: Point, end: Point, trial: Trial) -> StageDense:
         return StageDense(start.s, end.s, start.x, end.x, self.tableau.dense @ trial.kept)

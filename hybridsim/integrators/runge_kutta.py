@@ -58,7 +58,7 @@ class RungeKuttaStepper(OneStepStepper):
         )
         return Trial(out, error)
 
-    def _holds(self, start: Point, end: Point) -> bool:
+    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
         flow, (x, dx) = self.flow, np.empty((2, self.flow.n))
         if not flow.system.has_tape:  # its derivatives are differences, and less than the tolerances ask for
             return True
