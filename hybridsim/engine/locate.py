@@ -98,7 +98,7 @@ class Locator:
     def __init__(self, flow: Flow, watch: Watch, rounding: Callable[[], np.ndarray]) -> None:
         self.flow = flow
         self.rounding = rounding  # of the states, on the segment so far
-        self.numbers = watch.guards
+        self.numbers, self.x_error = watch.guards, watch.x_error
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
@@ -129,6 +129,7 @@ class Locator:
                         side or 1,
                         -1,
                         self._rounding(step, int(g), False),
+                        self._before(step, int(g), False),
                         floor,
                     )
                 except StepFailure as failure:
@@ -153,6 +154,7 @@ class Locator:
                         side,
                         0,
                         self._rounding(step, int(k), True),
+                        self._before(step, int(k), True),
                         self.monitor_floors[k],
                     )
                 except StepFailure as failure:
@@ -192,6 +194,23 @@ class Locator:
                     bound_at_end = self._bound(start, number, errors, is_monitor)
                 known.append(bound_at_end)
             return known[0]
+
+        return bound
+
+    def _before(self, step: Step, number: int, is_monitor: bool) -> Callable[[float], float]:
+        """What the errors of the states at the start of the segment make of a guard's or monitor's value at theta."""
+        known: list[list[float]] = []
+
+        def bound(theta: float) -> float:
+            if not known:
+                flow = self.flow
+                series = flow.system.series(step.s0, step.x0, flow.p, flow.z, self.x_error, math.ulp(step.s0))
+                bounds = series.monitor_bounds if is_monitor else series.guard_bounds
+                known.append(bounds[number].tolist())
+            d, total = abs(theta * (step.s1 - step.s0)), 0.0
+            for coefficient in reversed(known[0]):
+                total = coefficient + d * total
+            return total if math.isfinite(total) else 0.0
 
         return bound
 

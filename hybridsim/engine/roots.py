@@ -256,6 +256,7 @@ def find_roots(
     side: int,
     stop_at_first: int,
     rounding: Callable[[], float],
+    before: Callable[[float], float],
     floor: float = 0.0,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
     """All changes of side of one guard over a step, theta in (0, 1].
@@ -266,6 +267,7 @@ def find_roots(
     first : values at `POINTS` over the whole step
     order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
     rounding : bound of the rounding error of one value; asked for only where nothing else tells
+    before : bound of what errors at the start of the step make of a value at theta; likewise
     floor : what the location of the last event leaves uncertain, where the function starts from zero; values below it
         are not looked into
     stop_at_first : direction after whose first crossing the search may end (0: find all)
@@ -304,9 +306,12 @@ def find_roots(
         bounds = np.full(DEGREE + 1, max(error, floor))
         n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
         rows, count = sign_pattern(coefficients[:n], bounds[:n])
-        if n > DEGREE and (count > 1 or (rows[0, 2] and (rows[0, 2] * coefficients).min() <= touching)):
-            bounds = np.maximum(bounds, _ROUNDINGS_BEFORE * rounding())
-            rows = _with_touches(coefficients, bounds, rows[:count], a == 0.0, b == 1.0)
+        if count > 1 or (rows[0, 2] and (rows[0, 2] * coefficients[:n]).min() <= touching):
+            bounds[:] = max(error, floor, _ROUNDINGS_BEFORE * rounding(), before(b))
+            if n <= DEGREE:
+                _represent(samples, coefficients)
+                _deflated(coefficients, bounds, order, side)
+            rows = _with_touches(coefficients[:n], bounds[:n], rows[:count], a == 0.0, b == 1.0)
             count = len(rows)
         for left, right, sign in rows[:count]:
             x, y = a + (b - a) * left, a + (b - a) * right

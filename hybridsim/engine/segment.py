@@ -409,7 +409,7 @@ class SegmentRun:
         """Backward in time: stop where the present mode may have been entered through a guard of another."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
-            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, 0.0)
+            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)
             if found:
                 s = step.s0 + (step.s1 - step.s0) * polish(sample, found[0])
                 step = Step(step.s0, s, step.x0, step.dense(np.array([s]))[0], step.dense, step.roots)

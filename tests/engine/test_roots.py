@@ -37,13 +37,14 @@ class Search:
         stop: int = 0,
         rounding: float = ROUNDING,
         floor: float = 0.0,
+        before: Callable[[float], float] = lambda _: 0.0,
     ) -> None:
         self.f, self.samples = f, 0
         first = self.sample(POINTS)
         self.crossings: list[Crossing]
         self.grazings: list[Grazing]
         self.crossings, self.grazings, self.end, self.undefined = find_roots(
-            self.sample, first, order, side, stop, lambda: rounding, floor
+            self.sample, first, order, side, stop, lambda: rounding, before, floor
         )
 
     def sample(self, theta: np.ndarray) -> np.ndarray:
@@ -412,6 +413,31 @@ def test_a_dip_that_rounding_has_shifted_is_flagged(width: float) -> None:
     assert [g.theta for g in dips.grazings] == [pytest.approx(theta, abs=1e-7)]
     clear = Search(lambda x: ((x - theta) ** 2 + 1e-12) / width**2, side=1, rounding=UNIT)
     assert (clear.crossings, clear.grazings) == ([], [])
+
+
+def test_a_dip_within_rounding_on_the_piece_that_starts_from_zero() -> None:
+    """The zero at the start is divided out; the dip behind it is told all the same."""
+    search = Search(lambda s: s * ((s - 0.6) ** 2 + 4.0 * UNIT), order=1, side=1, stop=-1, rounding=UNIT)
+    assert search.crossings == []
+    assert [g.theta for g in search.grazings] == [pytest.approx(0.6, abs=1e-7)]
+    clear = Search(lambda s: s * ((s - 0.6) ** 2 + 1e-12), order=1, side=1, stop=-1, rounding=UNIT)
+    assert (clear.crossings, clear.grazings) == ([], [])
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize(("before", "flagged"), [(1e-12, 1), (1e-14, 0)])
+def test_a_dip_within_what_errors_before_the_step_make_of_it(order: int, before: float, flagged: int) -> None:
+    """They grow along the step, and are far beyond its own rounding."""
+    search = Search(
+        lambda s: s**order * ((s - 0.7) ** 2 + 2e-13),
+        order=order,
+        side=1,
+        stop=-1,
+        rounding=UNIT,
+        before=lambda s: before * s**2,
+    )
+    assert search.crossings == []
+    assert [g.theta for g in search.grazings] == [pytest.approx(0.7, abs=1e-5)] * flagged
 
 
 def test_a_dip_within_rounding_before_a_zero_on_the_same_piece() -> None:
