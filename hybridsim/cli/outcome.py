@@ -161,7 +161,8 @@ def _summary(solution: Solution) -> list[str]:
     found = {kind: n for kind, n in kinds(solution).items() if kind != "corner"}
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
-        f"  integrator   {solution.integrator}",
+        f"  integrator   {solution.integrator}"
+        + (f", chosen because {solution.chosen_because}" if solution.chosen_because else ""),
         f"  status       {solution.status}",
         f"  events       {sum(found.values())}"
         + (f" ({', '.join(f'{n} {kind}' for kind, n in found.items())})" if found else ""),

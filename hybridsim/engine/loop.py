@@ -90,7 +90,8 @@ class ModeLoop:
         except StepFailure as failure:
             self.record.status = "step-failure"
             why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
-            self.record.message = f"after t = {float(self.origin)!r}: {failure}" + (f"; {why}" if why else "")
+            reached = self.record.segments[-1].end if self.record.segments else self.origin
+            self.record.message = f"after t = {float(reached)!r}: {failure}" + (f"; {why}" if why else "")
         except LimitReached as reached:
             self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:

@@ -132,7 +132,7 @@ class SegmentRun:
             if self.counters.steps == 1:
                 self._check_shape(step)
             if not np.isfinite(step.x1).all():
-                raise StepFailure(f"the state is not finite at local time {step.s1!r}")
+                raise StepFailure(f"the state is not finite at the end of a step of {step.s1 - step.s0:.3g}")
             self.last_step = abs(step.s1 - step.s0)
             self._refuse_standstill(step)
             whole, known = step.s1, self.scale

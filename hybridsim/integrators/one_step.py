@@ -100,7 +100,7 @@ class OneStepStepper(ABC):
             last = h >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - start.s) if last else h
             if not h >= SMALLEST * math.ulp(start.s):
-                raise StepFailure(f"the step fell to {h:.3g} at local time {start.s!r}")
+                raise StepFailure(f"the step fell to {h:.3g}")
             trial = self._attempt(start, direction * h)
             self.h = next_length(h, trial.error, self.error_order, self._memory)
             if trial.error <= 1.0:

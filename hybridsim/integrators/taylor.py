@@ -91,7 +91,7 @@ class TaylorStepper:
                 self.since,
             )
         if not h >= _SMALLEST * math.ulp(self.s):
-            raise StepFailure(f"the step fell to {h:.3g} at local time {self.s!r}")
+            raise StepFailure(f"the step fell to {h:.3g}")
         s0, x0 = self.s, self.x
         self.s = self.bound if last else s0 + direction * h
         self.x = self.flow.landed(self.s, x1)

@@ -382,6 +382,11 @@ class Solution(InTables):
         return self.status in _GOOD
 
     @property
+    def chosen_because(self) -> str:
+        """Why `auto` took the integrator, in words; empty where it was asked for by name."""
+        return self._reason
+
+    @property
     def message(self) -> str:
         """One sentence about how the run ended."""
         why = f", chosen because {self._reason}" if self._reason else ""

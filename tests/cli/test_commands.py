@@ -24,6 +24,13 @@ def test_run_says_how_it_went(hybridsim: Callable) -> None:
         assert part in out
 
 
+def test_run_says_why_auto_took_the_integrator(hybridsim: Callable) -> None:
+    _, chosen, _ = hybridsim("run", "dfcs", "--t-end", "5T")
+    assert "exact, chosen because its modes are linear in the states\n" in chosen
+    _, named, _ = hybridsim("run", "dfcs", "--t-end", "5T", "--integrator", "exact")
+    assert "integrator   exact\n" in named
+
+
 def test_run_as_json_is_the_solution(hybridsim: Callable) -> None:
     code, out, _ = hybridsim("run", "dfcs", "--t-end", "5T", "--rtol", "1e-8", "--json")
     assert code == 0
