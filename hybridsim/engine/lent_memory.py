@@ -43,8 +43,8 @@ def _lent(size: int, free: list[bytearray]) -> Any:
     class Lent(ctypes.c_char * size):  # type: ignore[misc]  # made when it is needed
         memory: bytearray
 
-        def __del__(self) -> None:
-            if len(free) < _KEPT:
+        def __del__(self, kept: int = _KEPT) -> None:  # at the end of Python globals may be gone
+            if len(free) < kept:
                 free.append(self.memory)
 
     return Lent

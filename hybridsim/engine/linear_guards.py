@@ -57,6 +57,7 @@ def modal_guards(
     rests: Any,
     farthest: Any,
     grown: Any,
+    turning: Any,
     waves: Any,
 ) -> None:
     """Of Re(gamma c) with gamma = row basis along c' = B c: coefficients, bounds of |c|'s factors, reach, waves.
@@ -91,6 +92,7 @@ def modal_guards(
                     rests[k, g, j] = sizes[k, g, j] * flows.powers[k, j] / _FACTORIAL
                     if rests[k, g, j] > 0.0:
                         fastest, growing = max(fastest, flows.speeds[k, j]), max(growing, flows.growth[k, j])
+                        turning[k, g] = max(turning[k, g], growing, abs(values[k, j].imag))
                 for order in range(TERMS):
                     for j in range(first, end):
                         terms[k, g, j, 0, order], terms[k, g, j, 1, order] = gamma[j].real, gamma[j].imag

@@ -35,6 +35,7 @@ POINTS = 10**6
 # A row's rounding is at least ten units of the row in absolute values: what errors of y make of it, in terms of that.
 _IN_UNITS = 0.125 / UNIT
 # What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
+_TURNED = 2.0  # roundings, in the speed and in its product with the time
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 
 
@@ -353,19 +354,21 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
     if side <= 0 or order >= TERMS - 3 or not start[order] > 0.0:
         return OPEN, 0.0
     farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
+    turning = _TURNED * UNIT * lin.turning[k, g]
     is_due = 0.0 < hint <= min(bound, farthest)
     if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, margin * size):
         return NEVER, bound
     if is_due:
         moved(lin, k, c, hint, v)
         size_there, rest_there = guard_terms(lin, k, g, v, terms)
-        error = margin * size_there + floor
+        margin_there = margin + turning * hint
+        error = margin_there * size_there + floor
         rest_there *= _BACKWARD * grown
         d = zero_of_terms(terms, rest_there, size_there, lower)
         if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
             width = falls_over(terms, rest_there, min(hint, _BACK * farthest))
             if abs(d) < width and (
-                width == hint or stays_positive(start, order, grown * rest, hint - width, margin * size)
+                width == hint or stays_positive(start, order, grown * rest, hint - width, margin_there * size)
             ):
                 return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
     for i in range(TERMS):
@@ -386,6 +389,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         s += d
         moved(lin, k, c, s, v)
         size, rest = guard_terms(lin, k, g, v, terms)
+        margin = (16.0 + 2.0 * lin.counts[k]) * UNIT + turning * s
         error = margin * size + floor
         order, floor = 0, 0.0
         d = zero_of_terms(terms, grown * rest, size, lower)

@@ -40,9 +40,10 @@ class LinearTables(NamedTuple):
     sizes to what these are summed from; slopes (K, ., ., 4): from y to their rates. terms (K, G, J, 2, TERMS): Taylor
     coefficients of the guards in modal coordinates, factors of their real and imaginary parts; sizes, rests (K, G, J):
     bounds of the guard and of the first coefficient left out; farthest, grown (K, G): how far ahead the latter holds,
-    but for a factor. waves (K, G): the modal coordinate that turns without damping, where a guard sees one such and
-    else constants; -1 otherwise. lasting (K,): how long the motion may be followed from one point: of exp(2*(t - 400))
-    nothing is left at t = 0 that could grow to one.
+    but for a factor; turning (K, G): the fastest of the speeds and rates of growth that a guard sees, which make the
+    more of a rounding the longer they go on. waves (K, G): the modal coordinate that turns without damping, where a
+    guard sees one such and else constants; -1 otherwise. lasting (K,): how long the motion may be followed from one
+    point: of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one.
     """
 
     kinds: np.ndarray
@@ -70,6 +71,7 @@ class LinearTables(NamedTuple):
     rests: np.ndarray
     farthest: np.ndarray
     grown: np.ndarray
+    turning: np.ndarray
     waves: np.ndarray
     lasting: np.ndarray
 
@@ -83,7 +85,7 @@ def no_tables() -> LinearTables:
         np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros(0),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros(0),
     ))  # fmt: skip
     return tables
 
@@ -209,6 +211,7 @@ def of_matrices(
     terms = np.zeros((count, guards, widest, 2, TERMS))
     sizes, rests = np.zeros((count, guards, widest)), np.zeros((count, guards, widest))
     farthest, grown = np.full((count, guards), np.inf), np.ones((count, guards))
+    turning = np.zeros((count, guards))
     waves = np.full((count, guards), -1, dtype=np.int64)
     modal_guards(
         rows,
@@ -219,6 +222,7 @@ def of_matrices(
         rests,
         farthest,
         grown,
+        turning,
         waves,
     )
     parts, basis = (n, size - n), flows.full_basis[:, :n].copy()
@@ -241,6 +245,7 @@ def of_matrices(
         "rests": rests,
         "farthest": farthest,
         "grown": grown,
+        "turning": turning,
         "waves": waves,
         "lasting": np.array(
             [_lasting(*row) for row in zip(flows.values.real, flows.ends, flows.counts, strict=True)]

@@ -184,10 +184,12 @@ class Locator:
 
         def bound() -> float:
             if not known:
-                errors = 4.0 * UNIT * np.maximum(np.abs(step.x0), np.abs(step.x1))
-                if step.s1 != step.s0:  # the time of a sample is rounded as well
-                    slopes = np.abs(step.x1 - step.x0) / abs(step.s1 - step.s0)
-                    errors += math.ulp(max(abs(step.s0), abs(step.s1))) * slopes
+                times = step.s0 + (step.s1 - step.s0) * POINTS
+                states = step.dense(times)
+                rates = np.array([self.flow.rhs(s, x) for s, x in zip(times.tolist(), states, strict=True)])
+                sizes, speeds = (np.abs(np.nan_to_num(v)).max(axis=0) for v in (states, rates))
+                # the time of a sample is rounded as well, and all that is made of it
+                errors = 4.0 * UNIT * sizes + 2.0 * math.ulp(max(abs(step.s0), abs(step.s1))) * speeds
                 bound_at_end = self._bound(step, number, errors, is_monitor)
                 if not math.isfinite(bound_at_end):  # without a value there
                     start = replace(step, s1=step.s0, x1=step.x0)

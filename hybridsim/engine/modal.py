@@ -13,12 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.faint_entries import with_faint_rows
 from hybridsim.engine.jit import kernel
 
-_CONDITION = 1e3  # of the basis, at most: so many roundings of the state does the change of basis cost
+_CONDITION = 1e2  # of the basis, at most: so many roundings of the state does the change of basis cost
+_MISSED = 2.0**-48  # of the largest entry: by how much A v may differ from lambda v
+_GROWING, _SILENT = 3.0, 1e-12  # rates that matter: times the time at hand, and of the largest entry
+_SPREAD = 2.0**12  # of scales: beyond it is seen whether they do more harm than good
+_AMISS, _FAINT = 2.0**-40, 2.0**-10  # of what a matrix makes itself; what is next to nothing
+_LONGEST = 2.0**80  # times at hand, in terms of the fastest rate
 _SWEEPS = 8  # of balancing
-_TINY = 1e-9  # of the largest entry of a row: rounding, where there should be none
-_ALIKE = 1e-3  # eigenvalues that differ by less may be those of either
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,18 @@ def modals(
     # the norm of Frobenius bounds that which makes the condition; no column's norm is above 1
     with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
         is_diagonal = A.shape[1] * (inverses**2).sum(axis=(1, 2)) <= _CONDITION**2
+    # LAPACK balances once more, without the diagonal, and of entries that are nothing may make all of an eigenvector
+    missed = np.abs(balanced @ vectors - vectors * values[:, None, :]).max(axis=(1, 2), initial=0.0)
+    largest = np.abs(balanced).max(axis=(1, 2), initial=0.0)
+    are_right = missed <= _MISSED * largest
+    # of a motion that grows, rounding in the basis grows too
+    grows = values.real.max(axis=1, initial=0.0) > np.maximum(_GROWING / horizon, _SILENT * largest)
+    is_diagonal &= are_right & ~grows
+    is_diagonal &= scales.max(axis=1, initial=1.0) <= _SPREAD * scales.min(axis=1, initial=1.0)
     others = {
-        int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k])
+        int(k): _well_scaled(
+            A[k], horizon, _by_blocks(balanced[k], values[k], vectors[k], bool(are_right[k]), scales[k])
+        )
         for k in np.flatnonzero(~is_diagonal)
     }
     counts = (values.imag >= 0.0).sum(axis=1)
@@ -166,23 +180,85 @@ def _diagonal(
             j += 1
 
 
-def _by_blocks(balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, scale: np.ndarray) -> Modal:
+def _well_scaled(A: np.ndarray, horizon: float, flow: Modal) -> Modal:
+    """The flow, or one that is balanced for shorter times, if that is nearer to A entry by entry.
+
+    Over long times weak couplings count, and balanced for them states may be scaled so far apart that the strong ones
+    are known no better than the weak ones.
+    """
+    least, fastest = _amiss(A, flow), float(np.abs(flow.values).max(initial=0.0))
+    horizon, last = min(horizon, _LONGEST / max(fastest, 1e-300)), None
+    while least > _AMISS and horizon * fastest > 1.0:
+        horizon /= 16.0
+        scale = np.ones((1, len(A)))
+        _balance(np.abs(A)[None], 1.0 / horizon, scale)
+        if last is None or (scale != last).any():
+            last, balanced = scale, A * scale[0] / scale[0][:, None]
+            other = _by_blocks(balanced, np.empty(0), np.empty((0, 0)), False, scale[0])
+            found = _amiss(A, other)
+            if found < least:
+                least, flow = found, other
+    return flow
+
+
+def _amiss(A: np.ndarray, flow: Modal) -> float:
+    """By how much basis, inverse and blocks miss the identity and A, entry by entry.
+
+    In terms of what A itself makes of each state from each other within the time of the fastest rate, where it is not
+    next to nothing with A balanced for that time.
+    """
+    B, fastest = np.diag(flow.values) + flow.upper, float(np.abs(flow.values).max(initial=0.0))
+    fastest = fastest if fastest > 0.0 else 1.0
+    identity, units = np.eye(len(A)), np.ones((1, len(A)))
+    _balance(np.abs(A)[None], fastest, units)
+    in_units = units[0] / units[0][:, None]
+    made = in_units * np.linalg.matrix_power(identity + np.abs(A) / (8.0 * fastest), 8)
+    missed = np.maximum(
+        np.abs((flow.full_basis @ flow.inverse).real - identity),
+        np.abs((flow.full_basis @ B @ flow.inverse).real - A) / fastest,
+    )
+    return float((in_units * missed / (made + _FAINT)).max(initial=0.0))
+
+
+def _by_blocks(
+    balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, are_right: bool, scale: np.ndarray
+) -> Modal:
     """Eigenvalues in common blocks until the basis is well conditioned."""
+    if not are_right:
+        values = _schur_values(balanced)
     partners = _partners(values)
     clusters = [_Cluster((i,), partners[i] == i) for i in range(len(values)) if values[i].imag >= 0.0]
-    blocks = [
-        _Block(np.array([[values[i]]]), vectors[:, [i]].real if c.folded else vectors[:, [i]], np.eye(1))
-        for c in clusters
-        for i in c.members
-    ]
     known: dict[_Cluster, _Block] = {}  # one of two is merged at a time, the others stay
+
+    def found(cluster: _Cluster) -> _Block:
+        if cluster not in known:
+            known[cluster] = _block(balanced, cluster, values, partners)
+        return known[cluster]
+
+    if are_right:
+        first = [vectors[:, list(c.members)] for c in clusters]
+        blocks = [
+            _Block(values[list(c.members), None], v.real if c.folded else v, np.eye(1))
+            for c, v in zip(clusters, first, strict=True)
+        ]
+    else:
+        blocks = [found(c) for c in clusters]
     while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _merged(clusters, values)
-        for cluster in clusters:
-            if cluster not in known:
-                known[cluster] = _block(balanced, cluster, values, partners)
-        blocks = [known[cluster] for cluster in clusters]
+        blocks = [found(c) for c in clusters]
     return _joined(balanced, clusters, blocks, scale)
+
+
+def _schur_values(A: np.ndarray) -> np.ndarray:
+    """Eigenvalues by the Schur form of A as it is, pairs of conjugates in a row."""
+    from scipy.linalg import schur
+
+    triangular = schur(A, output="real")[0]
+    values = np.diag(triangular).astype(complex)
+    for i in np.flatnonzero(np.diag(triangular, -1)):  # LAPACK's blocks have equal diagonals
+        speed = math.sqrt(abs(triangular[i, i + 1])) * math.sqrt(abs(triangular[i + 1, i]))
+        values[i : i + 2] += [1j * speed, -1j * speed]
+    return values
 
 
 def _partners(values: np.ndarray) -> list[int]:
@@ -298,14 +374,13 @@ def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[
 def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale: np.ndarray) -> Modal:
     """All blocks as arrays, one for each pair of conjugates."""
     inverse = np.linalg.inv(_columns(clusters, blocks))
-    seen, moved = _supports(A, [np.diag(b.triangular) for b in blocks])
     kept = sum(len(b.triangular) for b in blocks)
     values, ends = np.empty(kept, dtype=complex), np.empty(kept, dtype=np.int64)
     upper = np.zeros((kept, kept), dtype=complex)
     basis, rows = np.empty((len(scale), kept), dtype=complex), np.empty((kept, len(scale)), dtype=complex)
     growth, speeds = np.empty(kept), np.empty(kept)
     at = source = 0
-    for b, (cluster, (block, vectors, rotation)) in enumerate(zip(clusters, blocks, strict=True)):
+    for cluster, (block, vectors, rotation) in zip(clusters, blocks, strict=True):
         size = len(block)
         if size == 0:  # two orders of arithmetic tell eigenvalues that nearly coincide apart differently
             continue
@@ -318,40 +393,9 @@ def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale
         else:
             columns, own = 2.0 * columns, 0.5 * (own - 1j * inverse[source : source + size])
             source += size
-        basis[:, here] = _without_rounding(columns.T, moved[b]).T
-        rows[here] = _without_rounding(own, seen[b])
+        basis[:, here] = with_faint_rows(A, columns, block)
+        rows[here] = with_faint_rows(A.T, own.T, block.T).T
         growth[here] = np.linalg.eigvalsh(0.5 * (block + block.conj().T)).max()
         speeds[here] = np.linalg.norm(block, 2)
         at += size
     return Modal(values, upper, ends, basis * scale[:, None], rows / scale[None, :], growth, speeds)
-
-
-def _supports(A: np.ndarray, blocks: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Which variables the coordinates of each block are made of, and which they move (blocks, m).
-
-    blocks: eigenvalues. A group of variables that depend on each other has eigenvalues of its own; their coordinates
-    are made of the group and of what it depends on, and move what depends on it.
-    """
-    m = len(A)
-    depends = (A != 0.0) | np.eye(m, dtype=bool)
-    for _ in range(max(m - 1, 1).bit_length()):
-        depends = depends @ depends
-    seen, moved = np.zeros((len(blocks), m), dtype=bool), np.zeros((len(blocks), m), dtype=bool)
-    tied = depends & depends.T
-    for i in range(m):
-        group = np.flatnonzero(tied[i])
-        if i != group[0]:
-            continue
-        for value in np.linalg.eigvals(A[np.ix_(group, group)]):
-            far = [np.abs(np.append(block, block.conj()) - value).min(initial=np.inf) for block in blocks]
-            near = np.array(far) <= max(min(far), _ALIKE * abs(value))
-            seen[near] |= depends[i]
-            moved[near] |= depends[:, i]
-    return seen, moved
-
-
-def _without_rounding(rows: np.ndarray, support: np.ndarray) -> np.ndarray:
-    """Rows whose entries outside of their support are nothing: exponentials would make something of their rounding."""
-    sizes = np.abs(rows)
-    is_rounding = ~support & (sizes < _TINY * sizes.max(axis=1, keepdims=True, initial=0.0))
-    return np.where(is_rounding, 0.0, rows)

@@ -37,19 +37,24 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:
     """A sentence for each mode that was asked for and that the state at the start rules out."""
-    told = [c for c in system.surface_of if task.z0[c] >= 0]
-    if not told:
+    if not any(task.z0[c] >= 0 for c in system.surface_of):
         return
-    x, z = task.x0[None], z.copy()
+    x, free = task.x0[None], z.copy()
     for c in system.surface_of:  # where a surface holds, the state would be looked at as it is put onto it
-        z[c] = system.automata[c].above
-    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x, p, z)[0].tolist()
+        free[c] = system.automata[c].above
+    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x, p, free)[0].tolist()
     near = _CLOSE * np.abs(task.x0).max(initial=0.0)
+    is_moved = bool((np.abs(system.project(0.0, task.x0, p, z) - task.x0) > near).any())
     for c, value in zip(system.surface_of, values, strict=True):
         automaton, mode = system.automata[c], task.z0[c]
+        if mode < 0:
+            continue
+        told = f"{automaton.name} begins in mode {automaton.modes[mode]}, as it was told to"
+        said = f"{told}, though the state at the start "
         wanted = {automaton.hold: 0.0, automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
-        if mode >= 0 and (abs(value) > near if wanted == 0.0 else value * wanted < -near):
-            yield (
-                f"{automaton.name} begins in mode {automaton.modes[mode]}, as it was told to, though the state at the "
-                f"start has its surface at {value:.6g}: the state was put onto the surface"
-            )
+        if wanted == 0.0 and abs(value) > near:
+            yield f"{said}has its surface at {value:.6g}: the state was put onto the surface"
+        elif wanted == 0.0 and is_moved and z[c] == mode:
+            yield f"{said}moves off its surface: the state was put onto the surface"
+        elif value * wanted < -near:
+            yield f"{said}has its surface at {value:.6g}, where that mode does not hold"

@@ -181,7 +181,8 @@ class FixedStepRun:
             return True
         z = self._sides_taken() if self.turned else self.z
         self.turned = False
-        count, why = self.march.run(numbers, bound, p, (self.x, z), self.fresh, rows)
+        here = self.x.copy(), z  # moved on as it goes; events hold what was there
+        count, why = self.march.run(numbers, bound, p, here, self.fresh, rows)
         self.fresh[:] = False
         if count < _ROWS:  # a short stretch does not hold on to room for a long one
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()

@@ -123,10 +123,47 @@ def test_half_of_the_basis_is_enough_near_defective_matrices(seed: int) -> None:
     """Of nearly parallel eigenvectors too: what is kept of a pair stands for both to what the rounding of it costs."""
     draw = np.random.default_rng(seed)
     n = 2 + seed % 7
-    A = matrix("nearly defective", n, draw)
-    flow = modal(A, 16.0)
+    flow = modal(matrix("nearly defective", n, draw), 16.0)
     lost = np.abs(np.real(flow.full_basis @ flow.inverse) - np.eye(n))
     assert (lost <= 64.0 * UNIT * (np.abs(flow.full_basis) @ np.abs(flow.inverse)).max()).all()
+
+
+WEAK = [
+    [[-1e-8, 0, 0, 1e-10], [1e-14, 0, 1e-10, 1], [0, 1e-12, 0, 1], [-1, 0, 0, -3]],
+    [[2, 0, 0, -1], [0, 0, 1e-10, -1e-8], [-3, 1e-14, 1e-12, -1e-14], [1e-10, 0, 0, -3]],
+    [[0, 0, 0, 1e-12], [-3, 1, 2, -1e-8], [0, -3, -1e-8, 0], [1e-12, 0, 0, 0]],
+    [[0, -1e-14, 0], [0, 0, 1e-12], [1, -1, -1]],
+    [[0, 0, 1], [1, 0, 0], [-3, 1e-14, 0]],
+    [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [1e-8, 0, 0, 0]],
+]
+
+
+@pytest.mark.parametrize(
+    ("A", "horizon"),
+    [(A, h) for A in WEAK for h in (4.0, 1e4, 1e8)][:-2],  # the last is slow: it may be 1e-11 off
+)
+def test_weak_couplings_cost_no_digits(A: list[list[float]], horizon: float) -> None:
+    """Of LAPACK's eigenvectors for the first, which it balances on its own, one was no eigenvector at all."""
+    matrix = np.array(A, dtype=float)
+    y = np.ones(len(A))
+    expected, _ = exponential(matrix, y, 1.0)
+    assert by_blocks(modal(matrix, horizon), y, 1.0) == pytest.approx(
+        expected, abs=512.0 * UNIT * np.abs(expected).max()
+    )
+
+
+@pytest.mark.parametrize(
+    ("A", "start"),
+    [
+        ([[0, 2e-4, -1e-10, 0], [-1e-8, -3e-10, 0, -3], [0, -1e-12, 0, 0], [2e-12, -3, 0, 2e-12]], 2),
+        ([[-5e-5, 0, 0, -2.9], [5e-4, 4, 0, 0], [0, -0.04, 0, -1e-5], [8.6, 0, -3e-5, 2e-4]], 2),
+    ],
+)
+def test_what_couples_weakly_to_a_motion_that_grows(A: list[list[float]], start: int) -> None:
+    """It grows by exp(36) and exp(48) from a share of 1e-12 and less, which rounding would hide."""
+    matrix, y = np.array(A, dtype=float), np.eye(4)[start]
+    expected, _ = exponential(matrix, y, 12.0)
+    assert by_blocks(modal(matrix, 48.0), y, 12.0) == pytest.approx(expected, rel=1e-12)
 
 
 def test_eigenvalues_that_two_factorisations_tell_apart_differently() -> None:

@@ -40,6 +40,16 @@ def test_a_gap() -> None:
         impacts=[hs.Impact("p", gap="h", restitution=0.5)],
     )
     assert not hs.simulate(ball, (0.0, 0.1), z0={"p": "open"}).warnings
+    assert not hs.simulate(ball, (0.0, 0.1), x0={"h": 0.0, "v": 0.0}, z0={"p": "closed"}).warnings
+    for speed in (1.0, -3.0):
+        for integrator in ("exact", "dop853"):
+            sol = hs.simulate(
+                ball, (0.0, 0.1), x0={"h": 0.0, "v": speed}, z0={"p": "closed"}, integrator=integrator
+            )
+            assert any("moves off its surface: the state was put onto the surface" in w for w in sol.warnings)
+            assert sol.y[:, -1].tolist() == [0.0, 0.0]
+    (below,) = hs.simulate(ball, (0.0, 0.1), x0={"h": -0.5}, z0={"p": "open"}).warnings
+    assert below.endswith("has its surface at -0.5, where that mode does not hold")
     assert any(
         "p begins in mode closed" in text
         for text in hs.simulate(ball, (0.0, 0.1), z0={"p": "closed"}).warnings

@@ -46,3 +46,35 @@ def test_what_is_not_there() -> None:
         sol.event_states("f", side="x")
     with pytest.raises(hs.UsageError, match="no component"):
         sol.event_states("g")
+
+
+@pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign", "exact", "dop853"])
+def test_they_are_those_of_the_dense_output(integrator: str) -> None:
+    """Steps went on in the array that an event held: its states were those of the end of the stretch behind it."""
+    oscillator = hs.Model(
+        "oscillator",
+        states=[hs.State("x", 0, "v"), hs.State("v", 1, "-x-f")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 0.05})],
+        monitors=[hs.Monitor("m", "x - 0.1")],
+    )
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-9.81")],
+        components=[
+            hs.Component(
+                "ground",
+                [hs.Mode("up", hs.Guard("down", "h", hs.Choice("up", reset={"h": "0", "w": "-0.8*w"})))],
+                initial="up",
+            )
+        ],
+    )
+    options = {"step": 1e-3} if integrator.startswith("rk4") else {}
+    for model, component in ((oscillator, "m"), (ball, "ground")):
+        sol = hs.simulate(model, (0.0, 1.5), integrator=integrator, **options)
+        times = sol.event_times(component)
+        assert len(times) >= 1
+        for side in ("+", "-"):
+            np.testing.assert_allclose(
+                sol.event_states(component, side=side), sol(times, side=side).T, rtol=0, atol=1e-9
+            )
+    assert sol.event_states("ground")[0, 1] == pytest.approx(0.8 * np.sqrt(2.0 * 9.81), rel=2e-3)
