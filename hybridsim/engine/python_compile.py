@@ -18,6 +18,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from hybridsim.engine.jit import SIGNATURE
 from hybridsim.engine.python_forms import Failures, Parts, Scalar, number, rates
+from hybridsim.engine.python_helpers import compiled_with_helpers
 from hybridsim.expr import function_name
 
 _REASON = 160  # characters of numba's reason that are shown
@@ -95,12 +96,7 @@ class Compiler:
             return ""
         if not (inspect.isfunction(function) or hasattr(function, "py_func")):
             return f"{function_name(function)}: it compiles plain functions only"
-        # with bounds checked: differences and trial steps go where an index into a table may be beyond it
-        own = (
-            function
-            if hasattr(function, "py_func")
-            else numba.njit(error_model="numpy", boundscheck=True)(function)
-        )
+        own = function if hasattr(function, "py_func") else compiled_with_helpers(function)
         named = numba.typeof(self.parts.parameters(*[0.0] * self.count))
         signature = (types.float64, types.Array(types.float64, 1, "C"), named)
         try:

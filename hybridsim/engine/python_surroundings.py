@@ -17,11 +17,22 @@ def surroundings(functions: Iterable[Callable[..., Any]]) -> tuple[Any, ...]:
     Numbers and texts, tuples and arrays of them, by what they say; everything else by which object it is. What numba
     has been told to compile already (`numba.njit`) keeps what it read then, as numba has it.
     """
-    plain = [function for function in functions if isinstance(function, FunctionType)]
-    return tuple((name, _told(value)) for function in plain for name, value in _read(function))
+    return tuple(_surroundings(functions, []))
 
 
-def _read(function: FunctionType) -> Iterator[tuple[str, Any]]:
+def _surroundings(
+    functions: Iterable[Callable[..., Any]], seen: list[FunctionType]
+) -> Iterator[tuple[Any, ...]]:
+    for function in functions:
+        if isinstance(function, FunctionType) and function not in seen:
+            seen.append(function)
+            for name, value in read(function):
+                yield name, _told(value)
+                yield from _surroundings([value], seen)  # what a plain function that it calls reads
+
+
+def read(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    """Names and values of its globals and of its closure."""
     for name in sorted(_names(function.__code__)):
         if name in function.__globals__:
             yield name, function.__globals__[name]

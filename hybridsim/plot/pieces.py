@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # slip among long ones is still a curve.
 _POINTS, _LEAST = 6_000, 9
 # More periods than can be told apart in a picture are not drawn; the last few are, without the transient.
-_MANY, _FEW = 12, 4
+_MANY, _FEW = 24, 4
 _MANY_EVENTS, _FEW_EVENTS = 300, 24  # and so with events, where nothing has a period
 # A number of periods that differs from a whole one by this share is whole: an end given as 100T is rounded.
 _WHOLE = 1e-9

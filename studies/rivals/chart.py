@@ -18,7 +18,7 @@ from rivals.scenes import Scene
 _LOOKS = {
     "ours": (style.PALETTE[0], "o", "hybridsim"),
     "rival": (style.PALETTE[1], "s", "other libraries"),
-    "published": (style.PALETTE[2], "^", "published RK4, and tanh"),
+    "published": (style.PALETTE[2], "^", "RK4 with dichotomy, and tanh"),
     "limit": (style.INK, "D", "closed form by hand"),
 }
 _FLOOR = 1e-17

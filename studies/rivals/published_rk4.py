@@ -25,7 +25,7 @@ def dichotomy(steps: int = 1200) -> Method:
             return None
         return _runs(scene, _march_by_dichotomy, (o.m, o.c, o.k, o.limit, o.F0, o.omega), steps)
 
-    return Method("rk4-dichotomy", f"RK4, dichotomy, T/{steps}", "published", start)
+    return Method("rk4-dichotomy", f"RK4, dichotomy, v zeroed, T/{steps}", "published", start)
 
 
 def tanh(steps: int = 120_000, width: float = 1e-4) -> Method:

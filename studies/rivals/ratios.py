@@ -97,7 +97,7 @@ def ratios(found: Found) -> list[Ratio]:
             )
         tsit5, diffrax = by.get("tsit5@1e-06"), by.get("diffrax@1e-06")
         if tsit5 and tsit5.events and diffrax and diffrax.events:
-            note = f"errors {tsit5.errors.states:.0e}, {diffrax.errors.states:.0e}"
+            note = f"errors {diffrax.errors.states:.0e}, {tsit5.errors.states:.0e}"
             note += "" if diffrax.errors.right else "; events of diffrax wrong"
             result.append(
                 Ratio(

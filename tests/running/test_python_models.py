@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -470,6 +471,37 @@ def test_what_functions_read_from_outside_is_what_it_is_now(monkeypatch: pytest.
             for integrator in ("dop853", "dop853", "scipy-dop853"):
                 sol = hs.simulate(model, (0, 5), integrator=integrator, rtol=1e-10)
                 assert sol.y[0, -1] == pytest.approx(math.cos(5 * math.sqrt(k)), abs=1e-7)
+
+
+def pull(x: float) -> float:
+    return -STIFFNESS * doubled(x) / 2.0
+
+
+def doubled(x: float) -> float:
+    return 2.0 * x if x < 1e300 else doubled(0.5 * x)  # calls itself
+
+
+def by_helpers(t: float, x: np.ndarray, p: Any) -> tuple[float, float]:
+    return x[1], pull(x[0])
+
+
+def by_a_local_helper() -> Callable[..., Any]:
+    def spring(x: float) -> float:
+        return pull(x)
+
+    return lambda t, x, p: (x[1], spring(x[0]))
+
+
+@pytest.mark.parametrize("make", [lambda: by_helpers, by_a_local_helper])
+def test_plain_functions_that_it_calls_are_compiled_along_with_it(
+    make: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=make())
+    for k in (1.0, 4.0):  # what a helper reads from outside is what it is now
+        monkeypatch.setattr(f"{__name__}.STIFFNESS", k)
+        sol = hs.simulate(model, (0, 5), integrator="dop853", rtol=1e-10)
+        assert sol.y[0, -1] == pytest.approx(math.cos(5 * math.sqrt(k)), abs=1e-7)
+        assert not sol.warnings
 
 
 def test_nothing_is_compiled_again_as_long_as_nothing_outside_has_changed() -> None:

@@ -29,8 +29,8 @@ class OneCoefficient(Rung):
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
             raise NothingToDrop(
-                "there is no step between mu_s and mu_k: every contact breaks loose at the force with which it begins "
-                "to slide"
+                "no force falls at once where a contact breaks loose: each begins to slide with the force at which it "
+                "breaks loose"
             )
         lowered = {c.name for c, jump in zip(model.contacts, jumps, strict=True) if jump}
         return with_contacts(model, lambda c: _lowered(c) if c.name in lowered else c, self.title)
