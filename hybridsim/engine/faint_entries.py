@@ -14,18 +14,30 @@ _CLOSE = 1e-14  # of the largest row: by how much a row may change, else it was 
 
 def with_faint_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
     """V (m, k) of A V = V T with its faint rows from A_ff V_f - V_f T = -A_fc V_c, of these again the fainter."""
-    from scipy.linalg import solve_sylvester
-
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
-    faint = np.flatnonzero(sizes < _FAINT * largest)
-    while len(faint):
-        clear = np.setdiff1d(np.arange(len(V)), faint)
-        known = A[np.ix_(faint, clear)] @ V[clear]
-        found = solve_sylvester(A[np.ix_(faint, faint)].astype(complex), -T, -known)
+    faint = sizes < _FAINT * largest
+    while faint.any():
+        rows, others = np.flatnonzero(faint)[:, None], np.flatnonzero(~faint)
+        known = A[rows, others] @ V[others]
+        found = _solved(A[rows, rows.T], T, known) if known.any() else np.zeros_like(known)
         if not (np.abs(found - V[faint]) <= _CLOSE * largest).all():
             break
         V[faint] = found
         sizes = np.abs(found).max(axis=1)
-        faint = faint[sizes < _FAINT * sizes.max()]
+        faint[rows[sizes >= _FAINT * sizes.max(), 0]] = False
+        if not sizes.any():
+            break
     return V
+
+
+def _solved(A: np.ndarray, T: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """X of A X - X T = -known; not a number where there is none."""
+    from scipy.linalg import solve_sylvester
+
+    try:
+        if len(T) > 1:
+            return np.asarray(solve_sylvester(A.astype(complex), -T, -known))
+        return np.linalg.solve(A - T[0, 0] * np.eye(len(A)), -known)
+    except np.linalg.LinAlgError:
+        return np.full_like(known, np.nan)

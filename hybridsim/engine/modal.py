@@ -19,9 +19,6 @@ from hybridsim.engine.jit import kernel
 _CONDITION = 1e2  # of the basis, at most: so many roundings of the state does the change of basis cost
 _MISSED = 2.0**-48  # of the largest entry: by how much A v may differ from lambda v
 _GROWING, _SILENT = 3.0, 1e-12  # rates that matter: times the time at hand, and of the largest entry
-_SPREAD = 2.0**12  # of scales: beyond it is seen whether they do more harm than good
-_AMISS, _FAINT = 2.0**-40, 2.0**-10  # of what a matrix makes itself; what is next to nothing
-_LONGEST = 2.0**80  # times at hand, in terms of the fastest rate
 _SWEEPS = 8  # of balancing
 
 
@@ -119,11 +116,8 @@ def modals(
     # of a motion that grows, rounding in the basis grows too
     grows = values.real.max(axis=1, initial=0.0) > np.maximum(_GROWING / horizon, _SILENT * largest)
     is_diagonal &= are_right & ~grows
-    is_diagonal &= scales.max(axis=1, initial=1.0) <= _SPREAD * scales.min(axis=1, initial=1.0)
     others = {
-        int(k): _well_scaled(
-            A[k], horizon, _by_blocks(balanced[k], values[k], vectors[k], bool(are_right[k]), scales[k])
-        )
+        int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
         for k in np.flatnonzero(~is_diagonal)
     }
     counts = (values.imag >= 0.0).sum(axis=1)
@@ -180,48 +174,12 @@ def _diagonal(
             j += 1
 
 
-def _well_scaled(A: np.ndarray, horizon: float, flow: Modal) -> Modal:
-    """The flow, or one that is balanced for shorter times, if that is nearer to A entry by entry.
-
-    Over long times weak couplings count, and balanced for them states may be scaled so far apart that the strong ones
-    are known no better than the weak ones.
-    """
-    least, fastest = _amiss(A, flow), float(np.abs(flow.values).max(initial=0.0))
-    horizon, last = min(horizon, _LONGEST / max(fastest, 1e-300)), None
-    while least > _AMISS and horizon * fastest > 1.0:
-        horizon /= 16.0
-        scale = np.ones((1, len(A)))
-        _balance(np.abs(A)[None], 1.0 / horizon, scale)
-        if last is None or (scale != last).any():
-            last, balanced = scale, A * scale[0] / scale[0][:, None]
-            other = _by_blocks(balanced, np.empty(0), np.empty((0, 0)), False, scale[0])
-            found = _amiss(A, other)
-            if found < least:
-                least, flow = found, other
-    return flow
-
-
-def _amiss(A: np.ndarray, flow: Modal) -> float:
-    """By how much basis, inverse and blocks miss the identity and A, entry by entry.
-
-    In terms of what A itself makes of each state from each other within the time of the fastest rate, where it is not
-    next to nothing with A balanced for that time.
-    """
-    B, fastest = np.diag(flow.values) + flow.upper, float(np.abs(flow.values).max(initial=0.0))
-    fastest = fastest if fastest > 0.0 else 1.0
-    identity, units = np.eye(len(A)), np.ones((1, len(A)))
-    _balance(np.abs(A)[None], fastest, units)
-    in_units = units[0] / units[0][:, None]
-    made = in_units * np.linalg.matrix_power(identity + np.abs(A) / (8.0 * fastest), 8)
-    missed = np.maximum(
-        np.abs((flow.full_basis @ flow.inverse).real - identity),
-        np.abs((flow.full_basis @ B @ flow.inverse).real - A) / fastest,
-    )
-    return float((in_units * missed / (made + _FAINT)).max(initial=0.0))
-
-
 def _by_blocks(
-    balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, are_right: bool, scale: np.ndarray
+    balanced: np.ndarray,
+    values: np.ndarray,
+    vectors: np.ndarray,
+    scale: np.ndarray,
+    are_right: bool,
 ) -> Modal:
     """Eigenvalues in common blocks until the basis is well conditioned."""
     if not are_right:
@@ -292,7 +250,7 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
                 for j in range(m):
                     if j != i:
                         row, column = max(row, size[i, j]), max(column, size[j, i])
-                if row == 0.0 or column == 0.0:
+                if row == 0.0 and column == 0.0:
                     continue
                 row, column = max(row, size[i, i]), max(column, size[i, i])
                 rows = columns = 0.0

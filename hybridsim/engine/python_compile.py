@@ -101,7 +101,7 @@ class Compiler:
         signature = (types.float64, types.Array(types.float64, 1, "C"), named)
         try:
             own.compile(signature)
-        except (NumbaError, NotImplementedError) as fault:
+        except (NumbaError, NotImplementedError, TypeError) as fault:  # the last of arguments with defaults
             return f"{function_name(function)}: {_in_short(fault)}"
         returned = own.overloads[signature].signature.return_type
         if _put_compiled(returned, None, None, None) is None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numba
 
-from hybridsim.engine.python_surroundings import read
+from hybridsim.engine.python_surroundings import closure_of, globals_of
 
 _NUMBA_KNOWS = ("numpy", "numba", "math")  # modules whose functions it replaces by its own
 
@@ -19,27 +19,27 @@ def compiled_with_helpers(function: FunctionType, made: dict[FunctionType, Any] 
     """
     made = {} if made is None else made
     compiled = numba.njit(error_model="numpy", boundscheck=True)
-    helpers = {
-        name: value
-        for name, value in read(function)
-        if isinstance(value, FunctionType) and value.__module__.split(".")[0] not in _NUMBA_KNOWS
-    }
-    if not helpers or function in made:
+    outside = {name: value for name, value in globals_of(function).items() if _is_plain(value)}
+    within = {name: value for name, value in closure_of(function).items() if _is_plain(value)}
+    if not (outside or within) or function in made:
         return made.get(function) or compiled(function)
-    surroundings = dict(function.__globals__)
     cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    surroundings = dict(function.__globals__)
     own = FunctionType(
         function.__code__,
         surroundings,
         function.__name__,
         function.__defaults__,
-        tuple(CellType() if name in helpers else cell for name, cell in cells.items()),
+        tuple(CellType() if name in within else cell for name, cell in cells.items()),
     )
     made[function] = compiled(own)
-    for name, helper in helpers.items():
-        ready = compiled_with_helpers(helper, made)
-        if name in cells:
-            own.__closure__[list(cells).index(name)].cell_contents = ready  # type: ignore[index]  # it has cells
-        else:
-            surroundings[name] = ready
+    surroundings |= {name: compiled_with_helpers(helper, made) for name, helper in outside.items()}
+    for name, cell in zip(cells, own.__closure__ or (), strict=True):
+        if name in within:
+            cell.cell_contents = compiled_with_helpers(within[name], made)
     return made[function]
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether it is a function that numba has to be given compiled."""
+    return isinstance(value, FunctionType) and (value.__module__ or "").split(".")[0] not in _NUMBA_KNOWS

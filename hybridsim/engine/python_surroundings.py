@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,21 +26,30 @@ def _surroundings(
     for function in functions:
         if isinstance(function, FunctionType) and function not in seen:
             seen.append(function)
-            for name, value in read(function):
+            yield "defaults", _told((function.__defaults__, tuple((function.__kwdefaults__ or {}).items())))
+            for name, value in (*globals_of(function).items(), *closure_of(function).items()):
                 yield name, _told(value)
+                if isinstance(value, ModuleType):  # what of it the function may read
+                    for part in sorted(_names(function.__code__) & vars(value).keys()):
+                        yield f"{name}.{part}", _told(vars(value)[part])
                 yield from _surroundings([value], seen)  # what a plain function that it calls reads
 
 
-def read(function: FunctionType) -> Iterator[tuple[str, Any]]:
-    """Names and values of its globals and of its closure."""
-    for name in sorted(_names(function.__code__)):
-        if name in function.__globals__:
-            yield name, function.__globals__[name]
+def globals_of(function: FunctionType) -> dict[str, Any]:
+    """Names and values of the globals that it may read."""
+    known = function.__globals__
+    return {name: known[name] for name in sorted(_names(function.__code__)) if name in known}
+
+
+def closure_of(function: FunctionType) -> dict[str, Any]:
+    """Names and values of its closure, without those that nothing has been put into so far."""
+    found = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
-            yield name, cell.cell_contents
-        except ValueError:  # nothing has been put into it so far
+            found[name] = cell.cell_contents
+        except ValueError:
             continue
+    return found
 
 
 def _names(code: CodeType) -> set[str]:

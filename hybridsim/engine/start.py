@@ -39,22 +39,24 @@ def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) ->
     """A sentence for each mode that was asked for and that the state at the start rules out."""
     if not any(task.z0[c] >= 0 for c in system.surface_of):
         return
-    x, free = task.x0[None], z.copy()
+    x, free = task.x0, z.copy()
     for c in system.surface_of:  # where a surface holds, the state would be looked at as it is put onto it
         free[c] = system.automata[c].above
-    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x, p, free)[0].tolist()
-    near = _CLOSE * np.abs(task.x0).max(initial=0.0)
-    is_moved = bool((np.abs(system.project(0.0, task.x0, p, z) - task.x0) > near).any())
+    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x[None], p, free)[0].tolist()
+    near = _CLOSE * np.abs(x).max(initial=0.0)
     for c, value in zip(system.surface_of, values, strict=True):
         automaton, mode = system.automata[c], task.z0[c]
         if mode < 0:
             continue
         told = f"{automaton.name} begins in mode {automaton.modes[mode]}, as it was told to"
         said = f"{told}, though the state at the start "
-        wanted = {automaton.hold: 0.0, automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
-        if wanted == 0.0 and abs(value) > near:
-            yield f"{said}has its surface at {value:.6g}: the state was put onto the surface"
-        elif wanted == 0.0 and is_moved and z[c] == mode:
-            yield f"{said}moves off its surface: the state was put onto the surface"
+        wanted = {automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
+        if mode == automaton.hold:
+            held = free.copy()
+            held[c] = mode
+            there = system.project(0.0, x, p, held)
+            if (np.abs(there - x) > _CLOSE * np.maximum(np.abs(there), np.abs(x))).any():
+                how = f"has its surface at {value:.6g}" if abs(value) > near else "moves off its surface"
+                yield f"{said}{how}: the state was put onto the surface"
         elif value * wanted < -near:
             yield f"{said}has its surface at {value:.6g}, where that mode does not hold"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -304,13 +304,12 @@ class FixedStepRun:
     def _monitor_events(
         self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray
     ) -> bool:
-        stop, resetting = False, []
+        stop, resetting, seen = False, [], []
         for k in crossed:
             monitor = self.system.model.monitors[k]
             if {"up": 1, "down": -1, "both": directions[k]}[monitor.direction] != directions[k]:
                 continue
-            occurrence = Occurrence(instant, "monitor", monitor.name, "", "", "", int(directions[k]), x, x)
-            self.record.occurrences.append(occurrence)
+            seen.append((monitor.name, int(directions[k])))
             if monitor.action == "reset":
                 resetting.append(int(k))
             elif monitor.action == "terminate":
@@ -318,8 +317,16 @@ class FixedStepRun:
                 self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
                 stop = True
         if resetting:  # all of one instant, so that they read one state
-            stop = self._settle(instant, (), (), x, monitors=tuple(resetting)) or stop
+            return self._settle(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
+        self._record_monitors(instant, seen, x, x)
         return stop
+
+    def _record_monitors(
+        self, instant: Instant, seen: Sequence[tuple[str, int]], x_minus: np.ndarray, x_plus: np.ndarray
+    ) -> None:
+        for name, direction in seen:
+            occurrence = Occurrence(instant, "monitor", name, "", "", "", direction, x_minus, x_plus)
+            self.record.occurrences.append(occurrence)
 
     def _settle(
         self,
@@ -328,9 +335,13 @@ class FixedStepRun:
         schedules: tuple[int, ...],
         x_minus: np.ndarray,
         monitors: tuple[int, ...] = (),
+        seen: Sequence[tuple[str, int]] = (),
         starting: bool = False,
     ) -> bool:
-        """Transitions and resets by the event contract, for all components but those with a surface."""
+        """Transitions and resets by the event contract, for all components but those with a surface.
+
+        monitors: numbers of those that reset; seen: names and directions of all that crossed, to be recorded first.
+        """
         system, record = self.system, self.record
         self.origin = instant
         p = self._vector()
@@ -346,6 +357,7 @@ class FixedStepRun:
         resets += [("monitor", k) for k in monitors]
         outcome = Settling(system, at, before, forward=True, scope=self.declared).run(fired, resets)
         self.x, self.z, self.discrete = outcome.x, outcome.z, system.discrete(outcome.p).copy()
+        self._record_monitors(instant, seen, x_minus, outcome.x)
         for change in outcome.changes:
             automaton = system.automata[change.component]
             if starting and automaton.is_corner:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import hybridsim as hs
@@ -33,6 +35,12 @@ def test_a_contact(x0: dict[str, float], z0: dict[str, str] | None, is_told: boo
         assert all("f begins in mode" in text for text in said)
 
 
+def test_beside_a_large_state() -> None:
+    model = replace(BELT, states=[*BELT.states, hs.State("far", 1e9, "0")])
+    (said,) = hs.simulate(model, (0.0, 0.01), x0={"v": 0.5}, z0={"f": "stick"}).warnings
+    assert "f begins in mode stick" in said
+
+
 def test_a_gap() -> None:
     ball = hs.Model(
         "ball",
@@ -48,6 +56,9 @@ def test_a_gap() -> None:
             )
             assert any("moves off its surface: the state was put onto the surface" in w for w in sol.warnings)
             assert sol.y[:, -1].tolist() == [0.0, 0.0]
+    rising = replace(ball, states=[hs.State("h", 1, "v"), hs.State("v", 0, "9.81 + p")])
+    (gone,) = hs.simulate(rising, (0.0, 0.1), x0={"h": 0.0, "v": 1.0}, z0={"p": "closed"}).warnings
+    assert "p begins in mode closed" in gone
     (below,) = hs.simulate(ball, (0.0, 0.1), x0={"h": -0.5}, z0={"p": "open"}).warnings
     assert below.endswith("has its surface at -0.5, where that mode does not hold")
     assert any(

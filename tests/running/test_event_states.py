@@ -78,3 +78,21 @@ def test_they_are_those_of_the_dense_output(integrator: str) -> None:
                 sol.event_states(component, side=side), sol(times, side=side).T, rtol=0, atol=1e-9
             )
     assert sol.event_states("ground")[0, 1] == pytest.approx(0.8 * np.sqrt(2.0 * 9.81), rel=2e-3)
+
+
+@pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign", "moreau", "exact", "dop853"])
+def test_those_of_a_monitor_that_resets(integrator: str) -> None:
+    """v+ = v- + 0.5."""
+    model = hs.Model(
+        "kicked",
+        states=[hs.State("x", 0, "v"), hs.State("v", 1, "-f")],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 0.05})],
+        monitors=[hs.Monitor("m", "x-0.1", action="reset", reset={"v": "v+0.5"}), hs.Monitor("n", "x-0.2")],
+    )
+    options = {} if integrator in ("exact", "dop853") else {"step": 1e-3}
+    sol = hs.simulate(model, (0.0, 0.3), integrator=integrator, **options)
+    ((x, v),) = sol.event_states("m", side="-")
+    assert sol.event_states("m")[0] == pytest.approx([x, v + 0.5], abs=1e-14)
+    assert (x, v) == pytest.approx((0.1, np.sqrt(1.0 - 0.1 * 0.1)), abs=2e-3)
+    np.testing.assert_array_equal(sol.event_states("n"), sol.event_states("n", side="-"))
+    assert [event.component for event in sol.events] == ["m", "n"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -492,6 +493,17 @@ def by_a_local_helper() -> Callable[..., Any]:
     return lambda t, x, p: (x[1], spring(x[0]))
 
 
+SETTINGS = ModuleType("settings")
+
+
+def by_a_default(x: float, force: float = 0.0) -> float:
+    return force
+
+
+def by_a_module(t: float, x: Any, p: Any) -> Any:
+    return x[1], by_a_default(x[0]) - SETTINGS.K * x[0]
+
+
 @pytest.mark.parametrize("make", [lambda: by_helpers, by_a_local_helper])
 def test_plain_functions_that_it_calls_are_compiled_along_with_it(
     make: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
@@ -502,6 +514,40 @@ def test_plain_functions_that_it_calls_are_compiled_along_with_it(
         sol = hs.simulate(model, (0, 5), integrator="dop853", rtol=1e-10)
         assert sol.y[0, -1] == pytest.approx(math.cos(5 * math.sqrt(k)), abs=1e-7)
         assert not sol.warnings
+
+
+def test_helpers_without_a_module_and_of_the_name_of_a_global() -> None:
+    def spring(x: float) -> float:
+        return -4.0 * x
+
+    spring.__module__ = None  # type: ignore[assignment]  # as sympy.lambdify makes them
+    pull = 0.0  # a number of the name of a global function
+
+    def flow(t: float, x: Any, p: Any) -> Any:
+        return x[1], spring(x[0]) + pull
+
+    model = hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=flow)
+    for integrator in ("dop853", "scipy-dop853"):
+        sol = hs.simulate(model, (0, 5), integrator=integrator, rtol=1e-10)
+        assert sol.y[0, -1] == pytest.approx(math.cos(10.0), abs=1e-7)
+
+
+def test_what_is_read_of_a_module_and_defaults_are_what_they_are_now() -> None:
+    model = hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=by_a_module)
+    for k, g in ((1.0, 0.0), (4.0, 0.0), (4.0, 4.0)):
+        SETTINGS.K = k  # type: ignore[attr-defined]  # made for the test
+        by_a_default.__defaults__ = (g,)
+        sol = hs.simulate(model, (0, 5), integrator="dop853", rtol=1e-10)
+        assert sol.y[0, -1] == pytest.approx(g / k + (1.0 - g / k) * math.cos(5 * math.sqrt(k)), abs=1e-7)
+
+
+def test_a_flow_with_a_default_is_called_from_python() -> None:
+    def flow(t: float, x: Any, p: Any, k: float = 4.0) -> Any:
+        return x[1], -k * x[0]
+
+    sol = hs.simulate(hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=flow), (0, 5), rtol=1e-10)
+    assert sol.y[0, -1] == pytest.approx(math.cos(10.0), abs=1e-7)
+    assert any("called from Python" in text for text in sol.warnings)
 
 
 def test_nothing_is_compiled_again_as_long_as_nothing_outside_has_changed() -> None:
