@@ -204,10 +204,10 @@ TAIL = """
 ## What it says
 
 The deepest pair that is flagged and not found has a depth of {exact:.1e} of the size (`exact`) and {taylor:.1e}
-(`taylor`). The error bounds that the compiled searches work with are (16 + 2 J) 2^-53 of the size for J modal
-coordinates, 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k| of the guard's series on the step, at most 6
-rtol = {bound:.0e} of its largest value. So no pair whose dip exceeds ten times the bound is missed. Of the others
-each is found or flagged, but for those that the table counts as lost, below the rounding of the guard's own terms.
+(`taylor`). The error bounds that the compiled searches work with are (16 + 2 J + 2 w s) 2^-53 of the size for J modal
+coordinates, speeds up to w and a time s since the last event, some 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53
+sum |a_k| of the guard's series on the step, at most 6 rtol = {bound:.0e} of its largest value. So no pair whose dip
+exceeds ten times the bound is missed. Of the others {lost}.
 
 How to run: `python studies/guards.py [guards]`; the first run compiles. {minutes:.0f} minutes on one core.
 """
@@ -222,7 +222,15 @@ def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
     text += table(tallies, "pairs", [("found",), ("flagged",), ("silent", "torn")])
     text += MISSES + table(tallies, "misses", [("passed",), ("flagged",), ("crossed", "torn")])
     deepest = {name: a.deepest_flagged for name, a in tallies.items()}
-    return text + TAIL.format(**deepest, bound=6 * RTOL, minutes=minutes)
+    silent = sum(
+        n for a in tallies.values() for (_, fate), n in a.pairs.items() if fate in ("silent", "torn")
+    )
+    lost = "each is found or flagged"
+    if count:
+        lost += (
+            f", but for {count} that the table counts as lost, below the rounding of the guard's own terms"
+        )
+    return text + TAIL.format(**deepest, bound=6 * RTOL, minutes=minutes, lost=lost)
 
 
 def table(tallies: dict[str, Tally], what: str, columns: list[tuple[str, ...]]) -> str:

@@ -155,9 +155,9 @@ and holds every run against a reference at four times: the end, and three betwee
   1e4, 6 with 1e4 to 1e8 (`rodas5p`).
 
 Errors are the largest of all states, relative to the largest state of the run, in units of rtol: {asked}.
-`exact` knows no tolerance. Its unit is 2^-53 of the largest state plus what a relative change of all numbers of the
-model by 2^-53 makes of the motion, which no computation in doubles can do without; its change of basis may cost a
-factor of a thousand on top.
+`exact` knows no tolerance. Its unit is 2^-53 of the largest state plus what relative changes of all numbers of the
+model by 2^-53 make of the motion (the worst of three random ones), which no computation in doubles can do without; its
+change of basis may cost a factor of a hundred on top.
 
 *Within* means at most {within:.0f} units, for `exact` {exact:.0e}, which is 1e-12: a tolerance is kept step by step,
 and what a system makes of the errors of all steps is its own.
