@@ -226,9 +226,9 @@ def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
         n for a in tallies.values() for (_, fate), n in a.pairs.items() if fate in ("silent", "torn")
     )
     lost = "each is found or flagged"
-    if count:
+    if silent:
         lost += (
-            f", but for {count} that the table counts as lost, below the rounding of the guard's own terms"
+            f", but for {silent} that the table counts as lost, below the rounding of the guard's own terms"
         )
     return text + TAIL.format(**deepest, bound=6 * RTOL, minutes=minutes, lost=lost)
 
