@@ -253,6 +253,8 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
                 if row == 0.0 and column == 0.0:
                     continue
                 row, column = max(row, size[i, i]), max(column, size[i, i])
+                if row == 0.0 or column == 0.0:  # over all times
+                    continue
                 rows = columns = 0.0
                 for j in range(m):
                     rows += (size[i, j] / row) ** 2
