@@ -19,6 +19,7 @@ from hybridsim.engine.jit import kernel
 _CONDITION = 1e2  # of the basis, at most: so many roundings of the state does the change of basis cost
 _MISSED = 2.0**-48  # of the largest entry: by how much A v may differ from lambda v
 _GROWING, _SILENT = 3.0, 1e-12  # rates that matter: times the time at hand, and of the largest entry
+_SLOWEST = 4.0  # over the horizon: the time at hand is 1 to 1/16 of it, and powers of the time have units of their own
 _SWEEPS = 8  # of balancing
 
 
@@ -99,7 +100,7 @@ def modals(
 ) -> Modals:
     """The same for many matrices (K, m, m); J is filled up to a multiple, and to `least`."""
     scales = np.ones(A.shape[:2])
-    _balance(np.abs(A), 1.0 / horizon, scales)
+    _balance(np.abs(A), _SLOWEST / horizon, scales)
     balanced = A * scales[:, None, :] / scales[:, :, None]
     values, vectors = np.linalg.eig(balanced)
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
