@@ -262,7 +262,9 @@ class _Follower:
             if not period > 0.0:
                 return None
             n = len(previous.orbit.start.x)
-            start = replace(previous.orbit.start, x=values[:n], discrete=values[n:count])
+            before = previous.orbit.start
+            share = before.at / previous.orbit.period  # of the period, at which the section is
+            start = replace(before, x=values[:n], discrete=values[n:count], at=share * period)
             start = motion.on_constraints(start)
             solution = motion.run(start, period)
             end = point_at_end(solution)
@@ -272,12 +274,11 @@ class _Follower:
         except HybridsimError as fault:
             self.fault = fault.message
             return None
-        last = solution._segments[-1]
-        rates = np.zeros(count)
-        rates[:n] = rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
+        rates, at_start = (self._rates(solution, k, count) for k in (-1, 0))
         columns = [found.by_start - np.eye(count)]
         columns += [rates[:, None]] if self.is_free else []
-        columns += [(found.by_parameter[:, 0] + rates * growth)[:, None]]
+        moved = rates * (1.0 + share) - found.by_start @ at_start * share  # by both ends of the period
+        columns += [(found.by_parameter[:, 0] + moved * growth)[:, None]]
         unit = self.unit
         jacobian = np.concatenate(columns, axis=1) * unit[None, :] / unit[:count, None]
         change = (end.values - start.values) / unit[:count]
@@ -292,6 +293,14 @@ class _Follower:
             value, orbit, motion, multipliers(found.by_start, self.is_free), _word(solution), self.is_free
         )
         return _Closing(point, change, jacobian)
+
+    @staticmethod
+    def _rates(solution: Solution, k: int, count: int) -> np.ndarray:
+        """Rates (count,) of all unknowns at the beginning (k = 0) or the end (-1) of a run."""
+        segment, found = solution._segments[k], np.zeros(count)
+        states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
+        found[: len(states)] = states
+        return found
 
     def _forced(self, value: float) -> tuple[float, float]:
         """The period of the forcing, and its derivative by the parameter."""

@@ -8,6 +8,7 @@ doi:10.1016/0960-0779(94)00170-U.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[floa
             return -math.inf, -math.inf
         logarithms.append(math.log(size))
         change /= size
-        point = point_at_end(solution)
+        point = replace(point_at_end(solution), at=start.at)
     half = _STRETCHES // 2
     rates = [sum(part) / (half * _PERIODS * period) for part in (logarithms[:half], logarithms[half:])]
     return rates[0], rates[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -80,6 +81,11 @@ class Measures:
     def _orbit(self) -> Orbit:
         return orbit_of(self.solution)
 
+    @property
+    def _phase(self) -> float:
+        """The time, counted with the forcing, at which the orbit begins."""
+        return 0.0
+
     @cached_property
     def _names(self) -> tuple[str, ...]:
         return tuple(n for n in self._orbit.names if not n.startswith(("guard ", "velocity of ")))
@@ -131,7 +137,7 @@ class Measures:
         return self._each(lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
 
     def harmonic(self, name: str, k: int = 1) -> complex:
-        """The amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), t from the orbit's start.
+        """The amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), t that of the forcing.
 
         Integrated over the segments: no sampling, no aliasing.
         """
@@ -142,7 +148,9 @@ class Measures:
             )
         if not isinstance(k, int) or k < 0:
             raise UsageError(f"k is {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ...")
-        return self._orbit.harmonic(name, 2.0 * math.pi * k / self._orbit.duration)
+        frequency = 2.0 * math.pi * k / self._orbit.duration
+        found = self._orbit.harmonic(name, frequency)
+        return found * cmath.exp(-1j * frequency * self._phase) if self._phase else found
 
     @property
     def dissipated(self) -> ByName:

@@ -25,13 +25,14 @@ class Point:
     """All that a run starts from: states, discrete states, and modes of the components that no surface decides.
 
     x (n,), discrete (d,); numbers: of the modes of all components, by which held states are known. What happens at the
-    very instant of the section has not happened yet.
+    very instant of the section has not happened yet. at: the time from which the forcing's phase is counted on.
     """
 
     x: np.ndarray
     discrete: np.ndarray
     z: dict[str, str]
     numbers: np.ndarray
+    at: float = 0.0
 
     @property
     def values(self) -> np.ndarray:
@@ -77,14 +78,15 @@ class Motion:
         x = system.project(0.0, point.x, system.vector(Instant(0.0), point.discrete), point.numbers)
         return replace(point, x=x)
 
-    def run(self, start: Point | None, t_end: float, **options: Any) -> Solution:
-        """From time 0, which the forcing's phase is counted from; None starts where the model is declared to start."""
+    def run(self, start: Point | None, duration: float, **options: Any) -> Solution:
+        """From the time of a point on; None starts at time 0 where the model is declared to start."""
         given: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
+        begin = 0.0 if start is None else start.at
         solution = simulate(
-            self.model, (0.0, t_end), **given, progress=self.progress, **(self.options | options)
+            self.model, (begin, begin + duration), **given, progress=self.progress, **(self.options | options)
         )
         if solution.status != "finished":
             raise SimulationError(

@@ -139,10 +139,11 @@ class Orbit:
             rows = self.values[chosen].transpose(0, 2, 1).reshape(-1, POINTS)
             yield first, rows @ TO_COEFFICIENTS.T, self.is_smooth[chosen]
 
-    def rises_through(self, name: str, level: float) -> np.ndarray:
-        """Times, from the beginning of the run, at which a quantity rises through a level."""
+    def passes(self, name: str, level: float, upward: bool = True) -> np.ndarray:
+        """Times, from the beginning of the run, at which a quantity rises through a level, or falls."""
         series = self._series(name)
         series[:, 0] -= level
+        series *= 1.0 if upward else -1.0
         values = series @ _VALUES_ON_GRID.T
         k, g = np.nonzero((values[:, :-1] < 0.0) & (values[:, 1:] >= 0.0))
         at = _zeros(series[k], _GRID[g], _GRID[g + 1], values[k, g], values[k, g + 1])

@@ -91,10 +91,18 @@ class SteadyState(Measures):
 
     @cached_property
     def solution(self) -> Solution:  # type: ignore[override]  # made when asked for
-        """One period from the section on; of a motion without one a stretch of it."""
+        """One period; of a motion without one a stretch of it.
+
+        Under forcing it begins at t = 0, or where something happens there between two events, so that it contains each
+        event once.
+        """
         if self._closed is None:
             raise UsageError(f"there is no stretch of this motion: {self.message}")
         return self._motion.run(self._closed.start, self._closed.period)
+
+    @property
+    def _phase(self) -> float:
+        return 0.0 if self._closed is None else self._closed.start.at
 
     @cached_property
     def _orbit(self) -> Stretch:

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
+from hybridsim.analysis.steady.quiet import (
+    between_events,
+    event_times,
+    is_event_near,
+    middle_of_longest,
+    quiet_offset,
+)
 from hybridsim.analysis.steady.resolving import orbit_of
+from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import ranges
 
 if TYPE_CHECKING:
+    from hybridsim.analysis.steady.orbit import Orbit
     from hybridsim.solution import Solution
 
 _CLOSER = 1e-2  # times the tolerance: what is below that and no longer shrinks has arrived
@@ -124,10 +133,18 @@ def scale_of(solution: Solution, since: float) -> np.ndarray:
 _DIGITS = 1e-3
 
 
-def forced_passings(motion: Motion, start: Point | None, period: float, count: int) -> Passings:
-    """At so many consecutive periods of the forcing."""
-    solution = motion.run(start, count * period)
-    times = period * np.arange(1, count + 1)
+def forced_passings(motion: Motion, start: Point | None, period: float, count: int, phase: float) -> Passings:
+    """At so many consecutive periods of the forcing: at this time after the beginning of each.
+
+    Where something happens there the section goes to where nothing does, and the motion is followed as long again.
+    """
+    solution = motion.run(start, (phase if start is None else 0.0) + count * period)
+    offset = quiet_offset(solution, period)
+    if offset > 0.0:
+        place = point_at(solution, solution.t_end - period + offset)
+        moved = (phase + offset) % period
+        return forced_passings(motion, replace(place, at=moved), period, count, moved)
+    times = phase + period * np.arange(1, count + 1)
     times[-1] = solution.t_end
     values = solution(times, side="-").T
     system = solution._system
@@ -136,7 +153,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
         discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
         values = np.concatenate([values, discrete], axis=1)
     late = solution.t_end - max(1, count // 4) * period
-    return Passings(times, values, scale_of(solution, late), point_at_end(solution))
+    return Passings(times, values, scale_of(solution, late), replace(point_at_end(solution), at=phase))
 
 
 def free_passings(motion: Motion, start: Point | None, duration: float, largest: np.ndarray) -> Passings:
@@ -149,7 +166,8 @@ def free_passings(motion: Motion, start: Point | None, duration: float, largest:
     solution = motion.run(start, duration)
     n, scale = len(motion.names), scale_of(solution, 0.0)
     np.maximum(largest, scale[:n], out=largest)
-    late = motion.run(point_at(solution, 0.5 * duration), 0.5 * duration)
+    middle = between_events(event_times(solution), 0.5 * duration, 0.25 * duration, 0.75 * duration)
+    late = motion.run(point_at(solution, middle), duration - middle)
     orbit = orbit_of(late, states_only=True)
     low, high = orbit.extremes
     moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
@@ -166,10 +184,45 @@ def free_passings(motion: Motion, start: Point | None, duration: float, largest:
         largest[:] = 0.5 * (high - low)
     others = np.where(_goes_on(late, high - low), 0.0, moves)
     j = int(np.argmax(others if others.max() > RESTS else moves))
-    times = orbit.rises_through(motion.names[j], 0.5 * (low[j] + high[j]))
+    times = orbit.passes(motion.names[j], 0.5 * (low[j] + high[j]))
+    times, j = _without_events(late, orbit, times, j, others > RESTS)
     points = [point_at(late, t) for t in times]
     values = np.array([p.values for p in points]).reshape(len(points), len(scale))
     return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
+
+
+def _without_events(
+    late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Times (K,) at which a section is passed by the flow and nothing else happens, and the state that tells.
+
+    times, j: of a first section, which is kept where nothing happens there. Else it goes to the middle of the longest
+    stretch of a round without events: to the level of the state that moves fastest there, among those that
+    may_be_passed (n,).
+    """
+    events = event_times(late)
+    if len(times) < 2 or not len(events):
+        return times, j
+    period = float(times[-1] - times[-2])
+    if not any(is_event_near(late, events, t, period) for t in times[-_FEW:]):
+        return times, j
+    begin = float(times[-2])
+    inside = events[(events >= begin) & (events < begin + period)] - begin
+    middle = begin + (middle_of_longest(inside, period) if len(inside) else 0.5 * period)
+    index, s = late._places(np.array([middle]), "-")
+    segment = late._segments[int(index[0])]
+    x = late(middle)
+    rates = rates_of(late._system, float(s[0]), x, segment.p, segment.z)
+    low, high = (part[: len(x)] for part in orbit.extremes)
+    share = np.where(may_be_passed & (high > low), np.abs(rates) / np.where(high > low, high - low, 1.0), 0.0)
+    if not share.any():
+        return times, j
+    j = int(np.argmax(share))
+    found = orbit.passes(orbit.names[j], float(x[j]), upward=bool(rates[j] > 0.0))
+    return np.array([t for t in found if not is_event_near(late, events, t, period)]), j
+
+
+_FEW = 3  # last passings at which events are looked for
 
 
 def _goes_on(solution: Solution, moves: np.ndarray) -> np.ndarray:

@@ -198,7 +198,8 @@ class _Search:
             count = self.expected or min(max(self.settle, self.periods), _MOST_AT_ONCE)
             self.expected = 0
             self.periods += count
-            return forced_passings(self.motion, start, self.period, count)
+            phase = 0.0 if last is None else last.last.at
+            return forced_passings(self.motion, start, self.period, count, phase)
         for _ in range(_LONGER):
             passings = free_passings(self.motion, start, self.duration, self.largest)
             if passings.rests or len(passings.times) >= _FEWEST:

@@ -1,0 +1,60 @@
+"""Where on a motion nothing happens: a period that begins there contains each of its events once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.system import CORNER
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+_NEAR = 1e-6  # of a period: an event so close to its end may come to lie on it while the motion settles
+_WITHOUT_EFFECT = ("near-grazing", CORNER)
+_LOOKED_AT = 4  # last periods whose events are looked at
+
+
+def event_times(solution: Solution) -> np.ndarray:
+    """Times (K,), ascending, of all that happened in a run forward in time."""
+    return np.concatenate([np.empty(0), *(block.times for block in solution._trajectory.occurrences.blocks)])
+
+
+def is_event_near(solution: Solution, times: np.ndarray, t: float, period: float) -> bool:
+    """Whether something changes modes or states, or is recorded, next to time t; times (K,) as of `event_times`."""
+    first, end = np.searchsorted(times, [t - _NEAR * period, t + _NEAR * period])
+    occurrences = solution._trajectory.occurrences
+    return any(occurrences[k].kind not in _WITHOUT_EFFECT for k in range(int(first), int(end)))
+
+
+def quiet_offset(solution: Solution, period: float) -> float:
+    """How long after the section at the end of a run, modulo the period, nothing happens: 0 where that is there.
+
+    Elsewhere it is the middle of the longest stretch without events.
+    """
+    times, end = event_times(solution), solution.t_end
+    if not any(is_event_near(solution, times, t, period) for t in (end, end - period)):
+        return 0.0
+    late = times[times > end - (_LOOKED_AT + _NEAR) * period]
+    return middle_of_longest(np.sort((late - end) % period), period)
+
+
+def middle_of_longest(times: np.ndarray, period: float) -> float:
+    """The middle of the longest gap between times (K,) in [0, period), which repeat; K > 0."""
+    gaps = np.diff(np.append(times, times[0] + period))
+    k = int(np.argmax(gaps))
+    return float((times[k] + 0.5 * gaps[k]) % period)
+
+
+def between_events(times: np.ndarray, t: float, low: float, high: float) -> float:
+    """A time within (low, high) in the middle between the events before and after t; t where there are none."""
+    if not len(times):
+        return t
+    k = int(np.searchsorted(times, t))
+    before = times[k - 1] if k > 0 else low
+    after = times[k] if k < len(times) else high
+    if k < len(times) and times[k] == t:  # an event at t itself
+        later = times[times > t]
+        before, after = t, later[0] if len(later) else high
+    return float(np.clip(0.5 * (before + after), low, high))
