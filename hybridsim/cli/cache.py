@@ -20,19 +20,25 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "action",
         choices=("path", "clear", "warm"),
-        help="path: print the folder; clear: delete what is in it; warm: compile the engine now",
+        help="path: print the folder; clear: delete the compiled code in it; warm: compile the engine now",
     )
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Do what `action` says."""
-    from hybridsim.engine.cache import cache_root, clear
+    from hybridsim.engine.cache import cache_root, clear, kernel_folder
 
+    root = cache_root()
+    if root is None or (args.action == "warm" and kernel_folder() is None):
+        return 1  # the reason is told already
     if args.action == "path":
-        print(cache_root())
+        print(root)
     elif args.action == "clear":
-        complain(f"freed {clear() / 1e6:.1f} MB in {cache_root()}")
+        freed, others = clear()
+        complain(f"freed {freed / 1e6:.1f} MB in {root}")
+        for other in others:
+            complain(f"{other} is left alone: hybridsim did not mark it as its own")
     else:
         _warm()
     return 0

@@ -22,7 +22,8 @@ def bernstein_code(order: int) -> tuple[list[int], Any]:
     The functions are void f(., ., a, ., ., b), as of series: coefficients of powers, and where those of Bernstein go.
     """
     names = [f"bernstein_{size}" for size in range(order + 1, order + 1 - LEADING, -1)]
-    kept = model_folder() / f"bernstein{order}"
+    folder = model_folder()
+    kept = None if folder is None else folder / f"bernstein{order}"
     return compile_series(kept, names, lambda: bernstein_text(order))
 
 

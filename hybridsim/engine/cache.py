@@ -1,62 +1,82 @@
-"""Where compiled things live on disk: one folder for generated model modules, one for the engine's own kernels."""
+"""Where compiled things live on disk: one folder for generated model modules, one for the engine's own kernels.
+
+What is found there runs. The folder is therefore this user's own (see `hybridsim.engine.private_folder`); without such
+a folder nothing is kept, and each process compiles for itself.
+"""
 
 from __future__ import annotations
 
-import getpass
 import hashlib
 import os
 import shutil
 import sys
 import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from hybridsim.files import cannot_write
+from hybridsim.engine.private_folder import HAS_OWNERS, is_trusted_file, make_private, why_not
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FLOORS = ("engine", "integrators", "mechanics")  # the floors that define kernels
+_MODEL_FLOORS = ("expr", "model", "engine")  # the floors that write the modules of models
+_MARK = "hybridsim.cache"  # a file in each folder that hybridsim made
+_MARK_TEXT = b"Compiled code of hybridsim. `hybridsim cache clear` deletes this folder.\n"
+_DIGEST = hashlib.sha256().digest_size
 
 
-def cache_root() -> Path:
-    """Folder of everything hybridsim keeps between runs: ``$HYBRIDSIM_CACHE``, else the user's cache folder."""
+def chosen_root() -> Path | None:
+    """The folder that is meant to hold the cache: ``$HYBRIDSIM_CACHE``, else the user's cache folder.
+
+    None where the system does not say what the user's folder is.
+    """
     chosen = os.environ.get("HYBRIDSIM_CACHE")
     if chosen:
-        return _usable(Path(chosen))
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return _usable(base / "hybridsim")
+        return Path(os.path.abspath(chosen))
+    try:
+        if sys.platform == "win32":
+            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            base = Path.home() / "Library" / "Caches"
+        else:
+            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except (RuntimeError, KeyError):  # no HOME, and no entry in the password file
+        return None
+    return Path(os.path.abspath(base)) / "hybridsim"
+
+
+def cache_root() -> Path | None:
+    """Folder of everything hybridsim keeps between runs; None where there is none that is this user's own."""
+    root = chosen_root()
+    if root is None:
+        note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a folder of your own")
+        return None
+    return root if _is_usable(root) else None
 
 
 @cache
-def _usable(folder: Path) -> Path:
-    """The folder if it can be made and written to, else one among the temporary files."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    temporary = Path(tempfile.gettempdir()) / f"hybridsim-{getpass.getuser()}"
-    temporary.mkdir(parents=True, exist_ok=True, mode=0o700)
-    print(f"hybridsim: {folder} cannot be written to, the cache is {temporary}", file=sys.stderr)
-    return temporary
+def _is_usable(folder: Path) -> bool:
+    """Whether a folder is there, or could be made, and nobody else could have put code into it; if not, say why."""
+    reason = why_not(folder)
+    if reason is None:
+        try:
+            make_private(folder)
+            reason = why_not(folder)  # somebody may have been faster
+        except OSError as fault:
+            reason = f"{folder} cannot be made: {fault.strerror}"
+    if reason is not None:
+        note(f"no cache: {reason}", "set HYBRIDSIM_CACHE to a folder of your own with mode 700")
+    return reason is None
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write in one move, so that another process never reads half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(temporary, path)
-    except OSError as fault:
-        os.remove(temporary)
-        raise cannot_write(path, fault) from fault
+_noted: set[str] = set()  # in this process: one line of a kind is enough
+
+
+def note(text: str, remedy: str) -> None:
+    """Say once, on stderr, why compiled code is not kept."""
+    if text not in _noted:
+        _noted.add(text)
+        print(f"hybridsim: {text}; compiled code is not kept ({remedy})", file=sys.stderr, flush=True)
 
 
 @cache
@@ -68,35 +88,125 @@ def engine_key() -> str:
     """
     from importlib.metadata import version
 
-    digest = hashlib.sha256()
-    for floor in _KERNEL_FLOORS:
-        for path in sorted((_PACKAGE / floor).glob("**/*.py")):
-            digest.update(path.name.encode())
-            digest.update(path.read_bytes())
+    digest = _of_sources(_KERNEL_FLOORS)
     versions = f"{sys.version_info[:3]} {version('numba')} {version('numpy')}"
     digest.update(versions.encode())
     return digest.hexdigest()[:16]
 
 
-def kernel_folder() -> Path:
-    """Folder of the engine's compiled kernels, valid for these sources and versions only."""
-    return cache_root() / f"engine-{engine_key()}"
+@cache
+def _model_key() -> str:
+    """Hash of the sources that say what the module of a model contains."""
+    return _of_sources(_MODEL_FLOORS).hexdigest()[:16]
 
 
-def model_folder() -> Path:
-    """Folder of generated model modules and their compiled functions."""
-    return kernel_folder() / "models"
+def _of_sources(floors: tuple[str, ...]) -> hashlib._Hash:
+    """Hash of all sources of some floors, each with its path and its length: what is in one file is not in another."""
+    digest = hashlib.sha256()
+    for floor in floors:
+        for path in sorted((_PACKAGE / floor).glob("**/*.py")):
+            text = path.read_bytes()
+            digest.update(f"{path.relative_to(_PACKAGE).as_posix()} {len(text)} ".encode())
+            digest.update(text)
+    return digest
 
 
-def clear() -> int:
-    """Delete the whole cache; return the number of bytes freed."""
+def kernel_folder() -> Path | None:
+    """Folder of the engine's compiled kernels, valid for these sources and versions only; None where none is kept."""
     root = cache_root()
-    freed = size()
-    for entry in root.glob("engine-*"):
+    if root is None:
+        return None
+    folder = root / f"engine-{engine_key()}"
+    return folder if _is_marked(folder) else None
+
+
+@cache
+def _is_marked(folder: Path) -> bool:
+    """Whether a folder for these sources is usable; it is made, with our mark, if it can be."""
+    if not _is_usable(folder):
+        return False
+    if not (folder / _MARK).exists():
+        store(folder / _MARK, _MARK_TEXT)
+    return True
+
+
+def model_folder() -> Path | None:
+    """Folder of generated model modules and their compiled functions; None where none is kept."""
+    kernels = kernel_folder()
+    if kernels is None:
+        return None
+    folder = kernels / f"models-{_model_key()}"
+    return folder if _is_usable(folder) else None
+
+
+def store(path: Path | None, content: bytes) -> bool:
+    """Keep something in one move, so that another process never reads half a file; return whether it is kept.
+
+    A disk that is full, or a folder that may only be read, costs the time to compile again and no more.
+    """
+    if path is None:
+        return False
+    temporary = None
+    try:
+        make_private(path.parent)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(temporary, path)
+    except OSError as fault:
+        if temporary is not None:
+            with suppress(OSError):
+                os.remove(temporary)
+        note(
+            f"the cache {chosen_root()} cannot be written to: {fault.strerror or fault}",
+            "make room, or set HYBRIDSIM_CACHE to another folder",
+        )
+        return False
+    return True
+
+
+def store_whole(path: Path | None, content: bytes) -> bool:
+    """Keep something together with its digest, for `load_whole`."""
+    return store(path, hashlib.sha256(content).digest() + content)
+
+
+def load_whole(path: Path | None) -> bytes | None:
+    """What `store_whole` kept; None where it is not there, not whole, or not this user's own."""
+    if path is None or not is_trusted_file(path):
+        return None
+    try:
+        stored = path.read_bytes()
+    except OSError:
+        return None
+    digest, content = stored[:_DIGEST], stored[_DIGEST:]
+    return content if hashlib.sha256(content).digest() == digest else None
+
+
+def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
+    """Folders of compiled code in a folder that carry our mark, and those that only have such a name."""
+    ours, others = [], []
+    for entry in sorted(root.glob("engine-*")):
+        is_folder = entry.is_dir() and not entry.is_symlink()
+        is_own = is_folder and (not HAS_OWNERS or os.lstat(entry).st_uid == os.geteuid())
+        mark = entry / _MARK
+        if is_own and is_trusted_file(mark) and mark.read_bytes() == _MARK_TEXT:
+            ours.append(entry)
+        else:
+            others.append(entry)
+    return ours, others
+
+
+def clear() -> tuple[int, list[Path]]:
+    """Delete the folders that carry our mark; return the bytes freed, and what has such a name and is left alone."""
+    root = cache_root()
+    if root is None:
+        return 0, []
+    ours, others = _made_by_us(root)
+    freed = sum(_size(entry) for entry in ours)
+    for entry in ours:
         shutil.rmtree(entry, ignore_errors=True)
-    return freed
+    return freed - sum(_size(entry) for entry in ours), others
 
 
-def size() -> int:
-    """Bytes the cache holds now."""
-    return sum(path.stat().st_size for path in cache_root().glob("engine-*/**/*") if path.is_file())
+def _size(folder: Path) -> int:
+    return sum(path.lstat().st_size for path in folder.glob("**/*") if path.is_file())

@@ -76,7 +76,7 @@ class CodeShelf(ABC):
                 with self._lock:
                     self._make(tapes.modes[k], place, codes, k)
 
-    def _make(self, z: np.ndarray, place: Path, codes: Any, k: int) -> None:
+    def _make(self, z: np.ndarray, place: Path | None, codes: Any, k: int) -> None:
         if codes.lacked[k] < KNOWN:  # another thread was first
             return
         tape = mode_tape(self.system, z)

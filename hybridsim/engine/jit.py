@@ -17,10 +17,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hybridsim.engine.cache import cache_root, kernel_folder
+from hybridsim.engine.cache import cache_root, kernel_folder, store
 
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
+if ENABLED:
+    import numba
 
+    ENABLED = not numba.config.DISABLE_JIT  # of everything, by NUMBA_DISABLE_JIT=1
 
 _NOTICED = 1.0  # seconds of compiling that a person wonders about
 _reached: list[Any] = []  # by address, and kept alive
@@ -32,14 +35,15 @@ def _fill_nan(out: Any) -> None:
 
 
 if ENABLED:
-    import numba
     from llvmlite import binding, ir
     from numba import types
     from numba.core import cgutils, compiler_lock, event
+    from numba.core.ccallback import CFunc
     from numba.core.registry import cpu_target
     from numba.extending import intrinsic
     from numba.np.arrayobj import populate_array
 
+    from hybridsim.engine.kernel_cache import keep_on_disk
     from hybridsim.engine.machine_code import compile_text, machine_name, ready
 
     _DOUBLES = types.CPointer(types.float64)
@@ -129,27 +133,15 @@ if ENABLED:
         """Seconds that this thread has spent so far on getting kernels ready."""
         return _compiling.of.spent
 
-    def _with_cache_folder(folder: str, define: Callable[[], Any]) -> Any:
-        """Run `define` while numba's cache folder is ours, and give the setting back to the user's own code."""
-        previous = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = folder
-        try:
-            return define()
-        finally:
-            numba.config.CACHE_DIR = previous
-
     def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         """A kernel with numba's options; literal arguments make versions of it, which run up to twice as fast.
 
         Without the option `_nrt` each read of an array from a pack would be two calls that count references, across
         which nothing stays in a register.
         """
-        return _with_cache_folder(
-            str(kernel_folder()),
-            lambda: numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(
-                function
-            ),
-        )
+        made = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+        keep_on_disk(made, function)
+        return made
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile a function of the engine once, cached on disk; division by zero gives inf or nan, as in numpy."""
@@ -177,17 +169,19 @@ if ENABLED:
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Compile one function of a generated module; return its address and the object that keeps it alive."""
-        path = Path(module.__file__)
-        kept = path.with_name(f"{path.stem}.{name}.{machine_name()}.o")
-        return compile_text(path.read_text(encoding="utf-8"), name, kept)
+        path = getattr(module, "__file__", None)  # of a module that is in memory alone there is none
+        kept = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
+        return compile_text(module.__loader__.get_source(module.__name__), name, kept)
 
-    def compile_series(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+    def compile_series(
+        kept: Path | None, names: Sequence[str], written: Callable[[], str]
+    ) -> tuple[list[int], Any]:
         """Addresses of functions of series, for `call_series`, and the object that keeps them alive."""
-        return ready(_of_this_machine(kept), names, written)
+        return ready(None if kept is None else _of_this_machine(kept), names, written)
 
-    def is_kept(kept: Path) -> bool:
+    def is_kept(kept: Path | None) -> bool:
         """Whether functions of series are on disk."""
-        return _of_this_machine(kept).exists()
+        return kept is not None and _of_this_machine(kept).exists()
 
     def _of_this_machine(kept: Path) -> Path:
         return kept.with_name(f"{kept.name}.{machine_name()}.o")
@@ -235,16 +229,15 @@ if ENABLED:
             others = _settings()
             _set(_ours())
             try:
-                made = _with_cache_folder(
-                    str(kernel_folder()),
-                    lambda: numba.cfunc(types.int64(*key), cache=True, error_model="numpy", _nrt=False)(
-                        function
-                    ),
-                )
+                options = {"error_model": "numpy", "_nrt": False}
+                made = CFunc(function, (key, types.int64), locals={}, options=options)
+                keep_on_disk(made, function)
+                made.compile()
             finally:
                 _set(others)
         _reached.append(made)
-        return int(made.address)
+        address: Any = made.address
+        return int(address)
 
     @intrinsic
     def call_kernel(typingctx: Any, address: Any, arguments: Any) -> Any:
@@ -335,11 +328,13 @@ else:
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         return function
 
-    def compile_series(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+    def compile_series(
+        kept: Path | None, names: Sequence[str], written: Callable[[], str]
+    ) -> tuple[list[int], Any]:
         """Nothing is compiled: series are those of the interpreter."""
         raise NotImplementedError
 
-    def is_kept(kept: Path) -> bool:
+    def is_kept(kept: Path | None) -> bool:
         """Nothing is kept."""
         return False
 
@@ -428,16 +423,15 @@ class Door:
 @cache
 def announce_compilation() -> None:
     """Say once, on stderr, that the engine is being compiled, if no run of it has been announced here yet."""
-    # the folder alone proves nothing: numba makes it as soon as a kernel is defined
-    announced = kernel_folder() / "announced"
-    if ENABLED and not announced.exists():
-        announced.parent.mkdir(parents=True, exist_ok=True)
-        announced.touch()
+    # the folder alone proves nothing: it is made as soon as a kernel is defined
+    folder = kernel_folder() if ENABLED else None
+    if ENABLED and (folder is None or not (folder / "announced").exists()):
+        store(folder and folder / "announced", b"")
         _tell(f"hybridsim: compiling the engine, once (half a minute for an integrator); {_kept()} ...")
 
 
 def _kept() -> str:
-    return f"kept for later runs in {cache_root()}"
+    return "not kept for later runs" if kernel_folder() is None else f"kept for later runs in {cache_root()}"
 
 
 _told: set[str] = set()  # in this process: one line is enough

@@ -18,10 +18,8 @@ from typing import Any
 
 from llvmlite import binding, ir
 
-from hybridsim.engine.cache import write_whole
+from hybridsim.engine.cache import load_whole, store_whole
 from hybridsim.expr.python_tree import python_tree
-
-_DIGEST = hashlib.sha256().digest_size
 
 _DOUBLE, _LONG, _STATUS, _BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)
 _SIGNATURE = ir.FunctionType(
@@ -250,24 +248,25 @@ def _machine() -> Any:
     )
 
 
-def compile_text(text: str, name: str, kept: Path) -> tuple[int, Any]:
+def compile_text(text: str, name: str, kept: Path | None) -> tuple[int, Any]:
     """Address of a function of a generated module, whose text is given, and what keeps it alive.
 
-    kept: where its machine code is on disk; written there the first time.
+    kept: where its machine code is on disk, if anywhere; written there the first time.
     """
     addresses, engine = ready(kept, (name,), lambda: _translated(text, name))
     return addresses[0], engine
 
 
-def ready(kept: Path, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
     """Addresses of functions of a module of LLVM, and what keeps them alive.
 
-    kept: where its machine code is on disk. Without it, it is compiled from the text that `written` gives, and kept.
+    kept: where its machine code is on disk, if anywhere. If it is not there, it is compiled from the text that
+    `written` gives, and kept.
     """
-    code = _known(kept)
+    code = load_whole(kept)
     if code is None:
         code = _compiled(written())
-        write_whole(kept, hashlib.sha256(code).digest() + code)
+        store_whole(kept, code)
     _prepare()
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
@@ -294,16 +293,6 @@ def _compiled(text: str) -> bytes:
     builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     builder.getModulePassManager().run(parsed, builder)
     return bytes(machine.emit_object(parsed))
-
-
-def _known(kept: Path) -> bytes | None:
-    """Machine code from disk; None where there is none, or not all of it."""
-    try:
-        stored = kept.read_bytes()
-    except OSError:
-        return None
-    digest, code = stored[:_DIGEST], stored[_DIGEST:]
-    return code if hashlib.sha256(code).digest() == digest else None
 
 
 @cache

@@ -113,9 +113,12 @@ def given(system: System) -> Given:
     )
 
 
-def kept(system: System, kind: str, z: np.ndarray) -> Path:
-    """Where code of a kind is kept; the name of the machine comes behind it."""
-    path = Path(str(system.code.module.__file__))
+def kept(system: System, kind: str, z: np.ndarray) -> Path | None:
+    """Where code of a kind is kept, if it is; the name of the machine comes behind it."""
+    file = getattr(system.code.module, "__file__", None)
+    if file is None:
+        return None
+    path = Path(file)
     return path.with_name(f"{path.stem}.{kind}.{hashlib.sha256(z.tobytes()).hexdigest()[:12]}")
 
 

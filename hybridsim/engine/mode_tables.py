@@ -183,7 +183,7 @@ class TapeShelf:
                 with self._lock:
                     self._make(tapes.modes[k], place, k)
 
-    def _make(self, z: np.ndarray, place: Path, k: int) -> None:
+    def _make(self, z: np.ndarray, place: Path | None, k: int) -> None:
         system, tapes = self.system, self.tapes
         if tapes.lacked[k] < KNOWN:  # another thread was first
             return

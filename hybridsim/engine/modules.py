@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib.abc import InspectLoader
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.engine.cache import model_folder, write_whole
+from hybridsim.engine.cache import model_folder, store
+from hybridsim.engine.private_folder import is_trusted_file
 
 if TYPE_CHECKING:
     from hybridsim.engine.python_code import PythonCode
@@ -88,42 +91,61 @@ def _code_of_functions(model: Model) -> PythonCode:
 
 def is_cached(model: Model) -> bool:
     """Whether the generated module of a model is on disk."""
-    return _path(_name(model)).exists()
+    path = _path(_name(model))
+    return path is not None and path.exists()
 
 
 def _name(model: Model) -> str:
     return f"hybridsim_model_{hashlib.sha256(model.structure().encode()).hexdigest()[:24]}"
 
 
-def _path(name: str) -> Path:
-    return model_folder() / f"{name}.py"
+def _path(name: str) -> Path | None:
+    folder = model_folder()
+    return None if folder is None else folder / f"{name}.py"
 
 
 def _load(model: Model, name: str) -> Compiled:
     path = _path(name)
-    seconds = 0.0
-    if not path.exists():
-        from hybridsim.engine.emit import emit
+    if path is not None and path.exists():
+        # a damaged file may raise anything; written anew, it tells whose fault it is
+        with suppress(Exception):
+            return Compiled(_import(_FromDisk(name, str(path))), 0.0)
+    from hybridsim.engine.emit import emit
 
-        start = time.perf_counter()
-        write_whole(path, emit(model).encode())
-        seconds = time.perf_counter() - start
-    try:
-        return Compiled(_import(name, path), seconds)
-    except Exception:  # a damaged file may raise anything; written anew, it tells whose fault it is
-        from hybridsim.engine.emit import emit
-
-        write_whole(path, emit(model).encode())
-        return Compiled(_import(name, path), seconds)
+    start = time.perf_counter()
+    text = emit(model)
+    is_kept = store(path, text.encode())
+    seconds = time.perf_counter() - start
+    loader = _FromDisk(name, str(path)) if is_kept else _FromMemory(name, text)
+    return Compiled(_import(loader), seconds)
 
 
-def _import(name: str, path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:  # pragma: no cover - a .py path always has a loader
-        raise ImportError(f"cannot import {path}")
+class _FromDisk(SourceFileLoader):
+    """Reads a module, or what Python compiled of it, from files that nobody else can have written."""
+
+    def get_data(self, path: str) -> bytes:
+        """The bytes of a file."""
+        if not is_trusted_file(path):
+            raise PermissionError(f"{path} may be of another user")
+        return super().get_data(path)
+
+
+class _FromMemory(InspectLoader):
+    """The module of a model where nothing is kept on disk."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self._text = name, text
+
+    def get_source(self, fullname: str) -> str:
+        """Its text."""
+        return self._text
+
+
+def _import(loader: _FromDisk | _FromMemory) -> ModuleType:
+    spec = importlib.util.spec_from_loader(loader.name, loader)
+    assert spec is not None, "it has a loader"
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # numba looks a cached function's module up by name
-    spec.loader.exec_module(module)
+    loader.exec_module(module)
     if not hasattr(module, "DATA"):
-        raise ImportError(f"{path} is not whole")
+        raise ImportError(f"{loader.name} is not whole")
     return module

@@ -226,17 +226,33 @@ def test_integrators(hybridsim: Callable) -> None:
 
 
 def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HYBRIDSIM_CACHE", str(tmp_path / "cache"))
-    assert hybridsim("cache", "path").out == f"{tmp_path / 'cache'}\n"
-    kept = tmp_path / "cache" / "mine.txt"
-    made = tmp_path / "cache" / "engine-0123" / "m.bin"
-    made.parent.mkdir(parents=True)
-    made.write_bytes(b"x" * 1000)
-    kept.write_text("not of hybridsim")
+    from hybridsim.engine.cache import kernel_folder, store
+
+    root = tmp_path / "cache"
+    monkeypatch.setenv("HYBRIDSIM_CACHE", str(root))
+    assert hybridsim("cache", "path").out == f"{root}\n"
+    made = kernel_folder()
+    assert made is not None and made.parent == root
+    store(made / "m.bin", b"x" * 1000)
+    (root / "mine.txt").write_text("not of hybridsim")
+    others = root / "engine-0123"
+    others.mkdir()
+    (others / "drawing.txt").write_text("of a steam engine")
+    (root / "elsewhere").mkdir()
+    (root / "elsewhere" / "kept.txt").write_text("what a link leads to")
+    (root / "engine-link").symlink_to("elsewhere")
     code, _, err = hybridsim("cache", "clear")
-    assert code == 0
-    assert "freed" in err
-    assert not made.exists() and kept.exists()
+    assert code == 0 and "freed 0.0 MB" in err
+    assert f"{others} is left alone" in err and str(made) not in err
+    assert not made.exists()
+    left = {str(path.relative_to(root)) for path in root.rglob("*")}
+    assert left == {
+        "mine.txt",
+        "engine-0123",
+        "engine-0123/drawing.txt",
+        "elsewhere",
+        "elsewhere/kept.txt",
+    } | {"engine-link"}
 
 
 def test_default_spans_are_those_of_the_library() -> None:

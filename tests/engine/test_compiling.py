@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from hybridsim.engine import jit
+from hybridsim.engine import jit, kernel_cache
 
 pytestmark = pytest.mark.skipif(not jit.ENABLED, reason="nothing is compiled")
 
@@ -50,7 +50,7 @@ def faulty(given: Any) -> int:
 def test_a_kernel_has_settings_of_its_own(
     met: list[tuple[Any, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(jit, "kernel_folder", lambda: tmp_path)  # where nothing is kept yet
+    monkeypatch.setattr(kernel_cache, "kernel_folder", lambda: tmp_path)  # where nothing is kept yet
     before = settings()
     assert jit._ours() != before
     assert jit.kernel_address(one, np.zeros(1)) and set(met) == {jit._ours()}

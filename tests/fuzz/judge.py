@@ -22,7 +22,7 @@ from fuzz import mutated_files, mutated_lines
 from fuzz.watch import watching
 from hybridsim.cli import main
 from hybridsim.cli.output import TRIAL
-from hybridsim.engine.cache import cache_root
+from hybridsim.engine.cache import chosen_root
 from hybridsim.model.hygiene import warnings_of
 
 ROOT = Path(__file__).parents[2]
@@ -137,7 +137,9 @@ def line_case(seed: int, number: int, folder: Path) -> Finding:
 def observed(folder: Path, expected: object) -> Iterator[Finding]:
     """A finding that takes up exceptions, warnings, code that ran, and files that nobody asked for."""
     finding = Finding("exception")
-    with watching(cache_root(), Path.home() / ".cache", Path.home() / ".config" / "matplotlib") as seen:
+    with watching(
+        chosen_root() or Path.home(), Path.home() / ".cache", Path.home() / ".config" / "matplotlib"
+    ) as seen:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:

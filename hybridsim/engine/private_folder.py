@@ -1,0 +1,118 @@
+"""Folders that nobody else can write to: code that is found in them may be run.
+
+Whoever can put a file where compiled code is looked for runs code as this user. A folder is used only if this user or
+the superuser owns it and every folder above it, and nobody else may write to them.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections import deque
+from contextlib import suppress
+from pathlib import Path
+
+HAS_OWNERS = hasattr(os, "geteuid")  # on Windows a user's own folder is private by its access list
+_LINKS = 40  # in one path, as Linux has it
+
+
+def why_not(path: Path) -> str | None:
+    """Return the reason why others could have put code at a path; None if they could not.
+
+    Missing parts of the path are no reason: this user makes them.
+    """
+    if not HAS_OWNERS:
+        return None
+    here, left, links = "/", deque(Path(os.path.abspath(path)).parts[1:]), 0
+    while True:
+        try:
+            found = os.lstat(here)
+        except FileNotFoundError:
+            return None
+        except OSError as fault:
+            return f"{here} cannot be looked at: {fault.strerror}"
+        if not _has_trusted_owner(found):
+            return f"{here} belongs to another user ({_name(found.st_uid)})"
+        if stat.S_ISLNK(found.st_mode):
+            links += 1
+            if links > _LINKS:
+                return f"{path} is a circle of links"
+            target = os.readlink(here)
+            left.extendleft(reversed([part for part in target.split("/") if part not in ("", ".")]))
+            here = "/" if target.startswith("/") else os.path.dirname(here)
+            continue
+        if not stat.S_ISDIR(found.st_mode):
+            return f"{here} is not a folder"
+        is_sticky = bool(found.st_mode & stat.S_ISVTX)  # others may add to it, and change nothing of ours
+        if _others_may_write(found) and not (is_sticky and left):
+            return f"others may write to {here} (mode {stat.S_IMODE(found.st_mode):o})"
+        if not left:
+            return None
+        part = left.popleft()
+        here = os.path.dirname(here) if part == ".." else os.path.join(here, part)
+
+
+def is_trusted_file(path: str | Path) -> bool:
+    """Whether a path is a regular file that only this user or the superuser can have written."""
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return False
+    if not stat.S_ISREG(found.st_mode):
+        return False
+    return not HAS_OWNERS or (_has_trusted_owner(found) and not _others_may_write(found))
+
+
+def make_private(path: Path) -> None:
+    """Make a folder, and those above it that are missing, with mode 700."""
+    for folder in (*reversed(path.parents), path):
+        with suppress(FileExistsError):
+            if not folder.is_dir():
+                os.mkdir(folder, 0o700)
+
+
+def _has_trusted_owner(found: os.stat_result) -> bool:
+    if found.st_uid in (0, os.geteuid()):
+        return True
+    # in a container the superuser of the machine outside is no user: all that is not mapped has this one number
+    return found.st_uid == _unmapped() and not found.st_mode & 0o022
+
+
+def _unmapped() -> int | None:
+    """Return the number of users that this name space does not know; None where it knows all of them."""
+    try:
+        with open("/proc/self/uid_map") as mapped, open("/proc/sys/kernel/overflowuid") as number:
+            knows_all = mapped.read().split() == ["0", "0", "4294967295"]
+            return None if knows_all else int(number.read())
+    except (OSError, ValueError):
+        return None
+
+
+def _others_may_write(found: os.stat_result) -> bool:
+    if found.st_mode & stat.S_IWOTH:
+        return True
+    return bool(found.st_mode & stat.S_IWGRP) and not _is_group_of_one(found.st_gid)
+
+
+def _is_group_of_one(group: int) -> bool:
+    """Whether a group is the one that many systems make for each user: it has the user's name and no other member."""
+    if group != os.getegid():
+        return False
+    import grp
+    import pwd
+
+    try:
+        entry = grp.getgrgid(group)
+        name = pwd.getpwuid(os.geteuid()).pw_name
+    except KeyError:
+        return False
+    return entry.gr_name == name and set(entry.gr_mem) <= {name}
+
+
+def _name(user: int) -> str:
+    import pwd
+
+    try:
+        return f"{pwd.getpwuid(user).pw_name}, {user}"
+    except KeyError:
+        return str(user)
