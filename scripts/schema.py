@@ -54,7 +54,7 @@ CHOICE = table(
     {
         "to": said("the mode that follows", TEXT),
         "when": said("the condition under which this choice is taken", EXPRESSION),
-        "reset": said("states and discrete states that jump, and to what", EXPRESSIONS),
+        "reset": said('states and discrete states that jump, and to what; "+= amount" adds', EXPRESSIONS),
     },
     ("to",),
 )

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from hybridsim.expr import assignment
 from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE
 from hybridsim.model.switching import ATTRACTION
 
@@ -58,6 +59,10 @@ def _primitive(primitive: Primitive) -> str:
 def _flat(expression: Expression) -> str:
     """Text of an expression in one line; a file may have it in several."""
     return " ".join(expression.text.split())
+
+
+def _flat_reset(name: str, value: Expression, sign: str) -> str:
+    return " ".join(assignment(name, value, sign).split())
 
 
 def _section(title: str, lines: Iterable[str]) -> Iterator[str]:
@@ -117,7 +122,7 @@ def _component(component: Component, report: Report) -> Iterator[str]:
             )
         )
     if limit := component.limit:
-        reset = ", ".join(f"{name} = {_flat(value)}" for name, value in limit.reset.items())
+        reset = ", ".join(_flat_reset(name, value, "=") for name, value in limit.reset.items())
         yield f"where its transitions accumulate: to {limit.to}" + (f", with {reset}" if reset else "")
     for mode in component.modes:
         linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
@@ -148,7 +153,7 @@ def _then(guard: Guard, sides: list[str]) -> Iterator[str]:
 
 
 def _resets(reset: Mapping[str, Expression]) -> str:
-    changes = ", ".join(f"{name} := {_flat(value)}" for name, value in reset.items())
+    changes = ", ".join(_flat_reset(name, value, ":=") for name, value in reset.items())
     return f" with {changes}" if changes else ""
 
 

@@ -12,9 +12,11 @@ from hybridsim.engine.layout import SIGNAL_SLOTS
 from hybridsim.engine.lower import Lowering, Program
 from hybridsim.engine.program import Assign, Item, Switch, needed
 from hybridsim.engine.program_names import user
+from hybridsim.engine.reset_keys import added, amounts_of, is_added
 from hybridsim.engine.stepped_rows import stepped
 from hybridsim.engine.tape import TapeBuilder
 from hybridsim.engine.ties import told
+from hybridsim.expr import parse
 from hybridsim.expr.symbolic import derivative
 from hybridsim.model.jumps import SIGN
 from hybridsim.model.rewriting import VARIABLE
@@ -268,8 +270,11 @@ class Emitter:
                 lines.append("        return 0")
         return "\n".join([*lines, "    return 0"])
 
-    def resets(self) -> list[tuple[str, Any]]:
-        """(what, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order."""
+    def resets(self) -> list[tuple[tuple[Any, ...], Any]]:
+        """(what, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order.
+
+        Behind them, by `added`, stand the amounts of those that add.
+        """
         model = self.program.model
         found: list[tuple[Any, Any]] = []
         for c, component in enumerate(self.program.components):
@@ -280,7 +285,8 @@ class Emitter:
         found += [(("limit", c), limit.reset) for c, limit in limits if limit]
         found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
         found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
-        return [(key, reset) for key, reset in found if reset]
+        found = [(key, reset) for key, reset in found if reset]
+        return found + [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
 
     def _reset(self) -> str:
         """Write what a reset sets into out, states first, then discrete states; its number stands behind the modes."""
@@ -288,8 +294,11 @@ class Emitter:
         names = [*(s.name for s in model.states), *(d.name for d in model.discrete)]
         place = {name: f"out[{i}]" for i, name in enumerate(names)}
         lines = ["def reset(t, x, p, z, out):"]
-        for number, (_, mapping) in enumerate(self.resets()):
+        for number, (key, mapping) in enumerate(self.resets()):
             converted = {n: self.lowering.convert(e) for n, e in mapping.items()}
+            if not is_added(key):
+                for n in amounts_of(mapping):
+                    converted[n] += self.lowering.convert(parse(n))
             lines.append(f"    if z[{count}] == {number}:")
             lines += ["    " + line for line in self._prelude(converted.values())]
             lines += [f"        {place[n]} = {self._text(e)}" for n, e in converted.items()]

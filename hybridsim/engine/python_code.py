@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.engine import jit
 from hybridsim.engine.python_forms import Forms, Parts, Scalar, number, parts_of, rates, value
 from hybridsim.engine.python_surroundings import surroundings
+from hybridsim.engine.reset_keys import added, amounts_of
 from hybridsim.errors import ModelError
 from hybridsim.expr import function_name
 
@@ -217,7 +218,10 @@ def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:
 
 
 def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
-    """(what, state -> function or number) of every reset: of choices, limits, monitors and schedules."""
+    """(what, state -> function or number) of every reset: of choices, limits, monitors and schedules.
+
+    Behind them, by `added`, stand the amounts of those that add.
+    """
     found: list[tuple[tuple[Any, ...], Any]] = [
         (("choice", c, m, g, k), choice.reset)
         for c, component in enumerate(model.all_components())
@@ -229,7 +233,9 @@ def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
     found += [(("limit", c), limit.reset) for c, limit in limits if limit]
     found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
     found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
-    return [(key, {name: value(e) for name, e in reset.items()}) for key, reset in found if reset]
+    found = [(key, reset) for key, reset in found if reset]
+    found += [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
+    return [(key, {name: value(e) for name, e in reset.items()}) for key, reset in found]
 
 
 def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from hybridsim.engine.decide import (
     judge,
     side_after,
 )
-from hybridsim.engine.diagnosis import rates_without_value, reset_in_words
+from hybridsim.engine.diagnosis import rates_without_value
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
 from hybridsim.engine.impact import strike
@@ -36,6 +36,7 @@ from hybridsim.engine.meeting import (
 )
 from hybridsim.engine.outcome import Change, Outcome, Situation
 from hybridsim.engine.releases import Releases
+from hybridsim.engine.resets import merged_resets
 from hybridsim.engine.rest_at_stops import together, with_tied
 from hybridsim.engine.system import Series, System
 
@@ -223,7 +224,6 @@ class Settling:
         at, system = self.at, self.system
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
-        writer: dict[str, tuple[str, float]] = {}
         taken: list[tuple[int, str, int, int]] = []
         for c in sorted(components, key=lambda c: (self._place(c), c)):
             automaton, mode = system.automata[c], int(at.z[c])
@@ -251,12 +251,9 @@ class Settling:
                 self.fired[list(guards)] = False
         if resets or any(not self.system.is_corner[c] for c, *_ in taken):
             self.fired[self.system.is_corner[self.system.owner]] = False
-        for key in resets:
-            x_one, p_one = at.x.copy(), at.p.copy()
-            system.apply_reset(key, at.s, at.x, at.p, at.z, x_one, p_one)
-            clash = self._merge(key, x_one, p_one, x_plus, p_plus, x_error, writer)
-            if clash:
-                return "inconsistent", clash
+        clash = merged_resets(system, at, resets, x_plus, p_plus, x_error)
+        if clash:
+            return "inconsistent", clash
         self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
         self.jumped = self.jumped or any(not system.is_corner[c] for c, *_ in taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
@@ -285,38 +282,6 @@ class Settling:
         """When the first of a component's guards came to zero, as a place in the order of all."""
         numbers = self.system.automata[component].guards[self.at.z[component]]
         return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
-
-    def _merge(
-        self,
-        key: tuple[object, ...],
-        x_one: np.ndarray,
-        p_one: np.ndarray,
-        x_plus: np.ndarray,
-        p_plus: np.ndarray,
-        x_error: np.ndarray,
-        writer: dict[str, tuple[str, float]],
-    ) -> str | None:
-        """Merge the values that one reset set into x+; two resets that disagree are a message."""
-        system = self.system
-        if key not in system.resets:
-            return None
-        label = " ".join(str(k) for k in key)
-        discrete = tuple(d.name for d in system.model.discrete)
-        for name in system.resets[key][1]:
-            if name in discrete:
-                place = system.layout.discrete_at + discrete.index(name)
-                value = p_plus[place] = p_one[place]
-            else:
-                place = system.names.index(name)
-                value = x_plus[place] = x_one[place]
-                x_error[place] = UNIT * abs(value)
-            if not np.isfinite(value):
-                state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, self.at.x, strict=True))
-                return f"{reset_in_words(self.system, key)} sets {name} to no finite number, at {state}"
-            previous = writer.setdefault(name, (label, float(value)))
-            if previous[1] != value and not (np.isnan(value) and np.isnan(previous[1])):
-                return f"two resets at one instant set {name} to {previous[1]!r} and to {float(value)!r}"
-        return None
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 

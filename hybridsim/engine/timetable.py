@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 class Appointment:
     """An instant to be stepped to, and the schedules that are due then (none: a knot of an input).
 
+    A schedule in whose list this time stands several times is there as often.
     At a renewal nothing happens but that local time begins anew.
     """
 
@@ -52,6 +53,7 @@ class Timetable:
             k
             for k in range(len(self._schedules))
             if (first := self._first(k)) is not None and abs(first.minus(start)) <= self._slack(start)
+            for _ in range(self._count(k, start))
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
@@ -81,7 +83,16 @@ class Timetable:
             latest = self._end
         elif (self._end.minus(nearest) < 0.0) == forward:
             return None
-        return Appointment(latest, tuple(sorted(k for k in together if k >= 0)))
+        due = sorted(k for k in together if k >= 0)
+        return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
+
+    def _count(self, k: int, instant: Instant) -> int:
+        """How often an instant, within rounding, stands in the list of a schedule that is due then; 1 for a clock."""
+        times, slack = self._schedules[k][0], self._slack(instant)
+        if not times:
+            return 1
+        first, last = bisect_left(times, instant.plus(-slack)), bisect_right(times, instant.plus(slack))
+        return sum(abs(time.minus(instant)) <= slack for time in times[first:last])
 
     def _slack(self, near: Instant) -> float:
         """What rounding of periods and offsets amounts to at an instant."""

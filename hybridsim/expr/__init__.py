@@ -2,17 +2,22 @@
 
 from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function
+from hybridsim.expr.increment import Increment, assignment, parse_reset, substitute_in_reset
 from hybridsim.expr.parse import Expression, of_tree, parse, require_names, substitute
 
 __all__ = [
     "Expression",
     "FunctionExpression",
+    "Increment",
+    "assignment",
     "evaluate",
     "function_name",
     "of_function",
     "of_tree",
     "parse",
+    "parse_reset",
     "require_names",
     "resolve",
     "substitute",
+    "substitute_in_reset",
 ]

@@ -22,7 +22,8 @@ class Choice(Declared):
     when : str or float, optional
         Condition, an expression; None always holds.
     reset : mapping of str to str or float, optional
-        State or discrete state to the expression that gives its new value.
+        State or discrete state to the expression that gives its new value, or to ``"+= amount"``, which adds:
+        amounts of one instant are summed in any order.
     place : Place, optional
         Where it is written, for the messages of errors.
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from hybridsim.calls import refuse_unless_taken
 from hybridsim.errors import ExpressionError, ModelError, Place, UsageError
-from hybridsim.expr import Expression, of_function, parse
+from hybridsim.expr import Expression, of_function, parse, parse_reset
 from hybridsim.model.frozen_map import FrozenMap
 
 
@@ -63,23 +63,26 @@ class Declared(metaclass=_Refusing):
             elif not self._has_default(name):
                 raise self._fault(f"{name} is None", "give a number or an expression")
 
-    def _parsed(self, value: Any, field: str, functions: bool) -> Expression:
+    def _parsed(self, value: Any, field: str, functions: bool, is_reset: bool = False) -> Expression:
         if functions and callable(value):
             return of_function(value, self.place)
         try:
-            return parse(value, self.place)
+            return parse_reset(value, self.place) if is_reset else parse(value, self.place)
         except ExpressionError as fault:
             message = f"{self._title}: {field}: {fault.message}"
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
     def _maps(self, *fields: str, functions: bool = False) -> None:
-        """Freeze mappings of expressions (or, if so, Python functions); a value of None stays None."""
+        """Freeze mappings of expressions (or, if so, Python functions); a value of None stays None.
+
+        In those named reset a text may begin with '+=': an amount to add.
+        """
         for name in fields:
             items = getattr(self, name)
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
                 raise self._fault(f"{name} is {items!r}", "give a mapping from names to expressions")
             parsed = {
-                key: None if v is None else self._parsed(v, f"{name}[{key!r}]", functions)
+                key: None if v is None else self._parsed(v, f"{name}[{key!r}]", functions, name == "reset")
                 for key, v in items.items()
             }
             object.__setattr__(self, name, FrozenMap(parsed))

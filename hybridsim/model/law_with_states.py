@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hybridsim.expr import Expression, parse, substitute
+from hybridsim.expr import Expression, parse, substitute, substitute_in_reset
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.model.component import Choice, Component, Guard, Mode
 from hybridsim.model.law import FORCE, INDEX, LOAD_RATE, SPEED
@@ -84,7 +84,7 @@ def _automaton(
 
 
 def _choice(contact: Contact, choice: Choice, names: Mapping[str, Expression], index: int | None) -> Choice:
-    reset = {_own(contact, state, index): substitute(e, names) for state, e in choice.reset.items()}
+    reset = {_own(contact, state, index): substitute_in_reset(e, names) for state, e in choice.reset.items()}
     when = None if choice.when is None else substitute(choice.when, names)
     return replace(choice, when=when, reset=reset)
 

@@ -28,7 +28,8 @@ class Monitor(Declared):
     action : str, optional
         "record", "terminate", or "reset" with ``reset`` evaluated at x-.
     reset : mapping of str to str or float, optional
-        State or discrete state to the expression that gives its new value.
+        State or discrete state to the expression that gives its new value, or to ``"+= amount"``, which adds:
+        amounts of one instant are summed in any order.
     place : Place, optional
         Where it is written, for the messages of errors.
 

@@ -21,14 +21,15 @@ class Schedule(Declared):
     name : str
         What its events are called.
     times : sequence of str or float, optional
-        Single times; or instead a clock, by the next three.
+        Single times, one that is listed twice counts twice; or instead a clock, by the next three.
     start, period : str or float, optional
         First tick (0 if only a period is given), time between ticks. All times are expressions of parameters,
         in the unit of t.
     count : int, optional
         Number of ticks; None: no end.
     reset : mapping of str to str or float, optional
-        State or discrete state to expression, evaluated at x-.
+        State or discrete state to the expression that gives its new value, evaluated at x-, or to ``"+= amount"``,
+        which adds: amounts of one instant are summed in any order.
     terminate : bool, optional
         Whether the run ends there.
     place : Place, optional
@@ -37,7 +38,7 @@ class Schedule(Declared):
     Examples
     --------
     >>> import hybridsim as hs
-    >>> dose = hs.Schedule("dose", period=1, count=3, reset={"x": "x + 1"})
+    >>> dose = hs.Schedule("dose", period=1, count=3, reset={"x": "+= 1"})
     >>> model = hs.Model("drug", states=[hs.State("x", 0, 0)], schedules=[dose])
     >>> hs.simulate(model, (0, 5)).y[:, -1].tolist()
     [3.0]

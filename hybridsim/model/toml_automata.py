@@ -68,13 +68,13 @@ def _guard(name: str, table: Table) -> Guard:
 def _choice(table: Table) -> Choice:
     table.only("to", "when", "reset")
     table.require("to", 'write to = "the next mode".')
-    return Choice(table.text("to"), table.expression("when"), table.expressions("reset"), place=table.place)
+    return Choice(table.text("to"), table.expression("when"), table.resets("reset"), place=table.place)
 
 
 def _limit(table: Table) -> Choice:
     table.only("to", "reset")
     table.require("to", 'write to = "the mode at the limit".')
-    return Choice(table.text("to"), None, table.expressions("reset"), place=table.place)
+    return Choice(table.text("to"), None, table.resets("reset"), place=table.place)
 
 
 def _surface(parent: Table) -> Surface | None:

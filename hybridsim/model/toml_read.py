@@ -178,7 +178,7 @@ def _monitors(root: Table) -> Iterable[Monitor]:
         expr = table.needed("expr", 'write expr = "the scalar to watch".')
         action = table.text("action", "reset" if "reset" in table.data else "record")
         direction = table.text("direction", "both")
-        yield Monitor(name, expr, direction, action, table.expressions("reset"), place=table.place)
+        yield Monitor(name, expr, direction, action, table.resets("reset"), place=table.place)
 
 
 def _schedules(root: Table) -> Iterable[Schedule]:
@@ -190,7 +190,7 @@ def _schedules(root: Table) -> Iterable[Schedule]:
             table.expression("start"),
             table.expression("period"),
             table.count("count"),
-            table.expressions("reset"),
+            table.resets("reset"),
             table.flag("terminate"),
             place=table.place,
         )
@@ -207,7 +207,7 @@ def _clocks(root: Table) -> Iterable[Schedule]:
         table.only("period", "offset", "set")
         period = table.needed("period", "write period = the time between ticks.")
         start = table.expression("offset")
-        yield Schedule(name, start=start, period=period, reset=table.expressions("set"), place=table.place)
+        yield Schedule(name, start=start, period=period, reset=table.resets("set"), place=table.place)
 
 
 def _outputs(root: Table) -> Iterable[Output]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from hybridsim.errors import ExpressionError, ModelError, Place, nearest
-from hybridsim.expr import Expression, parse
+from hybridsim.expr import Expression, parse, parse_reset
 from hybridsim.model.positions import Path
 
 _ZERO = parse(0)
@@ -111,11 +111,13 @@ class Table:
     def needed(self, key: str, remedy: str) -> Expression:
         return self.expression(key, remedy) or _ZERO
 
-    def parsed(self, value: Any, *keys: str | int) -> Expression:
+    def parsed(
+        self, value: Any, *keys: str | int, form: Callable[[Any, Place], Expression] = parse
+    ) -> Expression:
         """An expression out of a TOML value that stands at a key of this table."""
         place = self.source.place((*self.path, *keys))
         try:
-            return parse(value, Place(place.file, place.line))
+            return form(value, Place(place.file, place.line))
         except ExpressionError as fault:
             what = ".".join(str(key) for key in keys if key != "value")
             message = f"{self.kind}{', ' + what if what else ''}: {fault.message}"
@@ -128,6 +130,11 @@ class Table:
         """A table of expressions under a key; empty where it is absent."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name) for name, value in found.items()}
+
+    def resets(self, key: str) -> dict[str, Expression]:
+        """A table of resets under a key, some of which may add: '+= amount'; empty where it is absent."""
+        found = self._typed(key, dict, "a table of expressions", {})
+        return {name: self.parsed(value, key, name, form=parse_reset) for name, value in found.items()}
 
     def entries(self, key: str, kind: str, shorthand: str | None = None) -> Iterator[tuple[str, Table]]:
         """Named sub-tables under a key; a plain value stands for a table with the ``shorthand`` key alone."""

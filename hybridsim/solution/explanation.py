@@ -13,6 +13,7 @@ from hybridsim.engine.accumulation import SAME_FACTOR, turn_of
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.errors import UsageError
+from hybridsim.expr import assignment
 from hybridsim.model.units import units_of
 from hybridsim.solution.blow import errors_beside, is_struck
 from hybridsim.solution.candidate import candidate, views
@@ -145,7 +146,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     x_minus, x_plus = at.x, stage.outcome.x
     if change is not None and not system.automata[change.component].has_surface:
         x_minus, x_plus = change.x_minus, change.x_plus  # its own round: others may go before it, or follow
-    texts = {name: f" (= {reset.text})" for name, reset in resets.items() if reset.names}
+    texts = {name: f" ({assignment('', reset).strip()})" for name, reset in resets.items() if reset.names}
     # less than the error is what rounding left of a zero, set exactly
     error = (
         errors_beside(stage, change.component)
@@ -275,7 +276,8 @@ def _of_another_kind(solution: Solution, event: Event) -> str:
 def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
     """What the reset of a monitor or a schedule sets, as it is declared; a clock has none that is declared."""
     part = next((part for part in parts if part.name == event.component), None)
-    values = ", ".join(f"{name} = {value.text}" for name, value in part.reset.items()) if part else ""
+    resets = part.reset.items() if part else ()
+    values = ", ".join(assignment(name, value) for name, value in resets)
     return f"; it sets {values}" if values else ""
 
 

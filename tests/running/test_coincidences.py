@@ -191,3 +191,110 @@ def test_a_guard_and_a_monitor_at_one_instant_read_the_state_before_both(integra
     )
     sol = hs.simulate(model(text), (0, 1), integrator=integrator)
     assert sol(1.0)[1:].tolist() == [1.0, 0.0]
+
+
+DOSES = '[states]\ngut = { start = 0, der = "-1.2*gut" }\n'
+
+
+def schedule(name: str, times: str, reset: str) -> str:
+    return f'[schedules.{name}]\ntimes = {times}\nreset = {{ gut = "{reset}" }}\n'
+
+
+@pytest.mark.parametrize("integrator", LOCATING)
+@pytest.mark.parametrize(
+    ("schedules", "expected"),
+    [
+        ((("a", "[0, 24, 48]", "+= 100"), ("b", "[24]", "+= 100")), 200.0),
+        ((("a", "[0, 24, 48]", "+= 100"), ("b", "[24]", "+= 50")), 150.0),
+        ((("a", "[0, 24, 24]", "+= 100"),), 200.0),
+        ((("a", "[24, 0, 24]", "+= 2*gut + 1"),), 2.0),
+        ((("a", "[0, 0, 30]", "+= 100"), ("b", "[24]", "5")), None),
+    ],
+)
+def test_amounts_of_one_instant_are_summed(
+    integrator: str, schedules: tuple[tuple[str, str, str], ...], expected: float | None
+) -> None:
+    text = DOSES + "".join(schedule(*one) for one in schedules)
+    sol = hs.simulate(model(text), (0, 25), integrator=integrator)
+    first = 200.0 if expected is None else 1.0 if expected == 2.0 else 100.0
+    left = first * np.exp(-1.2 * 24)
+    right = 5.0 if expected is None else 2.0 + 5.0 * left if expected == 2.0 else expected + left
+    assert sol(24)[0] == pytest.approx(right, rel=1e-14, abs=1e-9)
+    assert sol(24, side="-")[0] == pytest.approx(left, rel=1e-6)
+
+
+def test_a_sum_of_amounts_does_not_depend_on_their_order() -> None:
+    amounts = ["0.1", "1e16", "-1e16", "0.7", "1/3"]
+    found = set()
+    for turn in range(len(amounts)):
+        turned = amounts[turn:] + amounts[:turn]
+        text = DOSES + "".join(schedule(f"s{k}", "[1]", f"+= {a}") for k, a in enumerate(turned))
+        found.add(float(hs.simulate(model(text), (0, 2), x0={"gut": 1.0}, integrator="taylor")(1)[0]))
+    assert len(found) == 1
+    assert found.pop() == pytest.approx(np.exp(-1.2) + 0.1 + 0.7 + 1 / 3, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "schedules",
+    [
+        (("a", "[24]", "gut + 100"), ("b", "[24]", "gut + 100")),
+        (("a", "[24, 24]", "gut + 100"),),
+        (("a", "[24]", "gut + 100"), ("b", "[24]", "+= 100")),
+        (("a", "[24]", "7"), ("b", "[24]", "+= 100")),
+        (("a", "[24]", "7"), ("b", "[24]", "8")),
+    ],
+)
+def test_resets_that_contradict_each_other_name_the_form_that_adds(
+    schedules: tuple[tuple[str, str, str], ...],
+) -> None:
+    sol = hs.simulate(
+        model(DOSES + "".join(schedule(*one) for one in schedules)), (0, 25), integrator="dop853"
+    )
+    assert sol.status == "inconsistent"
+    assert '"+= amount"' in sol.message
+
+
+def test_a_reset_through_a_definition_reads_what_it_sets() -> None:
+    text = '[definitions]\nmore = "gut + 100"\n' + DOSES
+    text += schedule("a", "[24]", "more") + schedule("b", "[24]", "more")
+    sol = hs.simulate(model(text), (0, 25), integrator="taylor")
+    assert sol.status == "inconsistent" and '"+= amount"' in sol.message
+
+
+@pytest.mark.parametrize("integrator", LOCATING)
+def test_two_expressions_of_one_value_agree_within_rounding(integrator: str) -> None:
+    # b is a + 1 as a double: b - 1 is a within the rounding of b
+    text = '[states]\nx = { start = 0, der = "1" }\n[discrete]\na = 0.1\nb = "0.1 + 1"\n'
+    text += '[clocks.one]\nperiod = 1\nset = { x = "a" }\n[clocks.two]\nperiod = 1\nset = { x = "b - 1" }\n'
+    sol = hs.simulate(model(text), (0, 2.5), integrator=integrator)
+    assert sol.status == "finished"
+    assert sol(2.5)[0] == pytest.approx(0.6, abs=1e-12)
+
+
+def test_python_declares_and_writes_resets_that_add() -> None:
+    one = hs.Schedule("a", times=[1, 1], reset={"x": "+= 2*k"})
+    made = hs.Model(
+        "counting",
+        parameters=[hs.Parameter("k", 3)],
+        states=[hs.State("x", 1, 0)],
+        schedules=[one],
+        components=[
+            hs.Component(
+                "c",
+                [hs.Mode("on", [hs.Guard("g", "2 - t", hs.Choice("on", reset={"x": "+= 1"}))])],
+            )
+        ],
+    )
+    again = hs.Model.from_toml(made.to_toml())
+    assert again == made
+    assert again.schedules[0].reset["x"].text == "+= 2*k"
+    assert hs.simulate(made, (0, 1.5), integrator="taylor")(1.5)[0] == 13.0
+
+
+def test_an_amount_that_cannot_be_read_is_refused_at_its_place() -> None:
+    with pytest.raises(ModelError, match="unknown name 'dose'"):
+        model(DOSES + schedule("a", "[1]", "+= dose"))
+    with pytest.raises(hs.HybridsimError, match="is empty"):
+        model(DOSES + schedule("a", "[1]", "+= "))
+    with pytest.raises(hs.HybridsimError):
+        model('[states]\ngut = { start = "+= 1", der = "0" }\n')

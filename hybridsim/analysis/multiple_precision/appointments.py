@@ -36,9 +36,7 @@ class Appointments:
         values = model.parameter_values()
         self._clocks = [_Clock(schedule, values, precision) for schedule in model.schedules]
         self.due_at_start = tuple(
-            k
-            for k, clock in enumerate(self._clocks)
-            if (first := clock.time(0)) is not None and _same(first, t0)
+            k for k, clock in enumerate(self._clocks) for _ in range(clock.times_at(0, t0))
         )
         for clock in self._clocks:
             while (time := clock.next) is not None and (time < t0 or _same(time, t0)):
@@ -53,7 +51,9 @@ class Appointments:
             nearest = min(knots)
         if nearest > self._t1 or _same(nearest, self._t1):
             nearest = self._t1
-        due = tuple(k for time, k in ahead if _same(time, nearest))
+        due = tuple(
+            k for _, k in ahead for _ in range(self._clocks[k].times_at(self._clocks[k].count, nearest))
+        )
         return Appointment(nearest, due)
 
     def keep(self, appointment: Appointment) -> None:
@@ -81,6 +81,13 @@ class _Clock:
         if self._times:
             return self._times[k]
         return self._start if self._period is None else self._start + k * self._period
+
+    def times_at(self, k: int, t: Number) -> int:
+        """How many of the times from the k-th on are at t."""
+        count = 0
+        while (time := self.time(k + count)) is not None and _same(time, t):
+            count += 1
+        return count
 
     @property
     def next(self) -> Number | None:

@@ -10,6 +10,7 @@ from hybridsim.analysis.multiple_precision.precision import Number
 from hybridsim.analysis.multiple_precision.program import Point
 from hybridsim.analysis.multiple_precision.programs import Modes, Programs
 from hybridsim.errors import SimulationError
+from hybridsim.expr import Increment
 
 if TYPE_CHECKING:
     from hybridsim.expr import Expression
@@ -82,12 +83,23 @@ class Transitions:
         self, point: Point, modes: Modes, resets: list[Mapping[str, Expression]]
     ) -> dict[str, Number]:
         values: dict[str, Number] = {}
+        added: dict[str, list[Number]] = {}
+        before = dict(zip((*self.states, *self.discrete), (*point.x, *point.discrete), strict=True))
+        context, zero = self.programs.precision.context, self.programs.precision.zero
         for reset in resets:
             for name, expr in reset.items():
                 value = self.programs.value(expr, point, modes)
-                if values.setdefault(name, value) != value:
+                if isinstance(expr, Increment):
+                    added.setdefault(name, []).append(value)
+                elif abs(context.fsub(values.setdefault(name, value), value)) > zero * max(
+                    abs(value), abs(before[name])
+                ):
                     raise SimulationError(
                         f"two resets at t = {float(point.t)!r} set {name} to {float(values[name])!r} and to "
                         f"{float(value)!r}"
                     )
+        for name, amounts in added.items():
+            if name in values:
+                raise SimulationError(f"resets at t = {float(point.t)!r} set {name} and add to it")
+            values[name] = context.fsum([before[name], *amounts])
         return values
