@@ -12,6 +12,7 @@ from hybridsim.cli.output import complain, require_folder
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import Place, SimulationError, UsageError
+from hybridsim.files import held
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
@@ -105,10 +106,24 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if args.after is not None:
         given["after"] = args.after
 
-    import hybridsim
-
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
+    with held(folder, f"another sweep is writing to {folder}"):
+        return _fill(args, session, model, axes, given, folder, is_new)
+
+
+def _fill(
+    args: argparse.Namespace,
+    session: Session,
+    model: Model,
+    axes: dict[str, list[Any]],
+    given: dict[str, Any],
+    folder: Path,
+    is_new: bool,
+) -> int:
+    """Sweep, and write what comes of it into a folder that no other sweep writes to."""
+    import hybridsim
+
     journal = folder / "sweep.journal"
     if journal.exists():
         complain(f"going on with {journal}")
@@ -129,10 +144,10 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         if is_new and not any(folder.iterdir()):
             folder.rmdir()
         raise
-    if not result.interrupted:
-        journal.unlink()
     try:  # before anything is printed to a reader who may have gone
         _write(result, args.over, folder, session)
+        if not result.interrupted:
+            journal.unlink(missing_ok=True)
     finally:
         print(result.to_json() if args.json else result.table())
     for text, count in result.problems():

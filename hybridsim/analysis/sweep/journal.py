@@ -6,11 +6,14 @@ Numbers are written with all their digits, so that a sweep in parts is to the la
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import count
 from os import PathLike
 from types import TracebackType
 from typing import IO, Any
@@ -20,9 +23,10 @@ import numpy as np
 from hybridsim.analysis.sweep.job import Outcome
 from hybridsim.analysis.sweep.readings import Reading
 from hybridsim.errors import UsageError
-from hybridsim.files import cannot_write
+from hybridsim.files import cannot_write, hold
 
 _FORMAT = "hybridsim sweep"
+_MOST_BYTES = 1 << 28  # of a line: some 10 million numbers
 
 
 def fingerprint(*parts: object) -> str:
@@ -45,45 +49,77 @@ class Journal:
     Raises
     ------
     UsageError
-        Where the file is no journal, or of another sweep, or cannot be written.
+        Where the file is no journal, or of another sweep, or in use by one, or cannot be written.
     """
 
     def __init__(self, path: str | PathLike[str], sweep: str) -> None:
         self.path = os.fspath(path)
         self.known: list[tuple[list[int], list[Outcome]]] = []
-        try:
-            self._file: IO[bytes] = open(self.path, "a+b")  # noqa: SIM115  # it is open as long as the journal is
-        except OSError as error:
-            raise cannot_write(self.path, error) from error
+        self._file = self._opened()
         try:
             self._read(sweep)
         except BaseException:  # whatever it is, the file is not left open; it is raised again
             self._close()
             raise
 
+    def _opened(self) -> IO[bytes]:
+        """The file, which no other sweep has open."""
+        while True:
+            try:
+                is_other = os.path.exists(self.path) and not stat.S_ISREG(os.stat(self.path).st_mode)
+                if is_other:
+                    raise OSError(errno.EINVAL, "it is no regular file")
+                file = open(self.path, "a+b")  # noqa: SIM115  # it is open as long as the journal is
+            except OSError as error:
+                raise cannot_write(self.path, error) from error
+            try:
+                hold(file.fileno(), f"{self.path} is in use by another sweep")
+            except UsageError:
+                file.close()
+                raise
+            # the sweep that had it may have deleted it in the meantime
+            if os.path.exists(self.path) and os.path.samestat(os.stat(self.path), os.fstat(file.fileno())):
+                return file
+            file.close()
+
     def _read(self, sweep: str) -> None:
+        """Take in what is there; a last line that is not whole is cut off."""
+        head = {"format": _FORMAT, "sweep": sweep}
         self._file.seek(0)
-        whole = self._file.read()
-        end = whole.rfind(b"\n") + 1
-        lines = whole[:end].splitlines()
+        end, line = 0, self._file.readline(_MOST_BYTES)
+        if not line.endswith(b"\n") and _as_line(head).startswith(line):  # nothing, or a beginning of ours
+            self._file.truncate(0)
+            self._write(head)
+            return
+        self._check_head(line, head)
+        for number in count(2):
+            end += len(line)
+            line = self._file.readline(_MOST_BYTES)
+            if not line.endswith(b"\n") and len(line) < _MOST_BYTES:
+                break
+            try:
+                self.known.append(_piece(json.loads(line)))
+            except (ValueError, OverflowError, RecursionError) as error:
+                raise UsageError(
+                    f"{self.path}, line {number} is no result of a sweep: {error}",
+                    remedy="take the line out, or delete the file",
+                ) from error
+        self._file.truncate(end)
+
+    def _check_head(self, line: bytes, head: dict[str, str]) -> None:
         try:
-            head = json.loads(lines[0]) if lines else None
-            if whole and (not isinstance(head, dict) or head.get("format") != _FORMAT):
-                raise ValueError
-            self.known = [_piece(json.loads(line)) for line in lines[1:]]
-        except (ValueError, KeyError, TypeError) as error:
+            found = json.loads(line)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict) or found.get("format") != _FORMAT:
             raise UsageError(
                 f"{self.path} is no journal of a sweep", remedy="give another path, or delete it"
-            ) from error
-        if head is None:
-            self._write({"format": _FORMAT, "sweep": sweep})
-        elif head["sweep"] != sweep:
+            )
+        if found.get("sweep") != head["sweep"]:
             raise UsageError(
                 f"{self.path} is of another sweep: model, values, measure or options differ",
                 remedy="finish that one, delete the file, or give another path",
             )
-        else:
-            self._file.truncate(end)
 
     def note(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
         """Add the outcomes of some points; a kill from now on does not lose them."""
@@ -93,7 +129,7 @@ class Journal:
 
     def _write(self, line: Any) -> None:
         try:
-            self._file.write(json.dumps(line).encode() + b"\n")
+            self._file.write(_as_line(line))
             self._file.flush()
         except OSError as error:
             raise cannot_write(self.path, error) from error
@@ -111,11 +147,31 @@ class Journal:
         self._close()
 
 
+def _as_line(content: Any) -> bytes:
+    return json.dumps(content).encode() + b"\n"
+
+
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
+    """Numbers of points and their outcomes.
+
+    Raises
+    ------
+    ValueError
+        For anything else.
+    """
+    if not (isinstance(line, list) and len(line) == 2 and all(isinstance(part, list) for part in line)):
+        raise ValueError("it is no pair of points and results")
     numbers, rows = line
-    return numbers, [
-        Outcome(status, {n: _read_back(v) for n, v in found.items()} or None) for status, found in rows
-    ]
+    if not all(type(number) is int for number in numbers):
+        raise ValueError("its points are no numbers")
+    return numbers, [_outcome(row) for row in rows]
+
+
+def _outcome(row: Any) -> Outcome:
+    is_pair = isinstance(row, list) and len(row) == 2
+    if not (is_pair and isinstance(row[0], str) and isinstance(row[1], dict)):
+        raise ValueError("a result is no status with readings")
+    return Outcome(row[0], {name: _read_back(value) for name, value in row[1].items()} or None)
 
 
 def _written(value: Reading) -> Any:
@@ -129,13 +185,24 @@ def _written(value: Reading) -> Any:
 
 
 def _read_back(value: Any) -> Reading:
+    if isinstance(value, str):
+        return value
     if not isinstance(value, dict):
-        return value if isinstance(value, str) else float(value)
-    if "complex" in value:
-        return complex(*value["complex"])
-    real, *imaginary = (np.array(part, dtype=float) for part in value["array"])
-    if not imaginary:
-        return real
-    both = np.empty(len(real), dtype=complex)
-    both.real, both.imag = real, imaginary[0]
-    return both
+        return _number(value)
+    match value:
+        case {"complex": [real, imaginary], **others} if not others:
+            return complex(_number(real), _number(imaginary))
+        case {"array": [list(numbers)], **others} if not others:
+            return np.array([_number(number) for number in numbers], dtype=float)
+        case {"array": [list(real), list(imaginary)], **others} if not others and len(real) == len(imaginary):
+            both = np.empty(len(real), dtype=complex)
+            both.real = [_number(number) for number in real]
+            both.imag = [_number(number) for number in imaginary]
+            return both
+    raise ValueError("a reading is no number, array or text")
+
+
+def _number(value: Any) -> float:
+    if type(value) not in (int, float):
+        raise ValueError(f"{value!r} is no number")
+    return float(value)

@@ -58,7 +58,11 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
     total = len(collected.status)
     known = np.zeros(total, dtype=np.bool_)
     for line, (numbers, outcomes) in enumerate(journal.known, start=2):
-        in_range = all(isinstance(k, int) and 0 <= k < total for k in numbers)
+        in_range = all(0 <= k < total for k in numbers)
+        if in_range and chains is not None:
+            in_range = numbers == list(range(numbers[0], total, chains))[: len(numbers)] if numbers else False
+        elif in_range:  # each point has its result once
+            in_range = len(set(numbers)) == len(numbers) and not known[numbers].any()
         if not (numbers and in_range and len(numbers) == len(outcomes)):
             raise UsageError(
                 f"{journal.path}, line {line}: the points {numbers!r} are none of this sweep of {total}",
