@@ -35,7 +35,8 @@ def to_ivp(
     fun(t, x) is dx/dt (n,), jac(t, x) its Jacobian (n, n), and events the guards of the mode: the mode lasts while
     all of them are >= 0. Each is a function (t, x) -> float with the attributes terminal = True and direction = -1
     as `solve_ivp` reads them, and component and guard, which name it. States that the mode holds are evaluated from
-    their constraint. Discrete states keep their initial values.
+    their constraint. Corners (`abs`, `min`, `max`, conditionals) and the pieces of a law's tables are switched inside
+    the functions, by the state they are called with. Discrete states keep their initial values.
 
     Parameters
     ----------
@@ -72,6 +73,7 @@ def to_ivp(
     0.00172
     """
     from hybridsim.engine.jit import announce_compilation
+    from hybridsim.engine.sides import modes_by_state
     from hybridsim.engine.stepping import Counters, Flow
     from hybridsim.engine.system import System
     from hybridsim.engine.timepair import Instant
@@ -83,27 +85,35 @@ def to_ivp(
     modes = _modes(system, z or {})
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
 
-    def flow_from(origin: float) -> Flow:
-        return Flow(system, system.vector(Instant(origin), discrete), modes, Counters())
+    tables = np.flatnonzero(system.is_corner).tolist()
+    from_zero = system.vector(Instant(0.0), discrete)
+    flows: dict[bytes, Flow] = {}
 
-    from_zero = flow_from(0.0)
-
-    def at(t: float) -> tuple[Flow, float]:
-        """A flow and the local time in it; the piece of an input that holds at t is looked up anew."""
-        return (flow_from(float(t)), 0.0) if system.signals else (from_zero, float(t))
+    def at(t: float, x: np.ndarray) -> tuple[Flow, float]:
+        """A flow and the local time in it; pieces of inputs and tables are those that hold at t and x."""
+        vector, s = (
+            (system.vector(Instant(float(t)), discrete), 0.0) if system.signals else (from_zero, float(t))
+        )
+        z = modes_by_state(system, tables, s, x, vector, modes) if tables else modes
+        if system.signals:
+            return Flow(system, vector, z, Counters()), s
+        key = z.tobytes()
+        if key not in flows:
+            flows[key] = Flow(system, vector, z, Counters())
+        return flows[key], s
 
     def fun(t: float, x: Any) -> np.ndarray:
-        flow, s = at(t)
-        return flow.rhs(s, _state(x))
+        flow, s = at(t, state := _state(x))
+        return flow.rhs(s, state)
 
     def jac(t: float, x: Any) -> np.ndarray:
-        flow, s = at(t)
-        return flow.jacobian(s, _state(x))
+        flow, s = at(t, state := _state(x))
+        return flow.jacobian(s, state)
 
     def event(number: int, component: str, guard: str) -> Function:
         def value(t: float, x: Any) -> float:
-            flow, s = at(t)
-            return float(flow.guards(np.array([s]), _state(x)[None, :])[0, number])
+            flow, s = at(t, state := _state(x))
+            return float(flow.guards(np.array([s]), state[None, :])[0, number])
 
         # a function has no such attributes by its type; solve_ivp reads the first two off it
         value.terminal, value.direction = True, -1  # type: ignore[attr-defined]  # SciPy reads them off the function
@@ -113,6 +123,7 @@ def to_ivp(
     events = tuple(
         event(number, automaton.name, name)
         for automaton, mode in zip(system.automata, modes, strict=True)
+        if not automaton.is_corner
         for number, name in zip(automaton.guards[mode], automaton.guard_names[mode], strict=True)
     )
     return Ivp(fun, events, jac)

@@ -152,6 +152,12 @@ class Contact(Declared):
         """Name in the model of what the law calls so: of a state, of a table, of the load that lift-off leaves."""
         return f"{self.name}_{name}"
 
+    @property
+    def table_speed(self) -> str | None:
+        """The variable that holds the speed for tables over it, which each mode sets; None where no table asks."""
+        asked = any(SPEED in table.over.names for table in self.law.tables)
+        return self.variable(SPEED) if asked and self.law.is_set_valued else None
+
     def _argument_speed(self) -> Expression:
         """What a table is read at: the speed, as the modes of a set-valued law give it, or the velocity."""
         return parse(self.variable(SPEED)) if self.law.is_set_valued else self.velocity
@@ -178,8 +184,8 @@ class Contact(Declared):
         upper = self._form("limit - f", limit=limit, f=force)
         lower = self._form("limit + f", limit=backward_limit, f=force)
         forward_set, backward_set, stick_set = {self.name: forward_slip}, {self.name: backward_slip}, {}
-        if any(SPEED in table.over.names for table in self.law.tables):
-            speed = self.variable(SPEED)
+        speed = self.table_speed
+        if speed is not None:
             forward_set[speed], backward_set[speed], stick_set[speed] = self.velocity, backward, parse(0)
         modes = (
             Mode("slip+", (Guard("velocity", self.velocity), *loaded), set=forward_set),

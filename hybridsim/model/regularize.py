@@ -91,10 +91,11 @@ def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
         else parse(0)
     )
     force = _form(_SMOOTH[kind], slip=contact.slip_force(speed), velocity=contact.velocity, v0=parse(v0))
+    values = {contact.name: force}
+    if contact.table_speed is not None:
+        values[contact.table_speed] = _form("abs(velocity)", velocity=contact.velocity)
     return Component(
-        contact.name,
-        (Mode("smooth", _loaded(model, contact), set={contact.name: force}),),
-        place=contact.place,
+        contact.name, (Mode("smooth", _loaded(model, contact), set=values),), place=contact.place
     )
 
 
@@ -134,17 +135,22 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     out_up = Guard("fast", _form("v0 - velocity", **parts), (Choice("slip+"),))
     out_down = Guard("fast-backward", _form("v0 + velocity", **parts), (Choice("slip-"),))
     forward_force = contact.slip_force(velocity)
+    speed = contact.table_speed  # at rest tables are read at no speed
+
+    def at(value: Expression) -> dict[str, Expression]:
+        return {} if speed is None else {speed: value}
+
     backward_force = _form("-f", f=contact.slip_force(backward, backward=True))
     modes = (
         Mode(
             "slip+",
             (Guard("slow", _form("velocity - v0", **parts), into_band), *loaded),
-            set={name: forward_force},
+            set={name: forward_force, **at(velocity)},
         ),
         Mode(
             "slip-",
             (Guard("slow", _form("-velocity - v0", **parts), into_band), *loaded),
-            set={name: backward_force},
+            set={name: backward_force, **at(_form("-velocity", velocity=velocity))},
         ),
         Mode(
             "stick",
@@ -155,12 +161,12 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
                 out_down,
                 *loaded,
             ),
-            set={name: held},
+            set={name: held, **at(parse(0))},
         ),
         Mode(
             "break+",
             (Guard("held", _form("held - limit", **parts), (Choice("stick"),)), out_up, out_down, *loaded),
-            set={name: limit},
+            set={name: limit, **at(parse(0))},
         ),
         Mode(
             "break-",
@@ -170,7 +176,7 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
                 out_down,
                 *loaded,
             ),
-            set={name: _form("-limit", **backward_parts)},
+            set={name: _form("-limit", **backward_parts), **at(parse(0))},
         ),
     )
     return Component(name, modes, initial="stick", place=contact.place)

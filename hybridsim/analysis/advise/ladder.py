@@ -15,6 +15,7 @@ from hybridsim.analysis.race import Budget
 from hybridsim.analysis.rows import NOT_STARTED, STOPPED
 from hybridsim.analysis.rungs import DoesNotApply, NothingToDrop, Rung, Scene
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.errors import ModelError
 from hybridsim.model import Model
 
 ADEQUATE, NOT_ADEQUATE, NOT_APPLICABLE, FULL = "adequate", "not adequate", "does not apply", "full model"
@@ -153,7 +154,12 @@ def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float
     except DoesNotApply as reason:
         return _without(rung, NOT_APPLICABLE, str(reason), model)
     except NoAnswer as reason:
-        return _without(rung, NOT_ADEQUATE, f"it gives no {question.text}: {reason}", model)
+        why = str(reason).partition("\n")[0]
+        if isinstance(
+            reason.__cause__, ModelError
+        ):  # that is no motion of the simpler model, but none at all
+            return _without(rung, NOT_APPLICABLE, f"its model cannot be run: {why}")
+        return _without(rung, NOT_ADEQUATE, f"it gives no {question.text}: {why}", model)
     except OutOfTime as fault:
         return _without(rung, STOPPED, limits.reason(fault, full), model)
     error = relative_error(answer.value, full.value)

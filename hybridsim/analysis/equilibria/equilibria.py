@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.analysis.equilibria.field import Field, is_driven
+from hybridsim.analysis.equilibria.field import INSIDE, Field, is_driven
 from hybridsim.analysis.equilibria.linearize import equilibrium_near
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 _MOST = 4096  # vectors of modes that are looked at
 _ROUNDS = 30
 _SETTLED = 1e-14
-_INSIDE = 1e-12  # of a guard's terms: rounding
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ def _in_modes(field: Field) -> Equilibrium | None:
     else:
         low = high = x
     _, A, g, G = field(x)
-    rounding = _INSIDE * (np.abs(G) @ field.sizes(x))
+    rounding = INSIDE * (np.abs(G) @ field.sizes(x))
     # slip without a velocity is the end of a stick
     slips = np.array([a.has_surface and z != a.hold for a, z in zip(system.automata, field.z, strict=True)])
     if (g <= np.where(slips[system.owner[field.guards]], rounding, -rounding)).any():

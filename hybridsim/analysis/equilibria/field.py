@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.sides import modes_by_state
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import UsageError, nearest
@@ -15,19 +16,23 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
 
+INSIDE = 1e-12  # of a guard's terms: rounding
+
+
 class Field:
     """x' = f(x) and the guards g(x) >= 0 of the modes z at time t.
 
-    held (h,): indices of the states that the modes hold on a constraint; free: of the others.
+    held (h,): indices of the states that the modes hold on a constraint; free: of the others. by_state: numbers of the
+    components whose modes follow the state, in `at_sides`.
     """
 
-    def __init__(self, system: System, z: np.ndarray, t: float = 0.0) -> None:
+    def __init__(self, system: System, z: np.ndarray, t: float = 0.0, by_state: tuple[int, ...] = ()) -> None:
         if not system.has_tape:
             raise UsageError(
                 f"model {system.model.name} is made of Python functions, of which derivatives are not known",
                 remedy="write it in expressions",
             )
-        self.system, self.z = system, z
+        self.system, self.z, self.t, self.by_state = system, z, t, by_state
         self.p = system.vector(Instant(t), system.discrete_start)
         self.guards = np.flatnonzero(system.active(z))
         self._tape = TangentTape(system, z, tuple(self.guards.tolist()))
@@ -40,6 +45,27 @@ class Field:
         found = self._tape(np.zeros(1), x[None, :], self.p, self._seeds)
         n = self.system.n
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
+
+    def at_sides(self, x: np.ndarray) -> Field:
+        """The field in the modes that the state decides at x: on its side of each corner and jump, in its piece."""
+        if not self.by_state:
+            return self
+        z = modes_by_state(self.system, self.by_state, 0.0, x, self.p, self.z)
+        return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
+
+    def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
+        """Components that x leaves on a border to another mode, to rounding, each with that mode."""
+        _, _, g, G = self(x)
+        rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
+        value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))
+        found = []
+        for c in self.by_state:
+            automaton, m = self.system.automata[c], self.z[c]
+            for k, number in enumerate(automaton.guards[m]):
+                if not abs(value[number]) <= rounding[number]:
+                    continue
+                found += [(c, other) for other in (automaton.targets[m][k] or (automaton.hold,))]
+        return found
 
     def sizes(self, x: np.ndarray) -> np.ndarray:
         """What is large for each state at x: its value or its nominal size, 1 where both are nothing."""
@@ -62,9 +88,14 @@ def is_driven(system: System) -> bool:
     return tape["time"] >= 0 or bool(system.model.inputs)
 
 
-def modes_of(system: System, mode: Mapping[str, str] | str | None) -> np.ndarray:
-    """Mode numbers from names by component; a text is the mode of the only component."""
-    declared = system.declared
+def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Mode numbers from names by component, and the components whose modes are left to the state.
+
+    A text is the mode of the only component. Left to the state are corners, tables and the jumps of a rate (components
+    that the model's author did not declare), but for those whose mode is given.
+    """
+    written = {component.name for component in system.written.all_components()}
+    declared = tuple(a for a in system.declared if a.name in written) or system.declared
     if isinstance(mode, str):
         if len(declared) != 1:
             raise UsageError(
@@ -75,17 +106,19 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> np.ndarray
     if not (mode is None or isinstance(mode, Mapping)):
         raise UsageError(f"mode is {mode!r}", remedy="give a mapping from components to modes")
     given: dict[str, Any] = dict(mode or {})
-    names = [a.name for a in declared]
+    names = [a.name for a in system.declared]
     for name in given:
         if name not in names:
             raise UsageError(
                 f"mode names {name!r}, which is no component of model {system.model.name}",
                 remedy=nearest(str(name), names, kind="components"),
             )
-    numbers = []
-    for automaton in system.automata:
+    numbers, by_state = [], []
+    for c, automaton in enumerate(system.automata):
         chosen = given.get(automaton.name)
-        if chosen is None and automaton.initial < 0 and not automaton.is_corner:
+        if chosen is None and (automaton.is_corner or automaton.name not in written):
+            by_state.append(c)
+        elif chosen is None and automaton.initial < 0:
             raise UsageError(
                 f"mode gives none for {automaton.name}", remedy=f"give one of {', '.join(automaton.modes)}"
             )
@@ -95,4 +128,4 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> np.ndarray
                 remedy=nearest(str(chosen), automaton.modes, kind="modes"),
             )
         numbers.append(max(automaton.initial, 0) if chosen is None else automaton.modes.index(chosen))
-    return np.array(numbers, dtype=np.int64)
+    return np.array(numbers, dtype=np.int64), tuple(by_state)

@@ -13,7 +13,7 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
 from hybridsim.calls import refusing
-from hybridsim.errors import SimulationError
+from hybridsim.errors import SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -22,6 +22,7 @@ _STEPS = 50
 _DUST = 1e-10  # of the largest state
 _CLOSED = 1e-13  # of the terms of a rate: what it is to rounding
 _HALVINGS = 20
+_ALIKE = 1e-9  # of the terms of a rate: Jacobians that differ by less are one
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,9 @@ def linearize(
 ) -> Linearization:
     """Linearize one vector of modes about a point: its Jacobian and complex eigenvalues.
 
-    The Jacobian is differentiated from the declaration, to rounding. With `hs.sweep` over a parameter it finds the
+    The Jacobian is differentiated from the declaration, to rounding. Corners (`abs`, `min`, `max`, conditionals, pieces
+    of a table) and jumps of a rate are taken on the side on which the point lies; a point on one of them, where the
+    sides differ, has no single linearization and is refused. With `hs.sweep` over a parameter it finds the
     onset of a friction-induced instability: where the growth of steady sliding passes zero.
 
     Parameters
@@ -129,7 +132,7 @@ def linearize(
     Raises
     ------
     UsageError
-        For modes or states that the model does not have.
+        For modes or states that the model does not have, and a point on a corner.
     SimulationError
         Where no equilibrium is found.
 
@@ -146,12 +149,15 @@ def linearize(
     system = system_of(model)
     start, _ = arguments.start_values(model, at)
     x = system.start_state(start)
-    field = Field(system, modes_of(system, mode), arguments.number(t, "t"))
+    z, by_state = modes_of(system, mode)
+    field = Field(system, z, arguments.number(t, "t"), by_state).at_sides(x)
     if at is None and not is_driven(system):
         x = equilibrium_near(field, x)
     x = field.projected(x)
+    field = field.at_sides(x)
     f, A, g, _ = field(x)
     free = field.free
+    _refuse_borders(field, x, A)
     return Linearization(
         tuple(system.names[i] for i in free),
         A[np.ix_(free, free)],
@@ -161,9 +167,32 @@ def linearize(
     )
 
 
+def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
+    """Refuse a point on a corner or a jump whose sides do not agree in their rates or in their Jacobians."""
+    system = field.system
+    rates = field(x)[0]
+    scale = field.sizes(x)
+    bound = _CLOSED * _terms(A, scale)
+    for c, mode in field.borders(x):
+        z = field.z.copy()
+        z[c] = mode
+        across = Field(system, z, field.t, field.by_state)
+        f, other, *_ = across(x)
+        free = across.free
+        gap = np.abs(other - A) @ scale
+        if free == field.free and (gap <= _ALIKE * bound / _CLOSED).all() and (abs(f - rates) <= bound).all():
+            continue
+        raise UsageError(
+            f"the point lies on the corner {system.automata[c].name}: there is one linearization on each side, and "
+            "no single one",
+            remedy="give a point on one side of it with at=",
+        )
+
+
 def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
     """A point at which nothing moves, by Newton's method; of a continuum of them the one next to where it goes."""
     x = field.projected(x)
+    field = field.at_sides(x)
     f, A, *_ = field(x)
     for _ in range(_STEPS):
         columns = A[:, field.free]
@@ -173,13 +202,14 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
         move[field.free] = np.linalg.lstsq(columns / scale[:, None], -f / scale, rcond=None)[0]
         for _ in range(_HALVINGS):
             trial = field.projected(x + move)
-            found = field(trial)
+            there = field.at_sides(trial)
+            found = there(trial)
             if np.abs(found[0] / scale).sum() < np.abs(f / scale).sum():
                 break
             move *= 0.5
         else:
             break  # as close as rounding lets it come, or nowhere near
-        x, f, A = trial, found[0], found[1]
+        field, x, f, A = there, trial, found[0], found[1]
     x, f, A = _without_dust(field, x, f, A)
     if (np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all():
         return x

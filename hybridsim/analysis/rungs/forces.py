@@ -9,14 +9,22 @@ from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
 from hybridsim.model.law import SPEED
 
+_SPEED = parse("abs(u)")
+
 
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
     """The model with a component of one mode for each contact, which sets its force to an expression.
 
-    Other automata of a contact, of lift-off, stay; the states that a law with memory brings go with it.
+    Other automata of a contact, of lift-off and of tables, stay; the states that a law with memory brings go with it.
     """
+
+    def values(contact: Contact) -> dict[str, Expression]:
+        speed = contact.table_speed
+        force = {contact.name: forces[contact.name]}
+        return force if speed is None else {**force, speed: substitute(_SPEED, {"u": contact.velocity})}
+
     components = tuple(
-        Component(c.name, (Mode(mode, set={c.name: forces[c.name]}),)) if part.name == c.name else part
+        Component(c.name, (Mode(mode, set=values(c)),)) if part.name == c.name else part
         for c in model.contacts
         for part in model.components_of(c)
         if not _is_copy(c, part)
