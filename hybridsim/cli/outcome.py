@@ -82,6 +82,11 @@ def check_arguments(args: argparse.Namespace) -> None:
         raise UsageError("--points without --csv or --npz", remedy="say where the table is to be written")
     if args.points == 1:
         raise UsageError("--points 1", remedy="give at least 2: the start and the end")
+    if args.points is not None:
+        from hybridsim.solution.tabulated import MOST_POINTS
+
+        if args.points > MOST_POINTS:
+            raise UsageError(f"--points {args.points}", remedy=f"give at most {MOST_POINTS}")
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:

@@ -194,10 +194,14 @@ def _row(model: Model, name: str, text: str) -> list[Any]:
         return [parse(part, Place(file=name, text=part)) for part in _parts(text)]
     parts = [part.strip() for part in text.split(":")]
     is_log = len(parts) == 4 and parts[3] == "log"
-    if not (len(parts) == 3 or is_log) or not parts[2].isdecimal() or int(parts[2]) < 1:
+    if not (len(parts) == 3 or is_log) or not parts[2].isdecimal() or not parts[2].strip("0"):
         raise UsageError(
             f"{name}={text}", remedy="write FROM:TO:COUNT, FROM:TO:COUNT:log, or values with commas between"
         )
+    from hybridsim.analysis.sweep.axes import MOST_POINTS
+
+    if len(parts[2]) > len(str(MOST_POINTS)) or int(parts[2]) > MOST_POINTS:
+        raise UsageError(f"{name}={text}", remedy=f"a sweep has {MOST_POINTS} points at most; sweep in parts")
     low, high, count = number_of(model, name, parts[0]), number_of(model, name, parts[1]), int(parts[2])
     if is_log and not (low > 0 and high > 0):
         raise UsageError(f"{name}={text}", remedy="equal ratios go between two numbers above zero")

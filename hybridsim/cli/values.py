@@ -20,6 +20,7 @@ DEFAULT_PERIODS = 100
 COMPARED_PERIODS = 20  # a comparison runs dozens of times: a minute, not five
 DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
 
+_MOST_DIGITS = 15  # of a count: whole numbers that doubles hold
 MOST_WORKERS = 1024  # beyond the processors of a machine; each takes memory
 _NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
 _PERIODS, _WITH_UNIT = re.compile(_NUMBER + r"T\s*"), re.compile(_NUMBER + r"[A-Za-z]+\s*")
@@ -58,8 +59,10 @@ def folder(text: str) -> Path:
 
 def count(text: str) -> int:
     """A whole number above zero."""
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above zero")
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) == 0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number above zero, of {_MOST_DIGITS} digits at most"
+        )
     return int(text)
 
 

@@ -15,8 +15,9 @@ MAX_BYTES = 64_000_000
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
     """Columns of a CSV file as numbers.
 
-    Comma, semicolon or tab separates; a first line that is not all numbers holds the names; lines that are
-    empty or begin with # are skipped.
+    Comma, semicolon or tab separates. Lines that are empty or begin with # are skipped. The first line holds the names
+    if a column is asked for by its name, or if there is no number in any column that is asked for by its index; what
+    stands in other columns decides nothing.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
-    names = None if all(_is_number(cell) for cell in head) else head
+    names = head if _are_names(head, columns) else None
     if len(rows) < (2 if names else 1):
         remedy = "give time and value in each row."
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
@@ -38,6 +39,13 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     for index in indices:
         found.append(tuple(_cell(row, index, line, path) for line, row in rows[1 if names else 0 :]))
     return tuple(found)
+
+
+def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
+    """Whether the first line holds names."""
+    if any(isinstance(column, str) for column in columns):
+        return not all(map(_is_number, head))
+    return not any(0 <= column < len(head) and _is_number(head[column]) for column in map(int, columns))
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:

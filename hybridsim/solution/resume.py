@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -30,6 +31,8 @@ def resumed(
             remedy="start a new one, from sol.y[:, -1] and with what is to be different",
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
+    if not math.isfinite(end):
+        raise UsageError(f"t_end is {t_end!r}", remedy="give a finite time; a monitor can end a run early")
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(

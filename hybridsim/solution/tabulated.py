@@ -13,11 +13,17 @@ from hybridsim.tables import Table
 if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution
 
+MOST_POINTS = 1 << 27  # of a column: a gigabyte
+
 
 def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
     """Times (points,) at equal steps, both ends included."""
     if points < 2:
         raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
+    if points > MOST_POINTS:
+        raise UsageError(
+            f"points is {points!r}", remedy=f"give at most {MOST_POINTS}, or tables of parts of the run"
+        )
     return np.linspace(t0, t1, points)
 
 

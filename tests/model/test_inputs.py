@@ -44,8 +44,32 @@ def test_a_table_from_a_file_is_the_table_in_place(more: str, table: str | bytes
 
 
 @pytest.mark.parametrize(
+    ("more", "table"),
+    [
+        ("", "0,10,start\n1,2,x\n2,3,y\n"),
+        ("", "0,10,\n1,2,\n2,3,\n"),
+        ("", "0;10;\n1;2;\n2;3;\n"),
+        ("columns = [0, 2]", "0,n/a,10\n1,5,2\n2,5,3\n"),
+        ("columns = [1, 0]", "10,0,-\n2,1,-\n3,2,-\n"),
+        ("", "t,u,\n0,10,\n1,2,\n2,3,\n"),
+        ("", "0,10\n1,2,x\n2,3,\n"),
+    ],
+)
+def test_the_first_row_is_data_whatever_stands_in_other_columns(
+    more: str, table: str, tmp_path: Path
+) -> None:
+    """The integral of the table is (10 + 2)/2 + (2 + 3)/2 = 8.5."""
+    model = load(tmp_path, TABLE + more, table)
+    assert (model.inputs[0].times, model.inputs[0].values) == ((0.0, 1.0, 2.0), (10.0, 2.0, 3.0))
+    driven = hs.Model("driven", states=[hs.State("x", 0, model.inputs[0].name)], inputs=model.inputs)
+    assert hs.simulate(driven, (0, 2), integrator="taylor").y[0, -1] == pytest.approx(8.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
     ("more", "table", "message"),
     [
+        ("", "0,n/a\n1,2\n2,3\n", "road.csv:1: 'n/a' is no number"),
+        ("", "t0,10\n1,2\n2,3\n", "road.csv:1: 't0' is no number"),
         ("", None, "there is no file"),
         ("", "", "no rows"),
         ("", "t,u\n", "no rows of numbers"),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from hybridsim.model import Model
 
 MODES = ("grid", "list")
 POINT = "point"  # the dimension of a list
+MOST_POINTS = 1 << 25  # each takes some hundred bytes
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,9 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
                 f"model {model.name} has no parameter or state {name!r} to sweep over",
                 remedy=model.remedy_for_parameter(str(name), tuple(starts)),
             )
+    _refuse_too_many({name: _length(row) for name, row in values.items()}, mode)
     settings = {name: _settings(name, row) for name, row in values.items()}
+    _refuse_too_many({name: len(row) for name, row in settings.items()}, mode)
     lengths = {name: len(row) for name, row in settings.items()}
     if mode == "list" and len(set(lengths.values())) > 1:
         counted = ", ".join(f"{name} {length}" for name, length in lengths.items())
@@ -123,10 +127,34 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
     return Points(axes, mode)
 
 
+def _length(row: Any) -> int:
+    """How many values a row has, as far as it says so itself."""
+    try:
+        return len(row)
+    except TypeError:  # no row, or one that is taken item by item
+        return 1
+    except OverflowError:  # a range beyond all words of the machine
+        return MOST_POINTS + 1
+
+
+def _refuse_too_many(lengths: Mapping[str, int], mode: str) -> None:
+    """Refuse a sweep of more points than fit into memory, before any of them is laid out."""
+    total = math.prod(lengths.values()) if mode == "grid" else max(lengths.values())
+    if total > MOST_POINTS:
+        counted = ", ".join(
+            f"{name} {length if length <= MOST_POINTS else f'more than {MOST_POINTS}'}"
+            for name, length in lengths.items()
+        )
+        raise UsageError(
+            f"the sweep has more than {MOST_POINTS} points ({counted})",
+            remedy="give fewer values, or sweep in parts",
+        )
+
+
 def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
     if not is_row(row):
         raise UsageError(f"the values of {name} are {row!r}", remedy="give a list of numbers or expressions")
-    found = tuple(_setting(name, value) for value in row)
+    found = tuple(_setting(name, value) for value in islice(row, MOST_POINTS + 1))
     if not found:
         raise UsageError(f"{name} has no values", remedy="give at least one")
     return found
