@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pprint import pformat
 from typing import Any
 
-from hybridsim.engine.impulse_rows import impulses, restitutions, speed_name
+from hybridsim.engine.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.layout import SIGNAL_SLOTS
 from hybridsim.engine.lower import Lowering, Program
 from hybridsim.engine.program import Assign, Item, Switch, needed
@@ -129,6 +129,7 @@ class Emitter:
             self._function("jumps", self._jumps()),
             self._function("effects", [(f"out[{k}]", e) for k, e in enumerate(self.lowering.effects)]),
             self._function("impulses", impulses(self.lowering)),
+            self._function("gap_slopes", gap_slopes(self.lowering)),
             self._function("restitutions", restitutions(self.lowering)),
             self._function("stepped", stepped(self.lowering)),
             self._function("rates", [(f"out[{k}]", r) for k, r in enumerate(program.rates)]),

@@ -16,6 +16,10 @@ from hybridsim.model.impact import ROUNDING
 if TYPE_CHECKING:
     from hybridsim.engine.settle import Settling
 
+# Newton's method from an error of location, which is rounding, is at rounding of the gap after one correction; the
+# second is for steps that end a little inside.
+_CORRECTIONS = 2
+
 Failure = tuple[str, str]
 
 
@@ -207,15 +211,8 @@ class _Collision:
         at, automata, settling = self.at, self.system.automata, self.settling
         normal = [c for c in members if automata[c].is_unilateral]
         shares = answer.impulses[:, None] * changes
-        # gaps that are zero are made so, in the positions, which no impulse changes
-        z = np.maximum(at.z, 0)
-        for c, automaton in enumerate(automata):  # what slides or sticks would go by velocities as they were
-            if automaton.has_surface and not automaton.is_unilateral and z[c] == automaton.hold:
-                z[c] = automaton.above
-        z[normal] = [automata[c].hold for c in normal]
-        x = self.system.project(at.s, at.x, at.p, z)
         moved = changes.any(axis=0)
-        x = np.where(moved, at.x + shares.sum(axis=0), x)
+        x = np.where(moved, at.x + shares.sum(axis=0), self._on_gaps(normal))
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
         at.x, at.x_error = x, np.where(moved, error, UNIT * np.abs(x))
@@ -244,6 +241,37 @@ class _Collision:
                 if at.z[c] == automaton.above and answer.impulses[i] > 0.0:
                     self._changes(c, "gap", automaton.above)
                 self._opens(c)
+
+    def _on_gaps(self, normal: list[int]) -> np.ndarray:
+        """The state with these gaps exactly zero, or zero to rounding: their rates change by impulses alone.
+
+        A gap that is linear in a position gives it. Others move the positions along their gradients, by no more than
+        the error with which the impact was located; a holding mode would move them until the rates are zero as well.
+        """
+        at, system = self.at, self.system
+        z = np.maximum(at.z, 0)
+        for c, automaton in enumerate(
+            system.automata
+        ):  # what slides or sticks would go by velocities as they were
+            if automaton.has_surface and not automaton.is_unilateral and z[c] == automaton.hold:
+                z[c] = automaton.above
+        z[normal] = [system.automata[c].hold for c in normal]
+        x = system.project(at.s, at.x, at.p, z)
+        projected = [c for c in normal if c in system.projected]
+        if not projected:
+            return x
+        moving = sorted({i for held in system.projected.values() for i in held})
+        x[moving] = at.x[moving]
+        free = at.p.copy()
+        free[system.layout.pin_at] = 0.0
+        rows = [self.place[c] for c in projected]
+        for _ in range(_CORRECTIONS):
+            gaps = system.series(at.s, x, free, z, at.x_error, at.s_error).surfaces[rows, 0]
+            slopes = system.gap_slopes(at.s, x, free, z)[rows]
+            if not (np.isfinite(gaps).all() and np.isfinite(slopes).all()):
+                return x
+            x = x - np.linalg.lstsq(slopes, gaps, rcond=None)[0]
+        return x
 
     def _uncertain(self, answer: Answer) -> np.ndarray:
         """Rounding of the impulses."""

@@ -31,6 +31,18 @@ def impulses(lowering: Lowering) -> Rows:
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
 
 
+def gap_slopes(lowering: Lowering) -> Rows:
+    """The rows of the function ``gap_slopes``: d(gap)/dx (m, n) of the surfaces; only those of gaps are set."""
+    n = len(lowering.states)
+    gaps = [(k, lowering.inlined(lowering.components[c].surface.function)) for k, c in _unilateral(lowering)]
+    return [
+        (f"out[{k * n + i}]", slope)
+        for k, gap in gaps
+        for i, x in enumerate(lowering.states)
+        if (slope := lowering.sp.diff(gap, x)) != 0
+    ]
+
+
 def restitutions(lowering: Lowering) -> Rows:
     """The rows of the function ``restitutions``, one for each surface; speeds of approach stand behind the states."""
     rows = []

@@ -48,7 +48,17 @@ class PythonCode:
             flow=self.forms.flow,
             **{name: self.forms.row(scalars) for name, scalars in self._rows.items()},
             **dict.fromkeys(
-                ("surfaces", "jumps", "effects", "rates", "impulses", "restitutions", "stepped"), nothing
+                (
+                    "surfaces",
+                    "jumps",
+                    "effects",
+                    "rates",
+                    "impulses",
+                    "gap_slopes",
+                    "restitutions",
+                    "stepped",
+                ),
+                nothing,
             ),
             choose=self._choose,
             reset=self._reset,

@@ -370,6 +370,12 @@ class System:
             out[2 * m * n :].reshape(2, m, m),
         )
 
+    def gap_slopes(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """d(gap)/dx (m, n) of the m surfaces; zero for those that are no gaps."""
+        out = np.zeros(len(self.surface_of) * self.n)
+        self._in_python("gap_slopes", s, x, p, z, out)
+        return out.reshape(-1, self.n)
+
     def restitutions(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, speeds: np.ndarray
     ) -> np.ndarray:

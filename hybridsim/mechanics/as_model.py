@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.expr import parse
 from hybridsim.mechanics.system import Harmonic
 from hybridsim.model import Contact, Impact, Model, Parameter, State
+from hybridsim.model.free_name import free_name
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.system import MechanicalSystem
@@ -29,7 +30,8 @@ def as_model(system: MechanicalSystem) -> Model:
         {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
         | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)}
     )
-    omega = {rate: f"omega_{i + 1}" for i, rate in enumerate(rates)}
+    taken = {*system.names, *system.velocities, *(contact.name for contact in system.all_contacts)}
+    omega = {rate: free_name(taken, f"omega_{i + 1}") for i, rate in enumerate(rates)}
     forces = {j: _signal(terms, omega) for j, terms in system.forcing.items()}
     states = []
     for i, (x, v) in enumerate(zip(system.names, system.velocities, strict=True)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable
+from typing import Any
 
 from hybridsim.expr.grammar import RESERVED
 from hybridsim.model.declared import Declared
@@ -31,12 +32,31 @@ def check_names(scope: Scope) -> None:
         seen.setdefault(name, kind)
     check_labels(scope, "component", [*model.contacts, *model.surfaces, *model.impacts, *model.components])
     check_labels(scope, "event", [*model.monitors, *model.schedules])
+    _made_labels(scope)
     check_labels(scope, "output", model.outputs)
     for output in model.outputs:
         check_identifier(scope, output, "output", output.name)
         if output.name in scope.all_names and output.expr.text != output.name:
             message = f"the output '{output.name}' has the name of something else, but is {output.expr.text}"
             scope.fail(output, message, "rename the output.")
+
+
+def _made_labels(scope: Scope) -> None:
+    """Report automata that contacts make, of lift-off, of copies and of tables, with the name of something else."""
+    model = scope.model
+    kinds: dict[str, tuple[Any, ...]] = {
+        "contact": model.contacts, "surface": model.surfaces, "impact": model.impacts, "component": model.components,
+        "monitor": model.monitors, "schedule": model.schedules, "input": model.inputs,
+    }  # fmt: skip
+    seen = {part.name: f"{kind} '{part.name}'" for kind, parts in kinds.items() for part in parts}
+    for contact, parts in zip(model.contacts, scope.made, strict=True):
+        for name in (part.name for part in parts if part.name != contact.name):
+            if name in seen:
+                message = (
+                    f"contact '{contact.name}' makes an automaton '{name}', which is the name of {seen[name]}"
+                )
+                scope.fail(contact, message, "rename one of them.")
+            seen.setdefault(name, f"an automaton of contact '{contact.name}'")
 
 
 def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> bool:

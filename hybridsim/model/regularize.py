@@ -11,6 +11,7 @@ from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, substitute
 from hybridsim.model.component import Choice, Component, Guard, Mode
 from hybridsim.model.contact import Contact
+from hybridsim.model.free_name import free_name, names_of_model
 from hybridsim.model.law import SPEED
 from hybridsim.model.quantities import Parameter
 from hybridsim.model.rate import inlined, rate_along
@@ -31,7 +32,8 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
         )
     if not any(contact.law.is_set_valued for contact in model.contacts):
         raise UsageError(f"the model '{model.name}' has no contact with a set-valued law to regularise")
-    name = _free_name(model, "v0")
+    taken = names_of_model(model)
+    name = free_name(taken, "v0")
     width = Parameter(name, parse(v0))
     changed = replace(model, parameters=(*model.parameters, width))
     value = changed.parameter_values()[name]
@@ -54,7 +56,7 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
     definitions = model.definitions
     if kind == "karnopp":
         definitions += tuple(
-            (_holding(c.name), _holding_force(model, c)) for c in model.contacts if c.law.is_set_valued
+            (_holding(model, c.name), _holding_force(model, c)) for c in model.contacts if c.law.is_set_valued
         )
     return replace(
         changed,
@@ -64,15 +66,6 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
         definitions=definitions,
         title=f"{model.title or model.name}, regularised by {kind}",
     )
-
-
-def _free_name(model: Model, wish: str) -> str:
-    taken = {p.name for p in model.parameters} | {i.name for i in model.inputs} | set(model.variables())
-    taken |= {s.name for s in model.states} | {d.name for d in model.discrete}
-    taken |= {name for name, _ in model.definitions}
-    while wish in taken:
-        wish += "_"
-    return wish
 
 
 def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
@@ -124,7 +117,7 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     left the band.
     """
     name, velocity, loaded = contact.name, contact.velocity, _loaded(model, contact)
-    held, limit, width = parse(_holding(name)), contact.limit_force(), parse(v0)
+    held, limit, width = parse(_holding(model, name)), contact.limit_force(), parse(v0)
     backward = _form("-velocity", velocity=velocity)
     parts = {"velocity": velocity, "v0": width, "held": held, "limit": limit}
     backward_limit = contact.limit_force(backward=True)
@@ -182,8 +175,8 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     return Component(name, modes, initial="stick", place=contact.place)
 
 
-def _holding(contact: str) -> str:
-    return f"{contact}_held"
+def _holding(model: Model, contact: str) -> str:
+    return free_name(names_of_model(model), f"{contact}_held")
 
 
 def _holding_force(model: Model, contact: Contact) -> Expression:

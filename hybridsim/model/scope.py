@@ -14,6 +14,7 @@ from hybridsim.model.declared import Declared
 from hybridsim.model.quantities import Output
 
 if TYPE_CHECKING:
+    from hybridsim.model.contact import Contact
     from hybridsim.model.model import Model
 
 
@@ -23,15 +24,21 @@ class Scope:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.errors: list[ModelError] = []
+        # the automata of each contact, by its number; none of one that could not be built
+        self.made = [self._made(contact) for contact in model.contacts]
         self.components = tuple(self._expanded())
+
+    def _made(self, contact: Contact) -> tuple[Component, ...]:
+        try:
+            return self.model.components_of(contact)
+        except ModelError as fault:
+            self.errors.append(fault)
+            return ()
 
     def _expanded(self) -> Iterator[Component]:
         """The components that could be built; a contact that could not is reported."""
-        for contact in self.model.contacts:
-            try:
-                yield from self.model.components_of(contact)
-            except ModelError as fault:
-                self.errors.append(fault)
+        for parts in self.made:
+            yield from parts
         yield from (surface.component() for surface in self.model.surfaces)
         yield from (impact.component() for impact in self.model.impacts)
         yield from self.model.components
@@ -59,12 +66,11 @@ class Scope:
             yield "definition", name, Declared(place=expr.place)
         for contact in model.contacts:
             yield "contact force", contact.name, contact
-        brought = {contact.name for contact in model.contacts}
-        own = len(model.surfaces) + len(model.impacts) + len(model.components)
-        for component in self.components[: len(self.components) - own]:
-            for name in component.variables:
-                if name not in brought:
-                    yield f"variable of contact {component.name}", name, component
+        for contact, parts in zip(model.contacts, self.made, strict=True):
+            for component in parts:
+                for name in component.variables:
+                    if name != contact.name:
+                        yield f"variable of contact {contact.name}", name, component
         for surface in model.surfaces:
             yield "switching surface", surface.name, surface
             for name in surface.above:

@@ -247,7 +247,12 @@ def watched(model: Model) -> Model:
             _speed(contact.name): f"abs{velocity}",
             _power(contact.name): f"{contact.name}*{velocity}",
         }
-        more += [Output(name, text) for name, text in texts.items() if name not in known]  # type: ignore[arg-type]  # made one
+        for name in known & texts.keys():
+            raise UsageError(
+                f"the output '{name}' has the name of a quantity of contact {contact.name} that is compared",
+                remedy="rename the output",
+            )
+        more += [Output(name, text) for name, text in texts.items()]  # type: ignore[arg-type]  # made one
     return replace(model, outputs=(*model.outputs, *more)) if more else model
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
+from hybridsim.model.free_name import free_name, names_of_model
 from hybridsim.model.law import SPEED
 
 _SPEED = parse("abs(u)")
@@ -71,16 +72,10 @@ def with_law(contact: Contact, law: FrictionLaw) -> Contact:
 
 def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
     """The model with more parameters, and the free name that each wish got."""
-    taken = {p.name for p in model.parameters} | {i.name for i in model.inputs} | set(model.variables())
-    taken |= {s.name for s in model.states} | {d.name for d in model.discrete}
-    taken |= {name for name, _ in model.definitions}
-    names = {}
+    taken, names = names_of_model(model), {}
     for wish in wishes:
-        name = wish
-        while name in taken:
-            name += "_"
-        taken.add(name)
-        names[wish] = name
+        names[wish] = free_name(taken, wish)
+        taken |= {names[wish]}
     more = tuple(Parameter(names[wish], value) for wish, value in wishes.items())  # type: ignore[arg-type]  # made an expression
     return replace(model, parameters=(*model.parameters, *more)), names
 

@@ -14,6 +14,7 @@ from hybridsim.engine.recent import system_of
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.expr import parse
 from hybridsim.model import Model, Monitor
+from hybridsim.model.free_name import free_name, names_of_model
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
@@ -111,10 +112,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
         raise UsageError(f"section is {section!r}", remedy="give an expression, or the name of a monitor")
     if section in {monitor.name for monitor in model.monitors}:
         return model, section
-    name = LEVEL
-    taken = {monitor.name for monitor in model.monitors} | {c.name for c in model.all_components()}
-    while name in taken:
-        name += "_"
+    name = free_name(names_of_model(model), LEVEL)
     monitor = Monitor(name, parse(section), direction="up")
     return replace(model, monitors=(*model.monitors, monitor)).validate(), name
 

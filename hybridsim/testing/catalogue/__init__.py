@@ -9,6 +9,7 @@ from hybridsim.testing.catalogue import (
     coincidences,
     contacts,
     corners,
+    curved_gaps,
     events,
     impacts,
     instants,
@@ -27,7 +28,7 @@ from hybridsim.testing.stories import with_stories
 # Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
 NONLINEAR = {
     "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
-    "drag", "circle-surface", "sliding-circle",
+    "drag", "circle-surface", "sliding-circle", "drum", "discs",
 }  # fmt: skip
 
 
@@ -50,6 +51,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             sliding,
             accumulation,
             impacts,
+            curved_gaps,
             stops,
             stiffness,
             stability,
