@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import assignment
-from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE
+from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, TIMED
 from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def _primitive(primitive: Primitive) -> str:
         COMPONENT: "two modes that agree where they change"
         + (f", those of {remark}" if remark != text else ""),
         SURFACE: f"it jumps, and switches with {remark}",
+        TIMED: f"a known signal, which changes where {remark} is zero",
         MODE: remark,
         KEPT: f"integrated as it stands, {remark}; exact and taylor refuse it",
         POWER: f"a fractional power, {remark}",

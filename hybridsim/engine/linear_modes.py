@@ -182,5 +182,5 @@ def refuse_nonlinear(system: System) -> None:
         raise UsageError(
             f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
             f"and {reason}",
-            remedy="choose taylor or dop853",
+            remedy="choose dop853" if system.has_corners else "choose taylor or dop853",
         )

@@ -12,7 +12,8 @@ from hybridsim.engine.elimination import eliminated
 from hybridsim.engine.held_states import HeldStates
 from hybridsim.engine.kept_rates import kept_rates, refuse_changed_rates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.nonlinear import nonlinear, refuse_powers
+from hybridsim.engine.nonlinear import refuse_powers
+from hybridsim.engine.products import Products
 from hybridsim.engine.program import Assign, Item, Switch, ordered
 from hybridsim.engine.program_names import declared_name, user
 from hybridsim.engine.second_order import Partner, attraction, partners
@@ -142,6 +143,8 @@ class Lowering:
         kind = self.model.inputs[index].kind
         c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
         d = self.s - c[4]
+        if kind == "step":
+            return c[0]
         if kind == "table" or (kind == "wave" and self.model.inputs[index].shape != "sine"):
             return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
         return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
@@ -285,19 +288,21 @@ class Lowering:
         all_unknown = set(unknown.values())
         blends = self._blends()
         rate: dict[int, Any] = {}
-        self.effect = effect = {}
+        effect: dict[tuple[int, int], Any] = {}
+        self.effect = effect
+        self.products = products = Products(self, unknown)
+        totals: dict[int, Any] = {}
         for c in order:
             s = surfaces[c]
-            total = self._rate_in_time(s)
+            totals[c] = self._rate_in_time(s)
             for x, d in zip(self.states, der, strict=True):
                 slope = sp.diff(s, x)
                 if slope != 0:
-                    total += slope * self._inline_unknown(d, definitions | blends, all_unknown)
-            for d in order:
-                effect[c, d] = simplified(sp.diff(total, unknown[d]))
-                if effect[c, d].free_symbols & all_unknown:
-                    raise nonlinear(self, c, d, effect[c, d].free_symbols & all_unknown)
-            rate[c] = total.subs(dict.fromkeys(all_unknown, 0))
+                    totals[c] += slope * self._inline_unknown(d, definitions | blends, all_unknown)
+        for c in order:
+            row = {d: simplified(sp.diff(totals[c], unknown[d])) for d in order}
+            row, rate[c] = products.linear(c, totals, row)
+            effect |= {(c, d): slope for d, slope in row.items()}
             self.effects.append(effect[c, c])
             if effect[c, c] == 0:
                 if not self.components[c].surface.unique:
@@ -315,15 +320,15 @@ class Lowering:
         if switching:
             refuse_powers(self, switching, self.open_rates)
         loads = normal_loads(self, unknown, definitions)
-        clusters = clusters_of(order, effect, loads)
-        items: list[Item] = []
+        clusters = clusters_of(order, effect, {*loads, *products.known})
+        items: list[Item] = products.items()
         for cluster in clusters:
             items += self._solve(cluster, unknown, rate, effect, loads)
         for c in order:
             if c in self.partners:
                 items.append(attraction(self, c, self.partners[c], effect))
             elif self.components[c].surface.unique:
-                pull = sp.Integer(-1) if c in self.never_held else -effect[c, c]
+                pull = sp.Integer(-1) if c in self.never_held else products.not_together(c, -effect[c, c])
                 items.append(Assign(user(ATTRACTION + self.components[c].surface.unknown), pull))
         return items, clusters
 
@@ -351,7 +356,7 @@ class Lowering:
         sp = self.sp
         items: list[Item] = []
 
-        branches = self._in_modes
+        branches = self.in_modes
         if len(cluster) == 1:
             c = cluster[0]
             if c in self.never_held:
@@ -371,6 +376,7 @@ class Lowering:
             for d in cluster:
                 by_mode = loads.get((c, d), {})
                 entry = partner.share(c, d, sp) if partner else effect[c, d]
+                entry = self.products.diagonal(c, entry) if c == d and not partner else entry
                 if entry == 0 and c != d and not by_mode:
                     continue
                 name = f"effect_{c}_{d}"
@@ -388,9 +394,7 @@ class Lowering:
             right[c] = sp.Symbol(f"right_{c}", real=True)
         return items + eliminated(cluster, unknown, matrix, right)
 
-    def _in_modes(
-        self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None
-    ) -> Switch:
+    def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
         """A name with one value in the holding mode; in the others another, or what they declare for the unknown.
 
         otherwise : by mode. without : values of names in what is declared.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.timepair import Instant, multiple
+from hybridsim.errors import ModelError
 from hybridsim.expr import evaluate
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class Signal:
         self._number = {name: evaluate(e, values) for name, e in declared.expressions.items()}
         if self.kind == "table":
             self._knots, self._coefficients = _table(declared)
+        elif self.kind == "step":
+            self._first, self._turns, self._period = step_turns(self._number, declared)
         elif self.kind == "wave" and self.shape != "sine":
             duty = self._number.get("duty", 0.5)
             square = ((0.0, 1.0, 0.0), (duty, -1.0, 0.0))
@@ -42,6 +45,8 @@ class Signal:
         """The six slots of the piece at `origin`: to its right, or to its left when time runs backward."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
+        if self.kind == "step":
+            return (self._step_value(origin, forward), 0.0, 0.0, 0.0, 0.0, 0.0)
         if self.kind == "chirp":
             return self._chirp_piece(origin, forward)
         if self.shape == "sine":
@@ -60,6 +65,8 @@ class Signal:
         if self.kind == "chirp":
             end = Instant(self._number["duration"])
             candidates = [Instant(0.0), end]
+        elif self.kind == "step":
+            candidates = [turn for turn, _ in self._step_turns(after)]
         elif self.shape == "sine":
             return None
         else:
@@ -68,6 +75,25 @@ class Signal:
         if not ahead_of:
             return None
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
+
+    def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
+        """The changes of a step near an instant, each with the value from then on."""
+        if self._period == 0.0:
+            return [(Instant(time), value) for time, value in self._turns]
+        k0 = math.floor(float(near) / self._period)
+        return [
+            (multiple(time, k, self._period), value)
+            for k in range(k0 - 2, k0 + 3)
+            for time, value in self._turns
+        ]
+
+    def _step_value(self, origin: Instant, forward: bool) -> float:
+        behind = [
+            turn
+            for turn in self._step_turns(origin)
+            if (turn[0].minus(origin) <= 0.0 if forward else turn[0].minus(origin) < 0.0)
+        ]
+        return max(behind, key=lambda turn: float(turn[0]))[1] if behind else self._first
 
     def _wave_knots(self, near: Instant) -> list[tuple[Instant, float, float]]:
         number = self._number
@@ -116,6 +142,41 @@ class Signal:
             turns, rate, bend_here = f0 * t + bend * t * t, f0 + 2 * bend * t, bend
         angle = number["phase"] + _TWO_PI * float(turns - round(turns))
         return (angle, _TWO_PI * float(rate), _TWO_PI * float(bend_here), number["amplitude"], 0.0, 0.0)
+
+
+def step_turns(
+    number: Mapping[str, float], declared: Input
+) -> tuple[float, list[tuple[float, float]], float]:
+    """The value of a step before all its changes, these with the values from then on, and their period (or 0).
+
+    Raises
+    ------
+    ModelError
+        Where what decides is zero at all times.
+    """
+    shift, rate, amplitude = number["shift"], number["rate"], number.get("amplitude")
+    if amplitude is None:
+        if rate:
+            return float(rate < 0.0), [(-shift / rate, float(rate > 0.0))], 0.0
+        amplitude, number = 0.0, {"phase": 0.0}
+    if rate == 0.0:
+        shift, amplitude = shift + amplitude * math.sin(number["phase"]), 0.0
+    if shift == amplitude == 0.0:
+        title = getattr(declared, "title", declared.name)
+        raise ModelError(
+            f"'{title}' is zero at all times: a condition on its sign has no meaning",
+            remedy="correct the numbers, or write the case that is meant",
+        )
+    if abs(shift) >= abs(amplitude):  # a wave that only touches zero changes nothing
+        return float(shift > 0.0), [], 0.0
+    # sin(phase + rate t) > -shift/amplitude between two angles, for a positive amplitude
+    low = math.asin(-shift / amplitude)
+    angles = ((low, float(amplitude > 0.0)), (math.pi - low, float(amplitude < 0.0)))
+    forward = rate > 0.0
+    turns = [((angle - number["phase"]) / rate, value if forward else 1.0 - value) for angle, value in angles]
+    period = _TWO_PI / abs(rate)
+    first, second = sorted((time % period, value) for time, value in turns)
+    return second[1], [first, second], period
 
 
 def _exact(instant: Instant) -> Fraction:

@@ -32,3 +32,13 @@ def with_names(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
     if isinstance(node, ast.Name):
         return parts.get(node.id, node)
     return rebuilt(node, lambda part: with_names(part, parts))
+
+
+def exchanged(node: ast.expr, old: ast.expr, new: ast.expr) -> ast.expr:
+    """The tree with all that reads as one part of it exchanged."""
+    text = ast.dump(old)
+
+    def change(part: ast.expr) -> ast.expr:
+        return new if type(part) is type(old) and ast.dump(part) == text else rebuilt(part, change)
+
+    return change(node)

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from hybridsim.expr.polynomial import Polynomial, difference, number_tree
-from hybridsim.expr.rebuild import rebuilt, with_names
+from hybridsim.expr.rebuild import exchanged, with_names
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import Sides, is_whole
 
@@ -39,7 +39,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr) -> Sides | None:
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id="sign"), args=[u]) if meanings.moves(u):
-                above, below = (_with(node, part, ast.Constant(value)) for value in (1, -1))
+                above, below = (exchanged(node, part, ast.Constant(value)) for value in (1, -1))
                 if is_continuous(meanings, u, above, below):
                     return u, above, below, above
     return None
@@ -55,13 +55,6 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
     powers = [p for p in parts if isinstance(p, ast.BinOp) and isinstance(p.op, ast.Pow)]
     bases += [power.left for power in powers if not is_whole(power.right, meanings)]
     return any(is_continuous(meanings, u, base, ast.Constant(0)) for u in borders for base in bases)
-
-
-def _with(node: ast.expr, old: ast.expr, new: ast.expr) -> ast.expr:
-    """A tree with all that reads as one part of it exchanged."""
-    if ast.dump(node) == ast.dump(old):
-        return new
-    return rebuilt(node, lambda part: _with(part, old, new))
 
 
 def _depends(p: Polynomial, name: str) -> bool:

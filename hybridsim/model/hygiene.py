@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import HybridsimError, Place
-from hybridsim.expr import Expression, parse
+from hybridsim.expr import Expression
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.force_signs import wrong_signs
 from hybridsim.model.meanings import Meanings
-from hybridsim.model.nonsmooth import JUMPS, KEPT, SURFACE, uses_primitives
+from hybridsim.model.nonsmooth import JUMPS, KEPT, uses_primitives
 from hybridsim.model.one_sided import names_of, never_negative, number_of
 from hybridsim.model.pulses import pulse_in
 from hybridsim.model.smoothing import smoothing_of
@@ -216,11 +217,9 @@ def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -
 
 def _of_pulses(model: Model) -> Iterator[Caution]:
     lookup = _Reading(model).lookup
-    primitives = smoothing_of(model).primitives if uses_primitives(model) else ()
-    met = {one.text for one in primitives if one.became == SURFACE}
     found: set[str] = set()
     for what, expr in _followed(model):
-        pulse = pulse_in(expr.tree, lookup, met)
+        pulse = pulse_in(expr.tree, lookup)
         if pulse is None or (text := ast.unparse(pulse)) in found:
             continue
         found.add(text)
@@ -255,16 +254,26 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
     if not uses_primitives(model):
         return
     meanings, states = Meanings(model), {state.name for state in model.states}
+    known = {TIME, *(signal.name for signal in model.inputs)}
     for one in smoothing_of(model).primitives:
-        is_watched = all(
-            where.startswith("monitor ") for where in one.where
-        )  # which is looked at, not integrated
-        is_jump = one.became == KEPT and one.remark.startswith(JUMPS) and not is_watched
-        if is_jump and names_of(meanings.written_out(parse(one.text).tree)) & states:
+        if one.became != KEPT or not one.remark.startswith(JUMPS):
+            continue
+        reason = one.remark.removeprefix(f"{JUMPS}: ")
+        what = f"'{one.text}' in {', '.join(one.where)}"
+        names = meanings.depended_on(re.findall(r"[A-Za-z_]\w*", one.text))
+        is_watched = all(where.startswith(("monitor ", "guard ")) for where in one.where)
+        if names & states and not is_watched:
             yield Caution(
-                f"'{one.text}' in {', '.join(one.where)} jumps inside a mode: it is integrated as it stands, and a "
+                f"{what} jumps inside a mode ({reason}): it is integrated as it stands, and a "
                 "motion that both sides drive back into the jump crawls",
                 one.place,
                 "write a sum of signs times what does not jump, or declare the surface with the fields on its sides "
                 '([surfaces.NAME] expr = "what changes its sign"), a dry friction as a contact ([contacts.NAME]).',
+            )
+        elif names & (states | known):
+            yield Caution(
+                f"{what} jumps inside a mode ({reason}): it is taken as it stands, and a step may pass over it",
+                one.place,
+                "give what decides as an input (a table or a wave, whose knots are stepped to) or as modes with "
+                "guards, or run with max_step at its width.",
             )

@@ -78,6 +78,7 @@ class Borders:
         self._switched = {name for component in components for name in component.variables}
         rates = {name for component in components for mode in component.modes for name in mode.der}
         self._changed = rates
+        self._rates = {state.name: state.der.tree for state in model.states}
         still = {state.name for state in model.states if not polynomial(state.der.tree)} - rates
         self._moving = {state.name for state in model.states} - still
         self._held = {*still, *(d.name for d in model.discrete), *(signal.name for signal in model.inputs)}
@@ -105,11 +106,20 @@ class Borders:
             return ""
         return "its border may stay at zero, as neither time nor a state with a rate moves it"
 
+    def is_only_passed(self, argument: ast.expr) -> bool:
+        """Whether no motion can stay on a border, as neither a force nor a jump acts on the rate of its function."""
+        names = names_of(self._meanings.written_out(argument)) & self._moving
+        if names & self._changed:
+            return False
+        rates = [self._meanings.written_out(self._rates[name]) for name in names]
+        return not any(names_of(rate) & self._switched or _jumps(rate) for rate in rates)
+
     def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
         """Why a border cannot be held beside those of a model's surfaces and of other jumps; empty if it can."""
-        if self.is_timed(argument):
+        if self.is_timed(argument) or self.is_only_passed(argument):
             return ""
         others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
+        others = [other for other in others if not self.is_only_passed(other)]
         rows = [self._slopes(other) for other in (*others, argument)]
         for other, row in zip(others, rows[:-1], strict=True):
             if row is not None and rows[-1] is not None and _rank([row, rows[-1]]) < 2:
@@ -139,6 +149,11 @@ class Borders:
     def is_timed(self, argument: ast.expr) -> bool:
         """Whether time alone moves a border."""
         return not names_of(self._meanings.written_out(argument)) & self._moving
+
+
+def _jumps(tree: ast.expr) -> bool:
+    """Whether anything in a tree may jump."""
+    return any(isinstance(part, ast.IfExp) or ast.unparse(part) == "sign" for part in ast.walk(tree))
 
 
 def _rank(rows: list[list[Fraction]]) -> int:
@@ -205,8 +220,8 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
     return with_names(parse("n*d - d*g*u + n*g*w").tree, dict(zip("ndg", signs, strict=True)))
 
 
-def multiplied(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
-    """Which signs do not enter linearly: they are multiplied with each other, or with a force, or stand in a function.
+def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
+    """Which signs do not enter linearly for given values of all others: they stand in a function, or in a power.
 
     trees: values of names, and rates, which have none. carried: signs and forces, by themselves, and what jumps with
     them.
@@ -223,9 +238,8 @@ def multiplied(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[
             continue
         for monomial in polynomial(tree):
             factors = [factor for factor, power in monomial for _ in range(power)]
-            single = [factor for factor in factors if factor in carried]
+            signs = [sign for factor in factors if factor in carried for sign in carried[factor]]
             words = {word for factor in factors if factor not in carried for word in _WORD.findall(factor)}
-            inside = words & carried.keys()
-            if inside or len(single) > 1:
-                found.update(*(carried[name] for name in {*single, *inside}))
+            found.update(*(carried[name] for name in words & carried.keys()))
+            found.update(sign for sign in signs if signs.count(sign) > 1)
     return found

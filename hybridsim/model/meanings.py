@@ -54,6 +54,13 @@ class Meanings:
             open_ |= (names_of(self.definitions[name]) & self.definitions.keys()) - found
         return found
 
+    def depended_on(self, names: Iterable[str]) -> set[str]:
+        """Names, and all that the definitions among them depend on."""
+        trees: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
+        return set().union(
+            *map(names_of, trees), *(names_of(self.definitions[name]) for name in self.reached(trees))
+        )
+
     def written_out(self, node: ast.expr) -> ast.expr:
         """A tree with its definitions put in."""
         inner = node

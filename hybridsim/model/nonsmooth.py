@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 # what became of a primitive
-COMPONENT, SURFACE, MODE, KEPT, POWER = "component", "surface", "mode", "kept", "power"
+COMPONENT, SURFACE, MODE, KEPT, POWER, TIMED = "component", "surface", "mode", "kept", "power", "signal"
 JUMPS = "it jumps, as far as its form shows"  # how the reason begins to keep a primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
@@ -41,8 +41,9 @@ class Primitive:
     where : the rates, guards, definitions and variables that use it.
     became : "component" (it switches like a component of two modes), "surface" (it jumps, and is the sign of a
         switching surface or, in time, of a component), "mode" (the modes of a component imply its side), "kept"
-        (integrated as it stands), "power" (a fractional power, which has no series at zero).
-    remark : the component, or the reason.
+        (integrated as it stands), "power" (a fractional power, which has no series at zero), "signal" (time alone
+        decides on it, at instants that are known beforehand).
+    remark : the component, the reason, or what changes its sign in time.
     """
 
     text: str
@@ -60,6 +61,11 @@ def uses_primitives(model: Model) -> bool:
 def uses_sign(model: Model) -> bool:
     """Whether anything that is integrated or watched has a sign in it."""
     return any("sign" in expr.text for expr in _expressions(model))
+
+
+def uses_conditions(model: Model) -> bool:
+    """Whether anything that is integrated or watched has a condition in it."""
+    return any(" if " in expr.text for expr in _expressions(model))
 
 
 def has_word(expr: Expression) -> bool:
@@ -82,17 +88,18 @@ def _expressions(model: Model) -> Iterator[Expression]:
     yield from (monitor.expr for monitor in model.monitors)
 
 
-def limited(node: ast.expr, meanings: Meanings) -> ast.expr | None:
-    """The first part of a tree without a value beyond some border: a root, a logarithm, a fractional power."""
+def limited(node: ast.expr, meanings: Meanings) -> Iterator[ast.expr]:
+    """What stands in the parts of a tree that have no value beyond some border: in roots, logarithms, powers."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _LIMITED:
-                if meanings.moves(argument):
-                    return part
+                if meanings.moves(argument) and not (
+                    name in ("sqrt", "log") and is_clear_of_zero(argument, {}, meanings)
+                ):
+                    yield argument
             case ast.BinOp(left=base, op=ast.Pow(), right=exponent) if meanings.moves(base):
-                if not is_whole(exponent, meanings):
-                    return part
-    return None
+                if not is_whole(exponent, meanings) and not is_clear_of_zero(base, {}, meanings):
+                    yield base
 
 
 def roots_in(expr: Expression, meanings: Meanings) -> Iterator[tuple[ast.expr, ast.expr, str]]:

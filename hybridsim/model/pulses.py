@@ -1,36 +1,28 @@
-"""Parts of an expression that are pulses or steps in plain time: what an integrator can step over without a trace."""
+"""Parts of an expression that are pulses or smooth steps in plain time, which an integrator can step over."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Set
 
 from hybridsim.expr.grammar import TIME
-from hybridsim.expr.write import write
 from hybridsim.model.one_sided import Lookup
 
 # Degree in t of what is no polynomial in it.
 _CURVED = 9
 
 
-def pulse_in(node: ast.expr, lookup: Lookup, met: Set[str]) -> ast.expr | None:
-    """The first part that is a pulse or a step in t, or None. met: texts of steps that a run meets.
+def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
+    """The first part that is a pulse or a smooth step in t, or None.
 
-    These are: exp of a bend in t, division by one, its negative powers, tanh, atan and sign of t, a condition on t.
-    Polynomials in t and periodic functions of linear angles are none.
+    These are: exp of a bend in t, division by one, its negative powers, tanh and atan of t. Polynomials in t and
+    periodic functions of linear angles are none; conditions on t are met, or told of as jumps.
     """
     match node:
         case ast.Name(id=name) if (tree := lookup(name)) is not None:
-            return pulse_in(tree, lookup, met)
-        case ast.IfExp() | ast.Call() if write(node) in met:
-            pass
-        case ast.IfExp(test=test) if _uses_time(test, lookup):
-            return node
+            return pulse_in(tree, lookup)
         case ast.Call(func=ast.Name(id="exp"), args=[argument]) if degree_in_time(argument, lookup) > 1:
             return node
-        case ast.Call(func=ast.Name(id="tanh" | "atan" | "sign"), args=[argument]) if degree_in_time(
-            argument, lookup
-        ):
+        case ast.Call(func=ast.Name(id="tanh" | "atan"), args=[argument]) if degree_in_time(argument, lookup):
             return node
         case ast.BinOp(op=ast.Div(), right=divisor) if degree_in_time(divisor, lookup) > 1:
             return node
@@ -39,7 +31,7 @@ def pulse_in(node: ast.expr, lookup: Lookup, met: Set[str]) -> ast.expr | None:
         ):
             return node
     for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.expr) and (found := pulse_in(part, lookup, met)) is not None:
+        if isinstance(part, ast.expr) and (found := pulse_in(part, lookup)) is not None:
             return found
     return None
 

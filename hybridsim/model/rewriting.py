@@ -12,7 +12,9 @@ from hybridsim.errors import Place
 from hybridsim.expr import parse
 from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
+from hybridsim.model.conditions import TooManyConditions, single_comparisons
 from hybridsim.model.continuity import has_root_beside_sign, is_continuous, sides_of_product
+from hybridsim.model.hoisting import jump_inside, resolved
 from hybridsim.model.jumps import SIGN, Borders, Jump, product_of_signs
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.nonsmooth import (
@@ -22,20 +24,24 @@ from hybridsim.model.nonsmooth import (
     MODE,
     POWER,
     SURFACE,
+    TIMED,
     Primitive,
     Sides,
     is_clear_of_zero,
     is_whole,
     limited,
     sides_of,
+    uses_conditions,
     uses_sign,
 )
 from hybridsim.model.one_sided import names_of, never_negative, number_of
+from hybridsim.model.steps_in_time import STEP, TimeStep, step_of
 from hybridsim.model.switching import blend
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
+_EITHER = parse("p*a + (1 - p)*b").tree
 WATCHED = "a guard, a monitor or another corner hangs on it"
 VARIABLE = "__corner_"  # names of a model do not begin with two underscores
 
@@ -44,7 +50,9 @@ VARIABLE = "__corner_"  # names of a model do not begin with two underscores
 class Here:
     """Where a tree stands: in words, the signs that its mode implies, why nothing is to be replaced (or empty).
 
-    jumps: why what jumps is left as it stands; empty in a rate, along whose jumps a motion may slide.
+    jumps: why what jumps where a state comes to a border is left as it stands; empty in a rate, along whose jumps a
+    motion may slide. is_passing: whether borders that a motion only crosses are taken nevertheless. times: why what
+    jumps in time alone is a known signal, and no component; empty in a rate.
     """
 
     where: str
@@ -52,6 +60,8 @@ class Here:
     signs: Mapping[Family, int] = field(default_factory=dict)
     untouched: str = ""
     jumps: str = WATCHED
+    is_passing: bool = False
+    times: str = WATCHED
 
 
 @dataclass
@@ -72,6 +82,7 @@ class Rewriting:
     refusal : why no corner or jump is to become a component, if so.
     refused : why those at some borders are not to.
     shared : borders at which there are jumps and corners.
+    timed : borders in time that are known signals wherever they stand, as they stand in a contact or a guard.
     """
 
     def __init__(
@@ -80,14 +91,27 @@ class Rewriting:
         refusal: str = "",
         refused: Mapping[Family, str] = MappingProxyType({}),
         shared: Set[Family] = frozenset(),
+        timed: Set[Family] = frozenset(),
     ) -> None:
-        self.model, self.refusal, self.refused, self.shared = model, refusal, refused, shared
+        self.model, self.refusal, self.refused, self.shared, self.timed = (
+            model,
+            refusal,
+            refused,
+            shared,
+            timed,
+        )
         self.meanings = Meanings(model)
         self.borders, self._has_sign = Borders(model, self.meanings), uses_sign(model)
+        self.has_jumps = self._has_sign or uses_conditions(model)
+        self._parameters = {parameter.name for parameter in model.parameters}
         self.components = model.all_components()
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}
         self.jumps: dict[Family, Jump] = {}
+        self.steps: dict[
+            Family, tuple[TimeStep, int]
+        ] = {}  # with the sign of what is above zero in its family
+        self._known_signs: dict[frozenset[tuple[Family, int]], Mapping[Family, int]] = {}
         self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
         self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
         self.count = 0
@@ -105,12 +129,15 @@ class Rewriting:
         """
         if not self.meanings.moves(node):
             return node
-        key = (id(node), id(here.signs), here.where, here.untouched, here.jumps)
+        key = (id(node), id(here.signs), here.where, here.untouched, here.jumps, here.times)
         if key not in self._walked:
             self._walked[key] = node, here, self._walk(node, here)  # kept alive, as their numbers are the key
         return self._walked[key][-1]
 
     def _walk(self, node: ast.expr, here: Here) -> ast.expr:
+        is_choice = isinstance(node, ast.IfExp) or ast.unparse(node).startswith("sign(")
+        if not is_choice and (border := jump_inside(self, node, here)):
+            return self._hoisted(node, border, here)
         match node:
             case ast.Call(func=ast.Name(id="min" | "max" as name), args=[first, second, third, *others]):
                 inner = ast.Call(node.func, [first, second], [])
@@ -125,6 +152,12 @@ class Rewriting:
                 here = self._note_power(node, base, here, exponent)
             case ast.BoolOp() | ast.Compare():
                 return node
+            case ast.IfExp() if self.meanings.moves(node.test):
+                if (taken_apart := self._taken_apart(node, here)) is not node:
+                    return taken_apart
+            case ast.Call(func=ast.Name(id="sign"), args=[argument]) if self.meanings.moves(argument):
+                if (of_sign := self._sign_taken_apart(argument, here)) is not None:
+                    return of_sign
             case ast.BinOp(op=ast.Mult() | ast.Div()) if self._has_sign:
                 if has_root_beside_sign(self.meanings, node):
                     here = replace(here, jumps=here.jumps or "the root beside it is zero there")
@@ -134,7 +167,7 @@ class Rewriting:
         if parts is not None and self.meanings.moves(parts[0]):
             return self._side(node, parts, here)
         if isinstance(node, ast.IfExp) and self.meanings.moves(node.test):
-            return self._kept(node, "its condition is no single comparison by < or >", here)
+            return self._kept(node, f"{JUMPS}: its condition is an equality", here)
         changed: list[bool] = []
 
         def change(part: ast.expr) -> ast.expr:
@@ -144,6 +177,56 @@ class Rewriting:
 
         new = rebuilt(node, change)
         return new if any(changed) else node
+
+    def _taken_apart(self, node: ast.IfExp, here: Here) -> ast.expr:
+        """What a conditional becomes whose condition is no single comparison; the node itself where it is one."""
+        try:
+            single = single_comparisons(self.meanings, node)
+        except TooManyConditions:
+            return self._kept(node, f"{JUMPS}: its condition has too many comparisons", here)
+        return node if single is node else self.walk(single, here)
+
+    def _sign_taken_apart(self, argument: ast.expr, here: Here) -> ast.expr | None:
+        """What the sign of something that is not smooth becomes; None for one that is smooth."""
+        minus = ast.UnaryOp(ast.USub(), ast.Constant(1))
+        node = ast.IfExp(ast.Compare(argument, [ast.Gt()], [ast.Constant(0)]), ast.Constant(1), minus)
+        if self.never_negative(argument) or self._owner(self.meanings.family(argument)[0]) is not None:
+            return None
+        found = self._taken_apart(node, here)
+        return None if found is node else found
+
+    def _hoisted(self, node: ast.expr, border: ast.expr, here: Here) -> ast.expr:
+        """An expression that a jump does not enter linearly, as the jump between its values on the sides."""
+        whole = self.meanings.written_out(node)
+        made = ast.IfExp(ast.Compare(border, [ast.Gt()], [ast.Constant(0)]), whole, whole)
+        return self._side(made, (border, whole, whole, whole), here)
+
+    def is_smooth(self, argument: ast.expr) -> bool:
+        """Whether a border has neither corners nor jumps, as far as its form shows."""
+        parts = ast.walk(self.meanings.written_out(argument))
+        return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
+
+    def is_open(self, family: Family, argument: ast.expr, here: Here) -> bool:
+        """Whether a surface may stand for what jumps at a border, where a tree stands."""
+        return bool(
+            family
+            and not self.never_negative(argument)
+            and self._owner(family) is None
+            and not self.borders.is_timed(argument)
+            and not self._left(family, argument, here)
+        )
+
+    def _left(self, family: Family, argument: ast.expr, here: Here) -> str:
+        """Why what jumps at a border is left as it stands; empty if it is not."""
+        reason = here.jumps
+        if here.is_passing and self.borders.is_only_passed(argument):
+            reason = ""
+        return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
+
+    def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
+        """The signs known beside that of a family."""
+        known = {**here.signs, family: sign}
+        return self._known_signs.setdefault(frozenset(known.items()), known)
 
     def _note_power(
         self, node: ast.expr, base: ast.expr, here: Here, exponent: ast.expr | None = None
@@ -160,15 +243,26 @@ class Rewriting:
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
         """What a primitive becomes: one of its sides, or a variable that is set to the one that holds."""
         argument, above, below, at_zero = parts
+        if here.signs and not self.is_smooth(argument):
+            argument = resolved(self.meanings, argument, here.signs)
         branches = (above, below) if isinstance(node, ast.IfExp) else ()
         forced = names_of(node) & self.meanings.forced
         family, sign = self.meanings.family(argument)
         if not family:
             return self.walk((below, at_zero, above)[sign + 1], here)
+        agrees = self.agrees(node, parts)
+        if family in here.signs and not agrees:
+            return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
+        if self._is_step(family, argument, here, agrees) and (step := self._step(family, argument)):
+            return self._stepped(node, step, parts, family, sign, here)
         if here.untouched:
-            return self._kept(node, here.untouched, here)
-        if any(limited(self.meanings.written_out(branch), self.meanings) for branch in branches):
-            return self._kept(node, "one of its sides has no value beyond its border", here)
+            return self._kept(node, here.untouched if agrees else f"{JUMPS}: {here.untouched}", here)
+        if any(
+            self._is_limited(side, argument, family, s)
+            for side, s in zip(branches, (sign, -sign), strict=False)
+        ):
+            reason = "one of its sides has no value beyond its border"
+            return self._kept(node, reason if agrees else f"{JUMPS}: {reason}", here)
         if family in here.signs:
             return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
         if self.never_negative(argument):
@@ -179,16 +273,18 @@ class Rewriting:
             sides = [self.walk(part, here) for part in (below, at_zero, above)]
             values = tuple(sides[signs[family] * sign + 1] for signs in self.signs[owner])
             return self._variable(self.implied.setdefault(owner, {}), values)
+        if not agrees:
+            return self._jump(node, (argument, above, below, at_zero), family, sign, here)
         if forced:
             return self._kept(
                 node, f"it depends on {', '.join(sorted(forced))}, which a mode solves for", here
             )
-        if not self._agrees(node, parts):
-            return self._jump(node, parts, family, sign, here)
         if self.refusal:
             return self._kept(node, self.refusal, here)
-        here = replace(here, jumps=WATCHED)
-        pair = (self.walk(above, here), self.walk(below, here))
+        if isinstance(node, ast.IfExp) and (border := jump_inside(self, node, here)):
+            return self._hoisted(node, border, here)
+        here = replace(here, jumps=WATCHED, is_passing=False)
+        pair = self._pair(above, below, family, sign, here)
         if family in self.shared:
             jump = self._jump_at(family, argument, sign)
             self.note(node, MODE, f"its side follows from the modes of {jump.name}", here)
@@ -200,21 +296,72 @@ class Rewriting:
         self.note(node, COMPONENT, found.name, here)
         return self._variable(found.values, pair if sign == found.sign else pair[::-1])
 
+    def _pair(
+        self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
+    ) -> tuple[ast.expr, ast.expr]:
+        """Both sides rewritten, each where the sign of the border is known."""
+        sides = ((above, sign), (below, -sign))
+        first, second = (self.walk(t, replace(here, signs=self._signs(here, family, s))) for t, s in sides)
+        return first, second
+
+    def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
+        """Whether a side may have no value beyond the border: a root of something that the border depends on, too."""
+        border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
+        side = resolved(self.meanings, branch, {family: sign})
+        return any(names_of(base) & border for base in limited(side, self.meanings))
+
+    def _is_step(self, family: Family, argument: ast.expr, here: Here, agrees: bool) -> bool:
+        """Whether a known signal stands for a condition on time alone here."""
+        wanted = here.untouched or (here.times and not agrees) or family in self.timed
+        return bool(wanted) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
+
+    def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
+        """The signal of a border in time; None where its zeros are not known beforehand."""
+        if family not in self.steps:
+            tree = self.meanings.written_out(argument)
+            found = step_of(f"{STEP}{len(self.steps) + 1}", tree, self._parameters, write(argument))
+            if found is None:
+                return None
+            self.steps[family] = found, self.meanings.family(argument)[1]
+            self.count += 1
+        return self.steps[family][0]
+
+    def timed_by_form(self) -> set[Family]:
+        """The borders of jumps and corners in time alone for which signals can stand."""
+        found = {family: one.argument for family, one in self.jumps.items()}
+        found |= {family: one.argument for family, one in self.corners.items()}
+        return {f for f, border in found.items() if self.borders.is_timed(border) and self._step(f, border)}
+
+    def _stepped(
+        self, node: ast.expr, step: TimeStep, parts: Sides, family: Family, sign: int, here: Here
+    ) -> ast.expr:
+        """What a condition on time alone becomes: its sides, each times the signal that is 1 while it holds."""
+        self.note(node, TIMED, step.title, here)
+        pair = self._pair(parts[1], parts[2], family, sign, here)
+        pair = pair if sign == self.steps[family][1] else pair[::-1]
+        names = {"a": pair[0], "b": pair[1], "p": ast.Name(step.name, ast.Load())}
+        return with_names(_EITHER, names)
+
     def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
         """What a primitive becomes whose sides differ."""
         argument, above, below, _ = parts
-        reason = here.jumps or self.refusal or self.refused.get(family, "") or self._border(family, argument)
+        if self.borders.is_timed(argument):
+            reason = (
+                here.times or self.refusal or self.refused.get(family, "") or self._border(family, argument)
+            )
+        else:
+            reason = self._left(family, argument, here)
         if reason:
             return self._kept(node, f"{JUMPS}: {reason}", here)
         jump = self._jump_at(family, argument, sign)
-        self.note(node, SURFACE, jump.name, here)
+        is_whole = isinstance(node, ast.IfExp) and node.body is node.orelse  # made of what jumps inside
+        self.note(above if is_whole else node, SURFACE, jump.name, here)
         if isinstance(node, ast.Call):
             return jump.signed(sign)
         for nested, other, way in ((above, below, 1), (below, above, -1)):
             if stairs := self._stairs(jump, argument, nested, other, way, here):
                 return stairs
-        inside = replace(here, jumps="it stands in a branch of another jump")
-        pair = (self.walk(above, inside), self.walk(below, inside))
+        pair = self._pair(above, below, family, sign, here)
         pair = pair if sign == jump.sign else pair[::-1]
         name = self._variable(jump.values, (*pair, blend(*pair, jump.unknown)))
         jump.blended.add(name.id)
@@ -256,10 +403,14 @@ class Rewriting:
             self.jumps[family] = Jump(name, f"{SIGN}{self.count}", argument, sign, timed)
         return self.jumps[family]
 
-    def _agrees(self, node: ast.expr, parts: Sides) -> bool:
+    def agrees(self, node: ast.expr, parts: Sides) -> bool:
+        """Whether the sides of a primitive have one value on its border, as far as its form shows."""
         argument, above, below, _ = parts
         if isinstance(node, ast.IfExp):
-            return is_continuous(self.meanings, argument, above, below)
+            family, sign = self.meanings.family(argument)
+            sides = ((above, sign), (below, -sign))
+            first, second = (resolved(self.meanings, tree, {family: s}) for tree, s in sides)
+            return is_continuous(self.meanings, argument, first, second)
         return not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "sign")
 
     def _owner(self, family: Family) -> int | None:
@@ -297,6 +448,8 @@ class Rewriting:
         return title
 
     def note(self, node: ast.expr, became: str, remark: str, here: Here) -> None:
+        if not here.where:
+            return
         where, _ = self._accounts.setdefault((write(node), became, remark), ([], here.place))
         if here.where not in where:
             where.append(here.where)

@@ -3,8 +3,8 @@
 `abs`, `min`, `max` and conditionals whose branches agree where they change are corners. Where the mode of a component
 implies the side that holds (v >= 0 in slip+), that side is put in. Any other corner gets a component of two modes which
 changes its mode where the argument passes through zero; both modes have one value there. A jump (`sign`, a conditional
-whose branches differ) in a rate is a switching surface (`hybridsim.model.jumps`); elsewhere, and where it enters no
-rate linearly, it is left as it stands.
+whose branches differ) is a switching surface (`hybridsim.model.jumps`), or a signal where time alone decides on it
+(`hybridsim.model.steps_in_time`); where neither can be, it is left as it stands.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression, of_tree, parse
-from hybridsim.model.component import Component, Corner, Guard, Mode
+from hybridsim.model.component import Component, Corner, Guard, Mode, Surface
 from hybridsim.model.frozen_map import FrozenMap
-from hybridsim.model.jumps import multiplied
+from hybridsim.model.jumps import not_linear
 from hybridsim.model.meanings import Family
 from hybridsim.model.nonsmooth import MODE, Primitive, sides_of, uses_primitives
 from hybridsim.model.rewriting import WATCHED, Found, Here, Rewriting
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 # Each event judges all components again, and compiled loops keep tables of the combinations of modes that they meet.
 MOST = 8
+IN_VELOCITY = "it is part of a relative velocity"
+IN_MODE = "it stands in a mode of a component"
 
 
 @dataclass(frozen=True)
@@ -55,16 +57,25 @@ def smoothing_of(model: Model) -> Smoothed:
     """The same with an account of every primitive that is not smooth, fractional powers included."""
     if model.flow is not None:
         return Smoothed(model, ())
-    work = Rewriting(model)
-    result, crooked = _Smoothing(model, work).run()
-    while crooked or not work.shared >= work.corners.keys() & work.jumps.keys():
-        refused = {**work.refused, **dict.fromkeys(crooked, "it does not enter the rates linearly")}
-        shared = (work.shared | (work.corners.keys() & work.jumps.keys())) - refused.keys()
-        work = Rewriting(model, "", refused, shared)
+    refused: dict[Family, str] = {}
+    shared: frozenset[Family] = frozenset()
+    timed: frozenset[Family] = frozenset()
+    while True:
+        work = Rewriting(model, "", refused, shared, timed)
         result, crooked = _Smoothing(model, work).run()
+        both = (work.corners.keys() & work.jumps.keys()) - shared
+        in_time = (work.steps.keys() & {*work.jumps, *work.corners}) - timed
+        if len(work.corners) + len(work.jumps) > MOST:  # a signal does not count among them
+            in_time |= work.timed_by_form() - timed
+        if not (crooked or both or in_time):
+            break
+        refused |= dict.fromkeys(crooked, "it does not enter the rates linearly")
+        shared, timed = (shared | both) - refused.keys(), timed | in_time
     count = len(work.corners) + len(work.jumps)
     if count > MOST:
-        work = Rewriting(model, f"the model has {count} corners and jumps, more than {MOST}")
+        work = Rewriting(
+            model, f"the model has {count} corners and jumps, more than {MOST}", {}, frozenset(), timed
+        )
         result, _ = _Smoothing(model, work).run()
     return Smoothed(result, work.primitives())
 
@@ -87,23 +98,31 @@ class _Smoothing:
         surfaces = [c.surface.function.tree for c in self.components if c.surface]
         velocities = self.meanings.reached(surfaces)
         states = tuple(
-            replace(state, der=self._rewritten(state.der, Here(f"state {state.name}", state.place, jumps="")))
+            replace(
+                state,
+                der=self._rewritten(state.der, Here(f"state {state.name}", state.place, jumps="", times="")),
+            )
             for state in model.states
         )
         components = [self._component(c) for c in range(len(self.components))]
         monitors = tuple(
-            replace(monitor, expr=self._watched(monitor.expr, Here(f"monitor {monitor.name}", monitor.place)))
+            replace(
+                monitor,
+                expr=self._watched(monitor.expr, Here(f"monitor {monitor.name}", monitor.place, jumps="")),
+            )
             for monitor in model.monitors
         )
         wanted = self.meanings.reached((*self._integrated(), *self._watched_trees()))
-        rates = self.meanings.reached(state.der.tree for state in model.states)
-        rates -= self.meanings.reached(self._of_modes())
+        of_modes = self.meanings.reached(self._of_modes())
+        outside = self.meanings.reached(self._watched_trees()) | of_modes
         definitions = []
         for name, expr in model.definitions:
-            reason = "it is part of a relative velocity" if name in velocities else ""
-            here = Here(
-                f"definition {name}", expr.place, untouched=reason, jumps="" if name in rates else WATCHED
-            )
+            where = f"definition {name}"
+            here = Here(where, expr.place, jumps="", times=WATCHED if name in outside else "")
+            if name in velocities:
+                here = replace(here, untouched=IN_VELOCITY)
+            elif name in of_modes:
+                here = replace(here, jumps=IN_MODE, is_passing=True)
             definitions.append((name, self._rewritten(expr, here) if name in wanted else expr))
         if not self.work.count and not self.work.corners:
             return model, []
@@ -118,6 +137,7 @@ class _Smoothing:
             surfaces=(),
             impacts=(),
             monitors=monitors,
+            inputs=(*model.inputs, *(step for step, _ in self.work.steps.values())),
         )
         return result, self._crooked(result)
 
@@ -148,7 +168,7 @@ class _Smoothing:
             for mode in component.modes:
                 trees += [("", expr.tree) for expr in mode.der.values()]
                 trees += [(name, expr.tree) for name, expr in mode.set.items()]
-        found = multiplied(trees, carried) if jumps else set()
+        found = not_linear(trees, carried) if jumps else set()
         return [family for family, jump in jumps.items() if jump.unknown in found]
 
     def _component(self, c: int) -> Component:
@@ -156,12 +176,26 @@ class _Smoothing:
         modes = []
         for mode, signs in zip(component.modes, self.signs[c], strict=True):
             where, place = f"mode {mode.name} of {component.name}", mode.place or component.place
-            here = Here(where, place, signs, jumps="it stands in a mode of a component")
+            here = Here(where, place, signs, jumps=IN_MODE, is_passing=True)
             guards = tuple(self._guards(component, mode, signs))
             der = {name: self._rewritten(expr, here) for name, expr in mode.der.items()}
             values = {name: self._rewritten(expr, here) for name, expr in mode.set.items()}
             modes.append(replace(mode, guards=guards, der=FrozenMap(der), set=FrozenMap(values)))
-        return replace(component, modes=tuple(modes))
+        return replace(component, modes=tuple(modes), surface=self._surface(component))
+
+    def _surface(self, component: Component) -> Surface | None:
+        """Its surface with what jumps in time alone as signals."""
+        surface = component.surface
+        if surface is None:
+            return None
+        here = Here("", component.place, untouched=IN_VELOCITY)  # its modes tell of what is kept
+        return replace(
+            surface,
+            function=self._rewritten(surface.function, here),
+            jump_above=self._rewritten(surface.jump_above, here),
+            jump_below=self._rewritten(surface.jump_below, here),
+            restitution=surface.restitution and self._rewritten(surface.restitution, here),
+        )
 
     def _guards(self, component: Component, mode: Mode, signs: Mapping[Family, int]) -> Iterator[Guard]:
         surface = component.surface
@@ -172,7 +206,8 @@ class _Smoothing:
                 f"guard {guard.name} of mode {mode.name} of {component.name}",
                 guard.place or component.place,
                 {other: sign for other, sign in signs.items() if other != family},
-                "it is part of a relative velocity" if is_side else "",
+                IN_VELOCITY if is_side else "",
+                jumps="",
             )
             if (
                 not is_side

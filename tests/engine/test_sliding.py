@@ -296,13 +296,42 @@ def test_modes_that_push_against_each_other_are_told_of_surfaces() -> None:
     assert "[surfaces.NAME]" in solution.message
 
 
-def test_unknowns_that_multiply_are_refused_by_name() -> None:
-    with pytest.raises(
-        ModelError, match=r"u and w multiply each other in the rate of the switching function 'x'"
-    ):
-        run(HELPING.replace("-u - 2*w", "-u*w"), 1.0)
+def test_a_power_of_an_unknown_is_refused_by_name() -> None:
     with pytest.raises(ModelError, match="u enters the rate of the switching function 'x' nonlinearly"):
         run(HELPING.replace("-u - 2*w", "-u**3"), 1.0)
+
+
+def test_unknowns_that_multiply() -> None:
+    """x' = -u w and y' = -2 u - w from (0, 0): of all sides and slidings only u = 1, w = -1 leads where it holds."""
+    solution = run(HELPING.replace("-u - 2*w", "-u*w"), 1.0)
+    assert solution.success and solution(1.0) == pytest.approx([1.0, -1.0], abs=1e-14)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
+def test_sliding_on_a_surface_whose_effect_another_switches(integrator: str) -> None:
+    """x' = -u w, y' = 1 for y < 3, then -1: x is drawn to zero while w = 1 alone, and leaves when y comes back."""
+    text = """
+    [states]
+    x = { start = -1, der = "-u*w" }
+    y = { start = -1, der = "1 if t < 4 else -1" }
+
+    [surfaces]
+    u = "x"
+    w = "y"
+    """
+    solution = run(text, 10.0, integrator=integrator)
+    # away from zero up to t = 1, back at t = 3, held up to y = 0 at t = 7; then both sides lead away
+    assert solution(1.0)[0] == pytest.approx(-2.0, abs=1e-9)
+    assert [solution(t)[0] for t in (3.0, 5.0, 6.9)] == pytest.approx([0.0] * 3, abs=1e-9)
+    assert solution.status == "nonunique" and solution.t[-1] == pytest.approx(7.0, abs=1e-9)
+
+
+def test_where_factors_meet_the_motion_is_not_unique() -> None:
+    """x' = -u w, y' = -w u: once both are at zero, and both are drawn there, no sides and no single sliding go on."""
+    text = '[states]\nx = { start = 1, der = "-u*w" }\ny = { start = 1, der = "-u*w" }\n[surfaces]\nu = "x"\nw = "y"\n'
+    solution = run(text, 3.0)
+    assert solution.t[-1] == pytest.approx(1.0, abs=1e-12)
+    assert solution.status in ("inconsistent", "nonunique")
 
 
 def test_a_contact_and_a_relay_in_one_cluster() -> None:

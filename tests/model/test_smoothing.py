@@ -63,7 +63,6 @@ def test_definitions_are_seen_through() -> None:
         ("1 if x > 0 else 0", SURFACE),
         ("k if x > g else -k", SURFACE),
         ("1 if t > g else 0", SURFACE),
-        ("x if x > 0 and v > 0 else 0", KEPT),
         ("sign(x)", SURFACE),
         ("sign(v)*v**2", COMPONENT),
         ("sqrt(x) if x > 0 else 0", KEPT),

@@ -120,7 +120,8 @@ def test_corners_on_a_side_are_taken_care_of() -> None:
 
 
 def test_a_sign_in_a_rate_is_told_of_surfaces() -> None:
-    (caution,) = warnings_of(read('[states]\nx = { start = 1, der = "-sign(x)*exp(sign(x))" }\n'))
-    assert "'sign(x)' in state x jumps inside a mode" in caution.message
+    relay = '[modes.a]\nset = { w = "sign(x)" }\n'
+    (caution,) = warnings_of(read('[states]\nx = { start = 1, der = "-w" }\n' + relay))
+    assert "'sign(x)' in mode a of mode jumps inside a mode" in caution.message
     assert "[surfaces.NAME]" in caution.remedy and "[contacts.NAME]" in caution.remedy
     assert not warnings_of(read(STATES + '[surfaces]\nu = "x + v"\n'))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from hybridsim.testing.catalogue import (
     accumulation,
     coincidences,
+    conditions,
     contacts,
     corners,
     curved_gaps,
@@ -45,6 +46,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             coincidences,
             instants,
             corners,
+            conditions,
             oscillators,
             contacts,
             thresholds,

@@ -1,0 +1,79 @@
+"""A condition on time alone as a known signal: 1 while it holds, 0 while it does not, with its changes as knots.
+
+In a rate a component stands for such a condition, since a run goes over it without a pause. In the velocity of a
+contact, a load, a law, a gap or a guard it is a signal, so that its jumps are those of an input.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Set
+from dataclasses import dataclass
+
+from hybridsim.expr import Expression, of_tree, parse
+from hybridsim.expr.grammar import TIME
+from hybridsim.expr.polynomial import difference
+from hybridsim.expr.rebuild import exchanged, with_names
+from hybridsim.model.inputs import Input
+from hybridsim.model.one_sided import names_of
+
+STEP = "__step_"  # begins the name of a signal; names of a model do not begin with two underscores
+_ZERO, _ONE = ast.Constant(0), ast.Constant(1)
+
+
+@dataclass(frozen=True)
+class TimeStep(Input):
+    """1 where shift + rate*t, or shift + amplitude*sin(phase + rate*t), is above zero, else 0.
+
+    Parameters
+    ----------
+    shift, rate, amplitude, phase : Expression
+        Expressions of parameters; the last two for the sine only.
+    title : str
+        What is above zero, as it was written.
+    """
+
+    shift: Expression | None = None
+    rate: Expression | None = None
+    title: str = ""
+
+    @property
+    def expressions(self) -> dict[str, Expression]:
+        """Its expressions of parameters by field name."""
+        fields = ("shift", "rate", "amplitude", "phase")
+        return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
+
+
+def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:
+    """The signal that is 1 where an expression of time, its definitions put in, is above zero; None for other forms."""
+    if linear := _linear(argument, TIME, parameters):
+        return TimeStep(name, "step", shift=of_tree(linear[0]), rate=of_tree(linear[1]), title=title)
+    for part in ast.walk(argument):
+        match part:
+            case ast.Call(func=ast.Name(id="sin" | "cos" as function), args=[angle]) if TIME in names_of(
+                angle
+            ):
+                place = ast.Name("__wave", ast.Load())
+                whole = _linear(exchanged(argument, part, place), place.id, parameters)
+                turning = _linear(angle, TIME, parameters)
+                if whole is None or turning is None:
+                    return None
+                begin = turning[0]
+                if function == "cos":
+                    begin = ast.BinOp(begin, ast.Add(), parse("pi/2").tree)
+                shift, amplitude = map(of_tree, whole)
+                phase, rate = map(of_tree, (begin, turning[1]))
+                return TimeStep(
+                    name, "step", shift=shift, amplitude=amplitude, phase=phase, rate=rate, title=title
+                )
+    return None
+
+
+def _linear(tree: ast.expr, name: str, parameters: Set[str]) -> tuple[ast.expr, ast.expr] | None:
+    """a and b of a + b*name, over parameters alone; None for what has no such form."""
+    shift, at_one = (with_names(tree, {name: value}) for value in (_ZERO, _ONE))
+    slope = ast.BinOp(at_one, ast.Sub(), shift)
+    if not names_of(shift) <= parameters:
+        return None
+    line = ast.BinOp(shift, ast.Add(), ast.BinOp(slope, ast.Mult(), ast.Name(name, ast.Load())))
+    return None if difference(tree, line) else (shift, slope)

@@ -1,0 +1,155 @@
+"""Conditions of any combination: what they choose is met where it changes, in time and where states pass borders."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.errors import UsageError
+from hybridsim.model.hygiene import jumps_of
+from running.conditions_truth import END, Conditions
+
+METHODS = ["exact", "taylor", "dop853"]
+
+
+def model(*states: tuple[str, float, str], **more: object) -> hs.Model:
+    return hs.Model("conditions", states=[hs.State(*state) for state in states], **more)
+
+
+def end_of(built: hs.Model, span: float, integrator: str = "dop853") -> list[float]:
+    sol = hs.simulate(built, (0.0, span), integrator=integrator)
+    assert sol.success, sol.message
+    assert sol.warnings == ()
+    return sol(span).tolist()
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("integrator", METHODS)
+def test_random_combinations(integrator: str, seed: int) -> None:
+    """Against sums over the intervals between all thresholds: numbers, parameters and definitions, negated or not."""
+    chance = random.Random(seed)
+    made = Conditions(
+        chance, chance.choice([{}, {"x": -1.5}, {"x": -1.5, "y": 0.25}]), negated=chance.random() < 0.5
+    )
+    rate = made.expression(chance.randint(1, 2))
+    states = [("z", 0.0, rate), *((name, start, "1") for name, start in made.starts.items())]
+    chance.shuffle(states)
+    built = model(*states, parameters=made.parameters, definitions=made.definitions)
+    z = end_of(built, END, integrator)[[name for name, _, _ in states].index("z")]
+    assert z == pytest.approx(made.integral(rate), abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize(
+    ("rate", "right"),
+    [
+        ("10000 if t > 20 and t < 20.1 else 0", 1000.0),
+        ("10000 if t > 20 and t < 60 else 0", 400000.0),
+        ("10000 if abs(t - 20) < 0.05 else 0", 1000.0),
+        ("10000 if 0.05 > abs(t - c) else 0", 1000.0),
+        ("0 if not 20 < t <= 20.1 else 10000", 1000.0),
+        ("(1 if t > 20 else 0)*(10000 if t < w + 20 else 0)", 1000.0),
+        ("10000 if min(t - 20, 20.1 - t) > 0 else 0", 1000.0),
+        ("10000 if (t > 20 if t < 20.1 else t < 0) else 0", 1000.0),
+        ("exp(1 if t > 20 and t < 21 else 0) - 1", math.e - 1),
+        ("1 if sin(t) > 0.5 and cos(t) > 0 else 0", 16 * math.pi / 3),
+    ],
+)
+def test_pulses_in_time(integrator: str, rate: str, right: float) -> None:
+    span = 32 * math.pi if "sin" in rate else 100.0
+    built = model(("x", 0.0, rate), parameters={"c": 20.0, "w": 0.1})
+    assert end_of(built, span, integrator) == [pytest.approx(right, rel=1e-11)]
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize(
+    ("rate", "right"),
+    [
+        ("exp(sign(x))", 5 / math.e + 5 * math.e),
+        ("1/(2 + sign(x))", 5 + 5 / 3),
+        ("sign(x)*sign(y)", 5 - 2 + 3),
+        ("sign(x)*sign(x)", 10.0),
+        ("max(sign(x), t/10)", 1.25 + 5),
+        ("(3 if y > 0 else sign(x)) if x > 0 or t > 8 else sign(y)", -5 + 2 + 9),
+        ("sign(abs(x) - 2)", 10 - 2 * 4),
+        ("sign(max(x, y))", 2 * 5 - 10),
+        ("abs(x) if x > 0 or not y > 1 else 0", 25.0),
+        ("sqrt(2 + sign(x))", 5 + 5 * math.sqrt(3)),
+    ],
+)
+def test_jumps_inside_of_what_is_not_linear(integrator: str, rate: str, right: float) -> None:
+    """x passes zero at t = 5 and y at t = 7."""
+    built = model(("z", 0.0, rate), ("x", -5.0, "1"), ("y", -7.0, "1"))
+    assert end_of(built, 10.0, integrator)[0] == pytest.approx(right, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "form", ["(1 if t > at else 0)", "(0 if at >= t else 1)", "u", "(1 if abs(t - 4) < 3 else 0)"]
+)
+@pytest.mark.parametrize("integrator", [*METHODS, "rodas5p", "scipy-radau", "cvode-bdf"])
+def test_a_belt_that_is_switched_on(integrator: str, form: str) -> None:
+    """The block does not take the new speed at once: it slips for two units of time."""
+    contact = hs.Contact("f", f"v - {form}", 1, "coulomb", {"mu": 0.5})
+    built = model(
+        ("v", 0.0, "-f"), contacts=[contact], parameters={"at": 1}, definitions={"u": "1 if t > at else 0"}
+    )
+    sol = hs.simulate(built, (0.0, 5.0), integrator=integrator)
+    assert [(e.target, e.t) for e in sol.events] == [
+        ("slip-", pytest.approx(1.0, abs=1e-12)),
+        ("stick", pytest.approx(3.0, abs=1e-6)),
+    ]
+    assert [sol(t)[0] for t in (0.5, 2.0, 5.0)] == pytest.approx([0.0, 0.5, 1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("where", ["load", "law", "definition"])
+def test_friction_that_is_pressed_on(integrator: str, where: str) -> None:
+    """v falls from 5 at the rate 2 from t = 0.4 on, and a state's border at x = 4 halves what is left."""
+    step = {"load": "(20 if t >= tc else 0)", "law": "20", "definition": "load"}[where]
+    mu = "0.1 if t >= tc else 0" if where == "law" else "0.1 if x < 4 or x > 4.5 else 0.05"
+    contact = hs.Contact("f", "v", step, "coulomb", {"mu": mu})
+    built = model(
+        ("x", 0.0, "v"),
+        ("v", 5.0, "-f"),
+        contacts=[contact],
+        parameters={"tc": 0.4},
+        definitions={"load": "20 if t >= tc else 0"},
+    )
+    x = 2 + 25 / 4 if where == "law" else 2 + 25 / 4 + 0.25
+    assert end_of(built, 6.0, integrator) == pytest.approx([x, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_monitor_that_jumps(integrator: str) -> None:
+    """It is recorded where its condition changes, in time and where a state passes a border."""
+    monitors = [
+        hs.Monitor("late", "1 if t > 3 and t < 7 else -1"),
+        hs.Monitor("right", "1 if x > 1 else -1", direction="up"),
+    ]
+    sol = hs.simulate(model(("x", -1.0, "1"), monitors=monitors), (0.0, 10.0), integrator=integrator)
+    seen = [(e.component, e.t) for e in sol.events if e.component in ("late", "right")]
+    assert seen == [("right", pytest.approx(2.0)), ("late", pytest.approx(3.0)), ("late", pytest.approx(7.0))]
+
+
+def test_what_is_left_is_warned_of_and_the_named_remedy_works() -> None:
+    """A condition on an input may hold for a stretch, and has no border that anything moves."""
+    wave = hs.Input("u", "table", times=[0, 1, 3], values=[0, 0, 2])
+    built = model(("x", 0.0, "1 if u > 0.5 else 0"), inputs=[wave])
+    (caution,) = jumps_of(built)
+    assert "'1 if u > 0.5 else 0' in state x jumps" in caution.message
+    sol = hs.simulate(built, (0.0, 4.0), integrator="dop853")
+    assert sol.success and any("1 if u > 0.5 else 0" in warning for warning in sol.warnings)
+    assert sol(4.0)[0] == pytest.approx(2.5, abs=1e-6)
+    with pytest.raises(UsageError, match="choose dop853") as refused:
+        hs.simulate(built, (0.0, 4.0), integrator="exact")
+    assert "taylor" not in refused.value.remedy
+
+
+def test_a_condition_without_an_end_has_no_meaning() -> None:
+    contact = hs.Contact("f", "v - (1 if a*t > 0 else 0)", 1, "coulomb", {"mu": 0.5})
+    built = model(("v", 0.0, "-f"), contacts=[contact], parameters={"a": 0.0})
+    with pytest.raises(hs.HybridsimError, match=r"'a\*t' is zero at all times"):
+        hs.simulate(built, (0.0, 1.0))
