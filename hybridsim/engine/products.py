@@ -41,10 +41,9 @@ class Products:
             multiplied |= others
         known = {d for d in multiplied if totals[d].free_symbols & self.number.keys() <= {self.unknown[d]}}
         self.known |= {(c, d) for d in known}
-        free = {self.unknown[d] for d in multiplied - known}
-        self.pairs |= {
-            (d, self.number[u]) for d, e in row.items() if d not in known for u in e.free_symbols & free
-        }
+        slopes = {d: slope.free_symbols & self.number.keys() for d, slope in row.items() if d not in known}
+        free = set().union(*slopes.values()) - {self.unknown[d] for d in known}
+        self.pairs |= {(d, self.number[u]) for d, factors in slopes.items() for u in factors & free}
         given = {u: self._given(self.number[u]) for u in free}
         effects = {
             d: self.lowering.sp.Integer(0) if d in known else slope.subs(given) for d, slope in row.items()

@@ -40,16 +40,25 @@ def _load() -> Scene:
         (1.4, (2 + amplitude * math.cos(1.0 + angle), -amplitude * math.sin(1.0 + angle))),
         (5.0, (2 - amplitude, 0.0)),
     )
-    truth = Truth(((stop, "f.stick"),), states)
-    return Scene("stepped-load", "stepped-load", (0.0, 5.0), truth, needs("contacts", "scheduled"), speed=3.0)
+    truth = Truth(((stop, "f:stick"),), states)
+    return Scene(
+        "stepped-load",
+        "stepped-load",
+        (0.0, 5.0),
+        truth,
+        needs("contacts", "scheduled", "exact-stick"),
+        speed=3.0,
+    )
 
 
 def _belt() -> Scene:
     """The belt overtakes the block, which follows at the rate 1/2, and stops below it."""
-    events = ((1.0, "f.slip-"), (3.0, "f.stick"), (8.0, "f.slip+"), (10.0, "f.stick"))
+    events = ((1.0, "f:slip-"), (3.0, "f:stick"), (8.0, "f:slip+"), (10.0, "f:stick"))
     states = ((2.0, (0.5,)), (5.0, (1.0,)), (9.0, (0.5,)), (12.0, (0.0,)))
     truth = Truth(events, states)
-    return Scene("stepped-belt", "stepped-belt", (0.0, 12.0), truth, needs("contacts", "scheduled"))
+    return Scene(
+        "stepped-belt", "stepped-belt", (0.0, 12.0), truth, needs("contacts", "scheduled", "exact-stick")
+    )
 
 
 def _guards() -> Scene:
