@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim import arguments
+from hybridsim.analysis.steady.scales import coupled_sizes
 from hybridsim.engine.recent import system_of
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import SimulationError
@@ -67,10 +69,31 @@ class Motion:
         self.progress = progress
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
+        self.sizes = np.zeros(len(self.names))  # of the states (n,), along what was followed last
 
     def unwatched(self) -> Motion:
         """The same, for runs that are made later, when nobody looks on any more."""
-        return Motion(self.model, self.options, self.first)
+        motion = Motion(self.model, self.options, self.first)
+        motion.sizes = self.sizes
+        return motion
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance of the runs."""
+        return arguments.relative_tolerance(self.options.get("rtol"))
+
+    def coupled_sizes(self, point: Point) -> np.ndarray:
+        """Sizes (n,) of the states at a point; see `hybridsim.analysis.steady.scales`."""
+        system = system_of(self.model)
+        return coupled_sizes(system, point.x, system.vector(Instant(point.at), point.discrete), point.numbers)
+
+    def _tolerances(self, start: Point) -> dict[str, Any]:
+        """Absolute tolerances of a run: of a state that happens to be near zero that of the motion's size."""
+        if "atol" in self.options or all(state.nominal for state in self.model.states):
+            return {}
+        found = np.maximum(self.coupled_sizes(start), self.sizes)
+        sizes = [s.nominal or size or 1.0 for s, size in zip(self.model.states, found.tolist(), strict=True)]
+        return {"atol": [1e-3 * self.rtol * size for size in sizes]}
 
     def on_constraints(self, point: Point) -> Point:
         """The point with the states that its modes hold where the model's parameters put them."""
@@ -82,11 +105,12 @@ class Motion:
         """From the time of a point on; None starts at time 0 where the model is declared to start."""
         given: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
+            given |= self._tolerances(start)
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
         begin = 0.0 if start is None else start.at
         solution = simulate(
-            self.model, (begin, begin + duration), **given, progress=self.progress, **(self.options | options)
+            self.model, (begin, begin + duration), progress=self.progress, **(given | self.options | options)
         )
         if solution.status != "finished":
             raise SimulationError(

@@ -17,6 +17,7 @@ from hybridsim.analysis.steady.quiet import (
     quiet_offset,
 )
 from hybridsim.analysis.steady.resolving import orbit_of
+from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import ranges
 
@@ -153,6 +154,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
         discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
         values = np.concatenate([values, discrete], axis=1)
     late = solution.t_end - max(1, count // 4) * period
+    motion.sizes = np.abs(ranges(solution, late)).max(axis=0)
     return Passings(times, values, scale_of(solution, late), replace(point_at_end(solution), at=phase))
 
 
@@ -174,11 +176,13 @@ def free_passings(motion: Motion, start: Point | None, duration: float, largest:
     end = point_at_end(late)
     if moves.max(initial=0.0) <= RESTS:
         return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
-    if died_out(low, high, largest):
+    motion.sizes = np.maximum(np.abs(low), np.abs(high))
+    rounding = rounding_of(motion.coupled_sizes(end), motion.rtol)
+    if died_out(low, high, largest) or (high - low <= rounding).all():
         following = motion.run(end, _LONGER * duration)  # to where it goes
         left = np.subtract(*ranges(following, following.t_end - 0.5 * duration)[::-1])
         # what is small beside its start alone, and a motion of its own, goes on as it is
-        if ((left <= 0.5 * (high - low)) | (left <= _ROUNDED * largest)).all():
+        if ((left <= 0.5 * (high - low)) | (left <= np.maximum(_ROUNDED * largest, rounding))).all():
             end = point_at_end(following)
             return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
         largest[:] = 0.5 * (high - low)

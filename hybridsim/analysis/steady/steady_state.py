@@ -13,11 +13,13 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
-from hybridsim.analysis.steady.motion import Motion, point_at_end
+from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
 from hybridsim.analysis.sweep.given import refuse_unknown
+from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.calls import refusing
 from hybridsim.engine.recent import system_of
@@ -39,6 +41,7 @@ _MARGIN = 1.1  # on how many are expected to be needed
 _GROWS = 1.2  # times what it was: a state that has no end of growing
 _COMMENSURATE = 1e-9
 _TIGHTER = 1e-2  # the runs' tolerance, in units of that of the steady state
+_NOTHING_LEFT = 1e-13  # of the scale that a state once had
 _NEUTRAL = 1e-3  # an exponent below that, per period, is nought
 PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
     "periodic",
@@ -170,6 +173,7 @@ class _Search:
         self.newton_steps, self.periods = 0, 0
         self.duration = motion.model.duration_value() or _DURATION
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
+        self.seen = np.zeros(0)  # largest scale of each state so far
         self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
         self.expected = 0  # periods that the motion is expected to need until it has settled
 
@@ -177,6 +181,7 @@ class _Search:
         passings = self._follow(None)
         while True:
             self.earlier, self.scale = self.scale, passings.scale
+            passings = self._not_below_rounding(passings)
             if passings.rests:
                 return _found(self.motion, EQUILIBRIUM, self._orbit(passings, 1), periods=self.periods)
             orbit = self._closed(passings)
@@ -185,6 +190,29 @@ class _Search:
             if self.periods >= self.max_periods:
                 return self._other(passings)
             passings = self._follow(passings)
+
+    def _not_below_rounding(self, passings: Passings) -> Passings:
+        """The passings, with scales below which a change of a state is rounding.
+
+        A state that dies out beside what it was has none of its own. A discrete state that settles on zero is set by
+        what the others are: a change of them by their own size, carried over a period, makes its size.
+        """
+        self.seen = passings.scale if not len(self.seen) else np.maximum(self.seen, passings.scale)
+        scale = np.maximum(passings.scale, _NOTHING_LEFT * self.seen)
+        n = len(self.motion.names)
+        if len(scale) > n and self.period is not None and not passings.rests:
+            matrix = np.abs(self._over_a_period(passings.last))
+            sizes = np.concatenate([self.motion.sizes, np.abs(passings.last.discrete)])
+            scale[n:] = np.maximum(scale[n:], matrix[n:] @ sizes)
+        self.scale = scale
+        return replace(passings, scale=scale)
+
+    def _over_a_period(self, start: Point) -> np.ndarray:
+        """What a period of the forcing makes of changes of the start (n + d, n + d); zeros where that is unknown."""
+        try:
+            return sensitivities(self.motion.run(start, self.period), ()).by_start
+        except UsageError:
+            return np.zeros((len(start.values), len(start.values)))
 
     @property
     def share(self) -> float:
@@ -256,12 +284,27 @@ class _Search:
 
     def _periodic(self, orbit: Orbit) -> SteadyState:
         orbit = self._shortest(orbit)
+        if self._rests(orbit):
+            message = f"equilibrium: nothing moves but by rounding; residual {orbit.residual:.1e}"
+            return _found(
+                self.motion, EQUILIBRIUM, orbit, self.period is None, self.newton_steps, self.periods, message
+            )
         multiple = orbit.multiple
         what = "" if multiple == 1 else f" of {multiple} periods of the forcing" if self.period else ""
         message = f"periodic motion{what}; residual {orbit.residual:.1e}"
         return _found(
             self.motion, PERIODIC, orbit, self.period is None, self.newton_steps, self.periods, message
         )
+
+    def _rests(self, orbit: Orbit) -> bool:
+        """Whether all that moves along an orbit is rounding."""
+        solution = self.motion.run(orbit.start, orbit.period)
+        held = [segment.p[solution._system.layout.discrete_slice] for segment in solution._segments]
+        if any((values != held[0]).any() for values in held):
+            return False
+        low, high = ranges(solution)
+        rounding = rounding_of(self.motion.coupled_sizes(orbit.start), self.motion.rtol)
+        return bool((high - low <= rounding).all())
 
     def _shortest(self, orbit: Orbit) -> Orbit:
         """The orbit with the least period: one that closes after a divisor of its multiple is taken for what it is."""

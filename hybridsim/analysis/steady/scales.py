@@ -1,0 +1,46 @@
+"""How small a motion may be before it is rounding, and the sizes of states that come near to zero."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.tangents import TangentTape
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+
+_ROUNDINGS = 10.0  # times the runs' relative tolerance: what a run leaves of a motion that is none
+_LOOSEST = 1e-10  # for which the runs' tolerance stands; a looser one hides motions that are some
+
+
+def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Sizes (n,) of the states at x, in the units in which each is of the size of those that it swings with.
+
+    A velocity at rest beside a spring at length x is as large as sqrt(k/m) x: an error of rounding in the spring's
+    force makes one of that size times rounding. Of two states that act on each other the ratio of their sizes is the
+    root of the ratio of what they do to each other's rates; one that decays by itself is no larger than what the other
+    makes of it meanwhile.
+    """
+    sizes = np.abs(x)
+    if not system.has_tape or not system.n:
+        return sizes
+    n = system.n
+    tape = TangentTape(system, z)
+    seeds = np.eye(n + 1 + len(p), n)
+    A = np.abs(tape(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds).slopes[0, :n])
+    if not np.isfinite(A).all():
+        return sizes
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        swung = np.where(A.T > 0.0, np.sqrt(A / A.T), np.inf)
+        driven = np.where(np.diag(A)[:, None] > 0.0, A / np.diag(A)[:, None], np.inf)
+        ratio = np.minimum(swung, driven)
+    ratio[~np.isfinite(ratio)] = 0.0
+    np.fill_diagonal(ratio, 1.0)
+    return np.asarray((ratio * sizes[None, :]).max(axis=1))
+
+
+def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
+    """What a run of this tolerance may move states (n,) of these sizes by while nothing moves."""
+    return _ROUNDINGS * min(rtol, _LOOSEST) * sizes
