@@ -210,7 +210,7 @@ class _Search:
     def _over_a_period(self, start: Point) -> np.ndarray:
         """What a period of the forcing makes of changes of the start (n + d, n + d); zeros where that is unknown."""
         try:
-            return sensitivities(self.motion.run(start, self.period), ()).by_start
+            return sensitivities(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
             return np.zeros((len(start.values), len(start.values)))
 
