@@ -1,8 +1,6 @@
 """`python -m hybridsim` is the command `hybridsim`."""
 
-import sys
-
-from hybridsim.cli import main
+from hybridsim.cli import command
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

@@ -6,6 +6,7 @@ asked to end (SIGTERM), 141 the reader of the output went away. Data goes to std
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
@@ -13,7 +14,8 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TextIO
+from contextlib import suppress
+from typing import TYPE_CHECKING, NoReturn, TextIO
 
 from hybridsim import __version__
 from hybridsim.cli import (
@@ -118,6 +120,20 @@ def main(argv: Sequence[str] | None = None) -> int:
                 )
             return HybridsimError.exit_code
     return code
+
+
+def command() -> NoReturn:
+    """Run the command line of the process, and end the process.
+
+    The interpreter would first take apart all that it holds, compiled code among it, which takes a second or more after
+    the last line. What is to be done at the exit is done; the memory goes back to the system as it is.
+    """
+    code = main()
+    atexit._run_exitfuncs()
+    with suppress(OSError, ValueError):  # whoever read it went away
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
 
 
 def _interrupted(session: Session) -> int:

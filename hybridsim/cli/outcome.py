@@ -68,8 +68,8 @@ def check_arguments(args: argparse.Namespace) -> None:
     if args.save:
         if str(args.save) in ("all", "events", "last-period", "nothing"):
             raise UsageError(
-                f"--save: {args.save} is no file, and the command line keeps all of a run",
-                remedy=f"name a file such as run.hsol; in Python hs.simulate(..., save='{args.save}') keeps less",
+                f"--save: {args.save} is no file",
+                remedy=f"name a file such as run.hsol; 'hybridsim run --keep {args.save}' says what is kept",
             )
         require_writable(args.save, "--save", (".hsol",))
     others = {"the model's own file": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
@@ -142,6 +142,11 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
         session.wrote(args.plot)
 
 
+def _has_events(solution: Solution) -> bool:
+    """Whether the events of a run, and with them its modes, were kept."""
+    return solution._run.save != "nothing"
+
+
 def _shares(solution: Solution) -> dict[str, dict[str, float]]:
     """Share of the time that each component spent in each of its modes."""
     shares: dict[str, dict[str, float]] = {}
@@ -163,16 +168,19 @@ def _summary(solution: Solution) -> list[str]:
     from hybridsim.solution.summary import kinds
 
     model, stats = solution.model, solution.stats
-    found = {kind: n for kind, n in kinds(solution).items() if kind != "corner"}
+    has_events = _has_events(solution)
+    found = {kind: n for kind, n in kinds(solution).items() if kind != "corner"} if has_events else {}
+    counted = ", ".join(f"{n} {kind}" for kind, n in found.items())
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
         f"  integrator   {solution.integrator}"
         + (f", chosen because {solution.chosen_because}" if solution.chosen_because else ""),
         f"  status       {solution.status}",
-        f"  events       {sum(found.values())}"
-        + (f" ({', '.join(f'{n} {kind}' for kind, n in found.items())})" if found else ""),
+        f"  events       {sum(found.values())}{f' ({counted})' if counted else ''}"
+        if has_events
+        else "  events       not kept",
     ]
-    for component, modes in _shares(solution).items():
+    for component, modes in (_shares(solution) if has_events else {}).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
         lines.append(f"  {f'modes of {component}':<12} {shares}")
     if solution.t.size:
@@ -190,7 +198,7 @@ def _summary(solution: Solution) -> list[str]:
 def _record(solution: Solution) -> dict[str, Any]:
     from hybridsim import __version__
 
-    model = solution.model
+    model, has_events = solution.model, _has_events(solution)
     return {
         "hybridsim": __version__,
         "model": model.name,
@@ -202,8 +210,11 @@ def _record(solution: Solution) -> dict[str, Any]:
         "warnings": solution.warnings,
         "t_span": [solution.t_start, solution.t_end] if solution.t.size else None,
         "final": dict(_final(solution)),
-        "modes": _shares(solution),
-        "events": [
+        "kept": solution._run.save,
+        "modes": _shares(solution) if has_events else None,
+        "events": None
+        if not has_events
+        else [
             {
                 "t": event.t,
                 "kind": event.kind,

@@ -17,6 +17,7 @@ examples:
   hybridsim run dfcs -p F0=22 -p 'omega=0.64*sqrt(k/m)' --t-end 20T --plot out.png
   hybridsim run my.toml --integrator cvode-bdf --rtol 1e-10 --csv out.csv --json > out.json
   hybridsim run belt --t-end 1e4 --limit events=500 --save belt.hsol
+  hybridsim run dfcs --t-end 1e6T --keep last-period --plot out.png
 """
 
 
@@ -46,6 +47,12 @@ def add_to(commands: Any) -> None:
         action="append",
         default=[],
         help="set an option of the integrator itself",
+    )
+    parser.add_argument(
+        "--keep",
+        metavar="WHAT",
+        help="what is kept of the run, which it never changes: all (the default), events, last-period, nothing, or the "
+        "last so much time; a run of any length then takes little memory",
     )
     outcome.add_arguments(parser)
     parser.set_defaults(
@@ -84,8 +91,32 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }
+    if args.keep is not None:
+        settings["save"] = _kept(args)
     for name, text in args.option:
         if name in settings:
             raise UsageError(f"--option {name} is given twice", remedy="give one value")
         settings[name] = values.option_value(text)
     return settings
+
+
+def _kept(args: argparse.Namespace) -> str | float:
+    """What is kept of the run; what cannot be written of so little is refused before the run."""
+    if args.keep in ("events", "nothing"):
+        for option in ("plot", "csv", "npz"):
+            if getattr(args, option):
+                raise UsageError(
+                    f"--{option} with --keep {args.keep}: no states are kept but those at the end",
+                    remedy="keep last-period, or the last so much time",
+                )
+    if args.keep == "nothing" and args.explain:
+        raise UsageError("--explain with --keep nothing: no events are kept", remedy="keep events")
+    if args.keep in ("all", "events", "last-period", "nothing"):
+        return str(args.keep)
+    try:
+        return values.positive(args.keep)
+    except argparse.ArgumentTypeError:
+        raise UsageError(
+            f"--keep {args.keep}",
+            remedy="give all, events, last-period, nothing, or a length of time above zero",
+        ) from None

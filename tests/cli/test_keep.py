@@ -1,0 +1,73 @@
+"""What the command line keeps of a long run, and that its process ends with its last line."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import hybridsim as hs
+
+
+@pytest.mark.parametrize("keep", ["all", "events", "last-period", "nothing", "0.05"])
+def test_it_keeps_what_python_keeps(keep: str, hybridsim: Callable, tmp_path: Path) -> None:
+    asked = ("run", "dfcs", "--t-end", "0.3", "--integrator", "dop853", "--keep", keep)
+    code, out, _ = hybridsim(*asked, "--json", "--save", "r.hsol")
+    found = json.loads(out)
+    save = float(keep) if keep[0] == "0" else keep
+    sol = hs.simulate("dfcs", (0, 0.3), integrator="dop853", save=save)
+    assert (
+        code == 0
+        and found["kept"] == save
+        and found["final"] == dict(zip(sol.names, sol.y[:, -1], strict=True))
+    )
+    if keep == "nothing":
+        assert found["events"] is None and found["modes"] is None
+    else:
+        assert [event["t"] for event in found["events"]] == [event.t for event in sol.events]
+    assert hs.load_solution(tmp_path / "r.hsol").y.tolist() == sol.y.tolist()
+    text = hybridsim(*asked).out
+    assert ("events       not kept" in text) == (keep == "nothing")
+    assert hybridsim("resume", "r.hsol", "--t-end", "0.4").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--keep", "some"], "give all, events, last-period, nothing"),
+        (["--keep", "-1"], "--keep"),
+        (["--keep", "events", "--csv", "r.csv"], "--csv with --keep events"),
+        (["--keep", "nothing", "--plot", "r.png"], "--plot with --keep nothing"),
+        (["--keep", "nothing", "--explain", "0"], "--explain with --keep nothing"),
+        (["--save", "events"], "hybridsim run --keep events"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_before_the_run(
+    words: list[str], told: str, hybridsim: Callable
+) -> None:
+    code, out, err = hybridsim("run", "dfcs", *words)
+    assert code == 2 and not out and told in err
+
+
+def test_the_process_ends_with_its_last_line(tmp_path: Path) -> None:
+    paths = os.pathsep.join(path for path in sys.path if path)
+    asked = [sys.executable, "-u", "-m", "hybridsim", "run", "dfcs", "--t-end", "20T", "--csv", "r.csv"]
+    with subprocess.Popen(
+        asked, env={**os.environ, "PYTHONPATH": paths}, cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        lines, last = [], time.perf_counter()
+        for line in process.stdout:
+            lines.append(line)
+            last = time.perf_counter()
+        process.wait()
+        after = time.perf_counter() - last
+    assert process.returncode == 0 and "cost" in lines[-1]
+    assert after < 0.5  # to take the interpreter apart takes 1 to 4 s
+    assert (tmp_path / "r.csv").read_text().endswith("\n")
