@@ -37,7 +37,9 @@ def work(tasks: Any, results: Any, draws: int) -> None:
             for record in trials(seed, draws, first):
                 results.send(record)
         except Exception as error:
-            results.send({"seed": seed, "draw": -1, "kind": "judge", "integrator": "", "detail": repr(error)[:300]})
+            results.send(
+                {"seed": seed, "draw": -1, "kind": "judge", "integrator": "", "detail": repr(error)[:300]}
+            )
         results.send({"seed": seed, "done": True})
 
 
@@ -78,7 +80,10 @@ def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[di
             out.write(json.dumps(record) + "\n")
             out.flush()
             if "kind" in record and record["kind"] not in SHOWN:
-                print(*(record.get(k, "") for k in ("seed", "draw", "kind", "integrator", "status", "detail")), flush=True)
+                print(
+                    *(record.get(k, "") for k in ("seed", "draw", "kind", "integrator", "status", "detail")),
+                    flush=True,
+                )
 
         while todo or len(idle) < len(workers):
             while todo and idle:
@@ -96,8 +101,15 @@ def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[di
                 elif time.perf_counter() - worker.heard > PATIENCE or not worker.process.is_alive():
                     hung = worker.process.is_alive()
                     worker.end()
-                    keep({"seed": worker.seed, "draw": worker.draw, "kind": "hangs" if hung else "dies", "integrator": "",
-                          "detail": "no result in time" if hung else "the process ended"})
+                    keep(
+                        {
+                            "seed": worker.seed,
+                            "draw": worker.draw,
+                            "kind": "hangs" if hung else "dies",
+                            "integrator": "",
+                            "detail": "no result in time" if hung else "the process ended",
+                        }
+                    )
                     keep({"seed": worker.seed, "done": True})
                     workers[workers.index(worker)] = fresh = Worker(context, draws)
                     idle.append(fresh)
@@ -119,6 +131,63 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
     return single, double
 
 
+HEAD = """# Combined forms
+
+`python studies/combined_forms.py` draws whole models at random and compares each run with a judge that shares no code
+with hybridsim. The models combine the forms that people combine:
+
+- Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
+- Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals, each in one of
+  several equal ways to write it. Forces, loads and belts change at known times, by single conditions, by Boolean
+  combinations, by tables and by waves.
+- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors meet at one
+  instant.
+- Names, the order of declaration, the scale and sign of the states and the origin of time are drawn as well. One run in
+  ten is stopped in the middle and resumed.
+
+*The judge* (`tests/reference/combined`) reads an abstract form of the model, not the model file. It follows the motion by
+Taylor series in each configuration, finds zeros by dense sampling and bisection, and decides an instant by definition: it
+tries every combination of modes and sides, and keeps those whose conditions hold just after the instant. Impulses are
+found by enumeration as well. A disagreement is judged again in 40 digits. A run is compared only as long as the
+motion is certain: not beyond a touch of zero within 1e-6, and not beyond an instant that the rules leave open.
+
+A run *agrees* if all states and discrete states are within {allowed:g} of the motion's size at {points} times, and its monitors
+fire as often as they should. A run that stops with a named status before the judge's motion ends is counted separately.
+
+"""
+
+
+def page(done: list[dict[str, Any]], draws: int) -> str:
+    """The page of the results."""
+    from reference.combined.compare import ALLOWED, POINTS
+
+    runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model")]
+    seeds = sorted({r["seed"] for r in done})
+    out = HEAD.format(allowed=ALLOWED, points=POINTS)
+    instants = sum(r.get("instants", 0) for r in runs)
+    out += f"{len(seeds)} structures with {draws} sets of numbers each: {len(runs)} runs, {instants} instants.\n\n"
+    out += "| result | runs |\n| --- | --- |\n"
+    out += "".join(
+        f"| {kind} | {count} |\n" for kind, count in Counter(r["kind"] for r in runs).most_common()
+    )
+    statuses = Counter((r["kind"], r["status"]) for r in runs if r["kind"] in ("refused", "stopped", "chose"))
+    out += "\n| result | status | runs |\n| --- | --- | --- |\n"
+    out += "".join(f"| {kind} | `{status}` | {count} |\n" for (kind, status), count in statuses.most_common())
+    out += "\n| integrator | runs | differ | stopped or refused |\n| --- | --- | --- | --- |\n"
+    for name in sorted({r["integrator"] for r in runs if r["integrator"]}):
+        of = Counter(r["kind"] for r in runs if r["integrator"] == name)
+        out += f"| `{name}` | {sum(of.values())} | {of['differs']} | {of['stopped'] + of['refused']} |\n"
+    single, double = pairs(seeds)
+    least = sorted((double[pair], *pair) for pair in combinations(sorted(single), 2))
+    out += f"\n## Forms\n\n{len(single)} forms and {len(least)} pairs of them. "
+    out += f"{sum(count < 10 for count, *_ in least)} pairs occur in fewer than 10 structures.\n\n"
+    out += "| form | structures | rarest partner | structures |\n| --- | --- | --- | --- |\n"
+    for name in sorted(single):
+        count, a, b = next(row for row in least if name in row[1:])
+        out += f"| {name} | {single[name]} | {b if a == name else a} | {count} |\n"
+    return out
+
+
 def main() -> None:
     """Run the study or shrink a finding."""
     if sys.argv[1:2] == ["shrink"]:
@@ -130,10 +199,11 @@ def main() -> None:
     draws = int(sys.argv[2]) if len(sys.argv) > 2 else 10
     journal = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("combined-forms.jsonl")
     done = study(structures, draws, journal, int(os.environ.get("FIRST", "0")))
-    print(Counter(r["kind"] for r in done if "kind" in r))
-    single, double = pairs(sorted({r["seed"] for r in done}))
-    rare = [(a, b) for a, b in combinations(sorted(single), 2) if double[a, b] < 10]
-    print(len(single), "forms,", len(rare), "pairs in fewer than 10 structures:", rare[:20])
+    out = page(done, draws)
+    print(out)
+    if draws >= 10:
+        _, found, by_hand = PAGE.read_text(encoding="utf-8").partition(BY_HAND)
+        PAGE.write_text(f"{out}\n{found}{by_hand}" if found else out, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,13 +7,14 @@ from typing import Any
 
 from .forms import lowered, parts_of, rate_of, var
 from .series import solved
+from .values import Stop
 
 PLASTIC = 1e-6  # speeds below which a rebound is too small to matter: what follows is at rest
 
 
 def effects(judge: Any, force: str) -> dict[str, Any]:
     """What a unit impulse of one force adds to each state."""
-    none = {name: 0 for name in [*judge.m.impacts, *judge.m.contacts, *judge.m.relays]}
+    none = dict.fromkeys([*judge.m.impacts, *judge.m.contacts, *judge.m.relays], 0)
     rates = dict(judge.rates)
     return {
         k: judge.value(e, none | {force: 1}) - judge.value(e, none)
@@ -31,17 +32,17 @@ def along(judge: Any, e: Any, change: dict[str, Any]) -> Any:
 
 def blow(judge: Any) -> bool:
     """Apply the impulses of this instant; False where nothing is struck."""
-    from .judge import Stop
-
     m, tol = judge.m, judge.tol
-    touching = [p for p, i in m.impacts.items() if abs(judge.value(i.gap)) <= 1e3 * tol or judge.value(i.gap) < 0]
+    touching = [
+        p for p, i in m.impacts.items() if abs(judge.value(i.gap)) <= 1e3 * tol or judge.value(i.gap) < 0
+    ]
     speed = {p: judge.gap_rate(p) for p in touching}
     if not any(u < -tol for u in speed.values()):
         return False
     back = {}
     for p in touching:
         e = judge.value(m.impacts[p].restitution)
-        back[p] = 0 if e < 1 and -PLASTIC < speed[p] else -e * min(speed[p], 0)
+        back[p] = 0 if e < 1 and speed[p] > -PLASTIC else -e * min(speed[p], 0)
     rate = {p: rate_of(lowered(m.impacts[p].gap), judge.rates) for p in touching}
     loaded = {
         f: [p for p in touching if any(n.op == "var" and n.args[0] == p for n in parts_of(c.normal))]
@@ -67,7 +68,9 @@ def blow(judge: Any) -> bool:
             if not any(all(abs(new[k] - o[k]) <= 1e-7 * (1 + abs(o[k])) for k in new) for o in found):
                 found.append(new)
     if len(found) != 1:
-        raise Stop("unclear: blows with several outcomes" if found else "inconsistent: no impulse is admissible")
+        raise Stop(
+            "unclear: blows with several outcomes" if found else "inconsistent: no impulse is admissible"
+        )
     judge.x = found[0]
     return True
 

@@ -8,7 +8,15 @@ from typing import Any
 
 from .forms import TIME, Abstract, Node, Number, abs_, cond, constant, max_, min_, node, sin, var, window
 
-WRITTEN = ["literal"] * 8 + ["parameter"] * 7 + ["expression"] * 3 + ["definition"] * 3 + ["discrete"] * 3 + ["derived"] * 2 + ["input"]
+WRITTEN = (
+    ["literal"] * 8
+    + ["parameter"] * 7
+    + ["expression"] * 3
+    + ["definition"] * 3
+    + ["discrete"] * 3
+    + ["derived"] * 2
+    + ["input"]
+)
 
 
 class Builder:
@@ -101,14 +109,20 @@ class Builder:
         kind = self.rng.choice(["after", "and", "or", "not", "near", "both"])
         one = self.moment()
         two = one + self.num("0.1", 1)
-        self.tag("condition on time: single" if kind == "after" else "condition on time: Boolean", f"in {place}")
+        self.tag(
+            "condition on time: single" if kind == "after" else "condition on time: Boolean", f"in {place}"
+        )
         tests: dict[str, tuple[Any, ...]] = {
             "after": ("after", one),
             "and": ("and", ("after", one), ("before", two)),
             "or": ("or", ("before", one), ("after", two)),
             "not": ("not", ("after", one)),
             "near": ("near", one, self.num("0.05", "0.3", 5)),
-            "both": ("and", ("not", ("before", one)), ("or", ("before", two), ("after", two + self.num("0.1", "0.5")))),
+            "both": (
+                "and",
+                ("not", ("before", one)),
+                ("or", ("before", two), ("after", two + self.num("0.1", "0.5"))),
+            ),
         }
         return window(tests[kind], a, b)
 
@@ -156,7 +170,9 @@ class Builder:
         if self.chance(0.5):
             self.tag("input: jump")
             times.insert(2, times[1])
-        grid = [node(Fraction(self.rng.randint(0, 20), 20) * Fraction(high - low) + Fraction(low)) for _ in times]
+        grid = [
+            node(Fraction(self.rng.randint(0, 20), 20) * Fraction(high - low) + Fraction(low)) for _ in times
+        ]
         self.m.tables[name] = times, grid
         return Node("table", (name,))
 

@@ -10,8 +10,9 @@ from typing import Any
 import hybridsim as hs
 
 from .forms import Abstract
-from .judge import Digits, Judge, Motion
+from .judge import Judge
 from .render import Renderer
+from .values import Motion
 
 POINTS = 23
 ALLOWED = 1e-5  # error of a run at rtol 1e-9, relative to the motion, beyond which it is called different
@@ -66,8 +67,13 @@ def shortened(truth: Truth, end: float) -> Truth:
 
 
 def hold(
-    model: Abstract, compiled: hs.Model, renderer: Renderer, numbers: dict[str, Fraction], integrator: str,
-    truth: Truth, way: str = "plain",
+    model: Abstract,
+    compiled: hs.Model,
+    renderer: Renderer,
+    numbers: dict[str, Fraction],
+    integrator: str,
+    truth: Truth,
+    way: str = "plain",
 ) -> Verdict:
     """Run the rendered model and hold it against the judge's motion."""
     motion, times, certain = truth
@@ -75,7 +81,10 @@ def hold(
     try:
         end = shift + model.duration * (0.5 if way == "resumed" else 1)
         sol = hs.simulate(
-            compiled, (shift, end), params=renderer.values(numbers), integrator=integrator,
+            compiled,
+            (shift, end),
+            params=renderer.values(numbers),
+            integrator=integrator,
             limits={"seconds": 20, "events": 5000},
         )
         if way == "resumed" and sol.status == "finished":
@@ -111,12 +120,18 @@ def hold(
         our_times = [t for t in our_times if t < certain - 1e-3]
         late = [t for t in true_times if t < reached - 1e-3]
         if len(late) > len(our_times) or len(our_times) > len(true_times):
-            return Verdict("differs", integrator, sol.status, f"monitor {w} right {true_times} got {our_times}", certain)
+            return Verdict(
+                "differs", integrator, sol.status, f"monitor {w} right {true_times} got {our_times}", certain
+            )
     if reached < certain - 1e-3:
         kind = "refused" if sol.status in ("nonunique", "inconsistent") else "stopped"
-        return Verdict(kind, integrator, sol.status, f"at {reached:.6g} of {certain:.6g}: {sol.message[:300]}", certain)
+        return Verdict(
+            kind, integrator, sol.status, f"at {reached:.6g} of {certain:.6g}: {sol.message[:300]}", certain
+        )
     if motion.status in ("terminated",) and certain == motion.end and abs(reached - motion.end) > 1e-4:
-        return Verdict("differs", integrator, sol.status, f"ends at {motion.end} right, {reached} got", certain)
+        return Verdict(
+            "differs", integrator, sol.status, f"ends at {motion.end} right, {reached} got", certain
+        )
     if motion.status == "nonunique" and certain == motion.end and sol.status == "finished":
         return Verdict("chose", integrator, sol.status, f"at {motion.end:.6g}: {motion.message}", certain)
     if motion.status == "inconsistent" and certain == motion.end and sol.status == "finished":
@@ -128,6 +143,3 @@ def value_of(sol: Any, renderer: Renderer, name: str, time: float) -> float:
     scale = renderer.style.scales.get(name)
     value = float(sol.output(renderer.called(name), time))
     return value * float(scale) if scale else value
-
-
-__all__ = ["Digits", "Verdict", "hold", "judged"]

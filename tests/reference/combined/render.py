@@ -39,7 +39,9 @@ class Renderer:
         self.discrete: dict[str, str] = {}
         self.inputs: dict[str, str] = {}
         self.signs = {r for r in model.relays if self.rng.random() < style.signs}  # relays written as signs
-        self.of_number: dict[str, tuple[str, str]] = {}  # text anywhere; text where parameters alone may stand
+        self.of_number: dict[
+            str, tuple[str, str]
+        ] = {}  # text anywhere; text where parameters alone may stand
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 
@@ -115,16 +117,24 @@ class Renderer:
             return f"(-{x})"
         if op == "abs":
             return self.pick(
-                f"abs({x})", f"abs(-{x})", f"max({x}, -{x})", f"max(-{x}, {x})", f"(-min({x}, -{x}))",
-                f"({x} if {x} > 0 else -{x})", f"(-{x} if {x} < 0 else {x})", f"(sign({x})*{x})",
+                f"abs({x})",
+                f"abs(-{x})",
+                f"max({x}, -{x})",
+                f"max(-{x}, {x})",
+                f"(-min({x}, -{x}))",
+                f"({x} if {x} > 0 else -{x})",
+                f"(-{x} if {x} < 0 else {x})",
+                f"(sign({x})*{x})",
             )
         if op in ("sin", "cos", "sqrt"):
             return f"{op}({x})"
         if op == "if":
             one, two = self.text(a[1], plain), self.text(a[2], plain)
             return self.pick(
-                f"({one} if {x} > 0 else {two})", f"({two} if {x} <= 0 else {one})",
-                f"({two} if not {x} > 0 else {one})", f"({one} if 0 < {x} else {two})",
+                f"({one} if {x} > 0 else {two})",
+                f"({two} if {x} <= 0 else {one})",
+                f"({two} if not {x} > 0 else {one})",
+                f"({one} if 0 < {x} else {two})",
                 f"({two} if {x} < 0 else {one})",
             )
         y = self.text(a[1], plain)
@@ -132,8 +142,11 @@ class Renderer:
             other = "min" if op == "max" else "max"
             compare = ">" if op == "max" else "<"
             return self.pick(
-                f"{op}({x}, {y})", f"{op}({y}, {x})", f"(-{other}(-{x}, -{y}))",
-                f"({x} if {x} {compare} {y} else {y})", f"({y} if {y} {compare}= {x} else {x})",
+                f"{op}({x}, {y})",
+                f"{op}({y}, {x})",
+                f"(-{other}(-{x}, -{y}))",
+                f"({x} if {x} {compare} {y} else {y})",
+                f"({y} if {y} {compare}= {x} else {x})",
                 f"(0.5*({x} + {y} {'+' if op == 'max' else '-'} abs({x} - {y})))",
             )
         if op in ("add", "mul"):
@@ -189,14 +202,17 @@ class Renderer:
         for name, (times, values) in m.tables.items():
             if name in m.waves:
                 shape, period, size = m.waves[name]
-                wave = f'kind = "wave"\nshape = "{shape}"\nperiod = {float(period)}\namplitude = {float(size)}'
+                wave = (
+                    f'kind = "wave"\nshape = "{shape}"\nperiod = {float(period)}\namplitude = {float(size)}'
+                )
                 self.inputs[self.called(name)] = wave + f"\nphase = {float(self.style.shift)}"
                 continue
             knots = [float(constant(e, numbers)) + float(self.style.shift) for e in times]
             heights = [float(constant(e, numbers)) for e in values]
             self.inputs[self.called(name)] = f'kind = "table"\ntimes = {knots}\nvalues = {heights}'
         for name, (start, rate) in m.states.items():
-            text = f'{self.called(name)} = {{ start = "{self.scaled(name, start, True)}", der = "{self.scaled(name, rate)}" }}'
+            begin, der = self.scaled(name, start, True), self.scaled(name, rate)
+            text = f'{self.called(name)} = {{ start = "{begin}", der = "{der}" }}'
             sections.append(("states", text))
         for name, start in m.discrete.items():
             sections.append(("discrete", f'{self.called(name)} = "{self.text(start, True)}"'))
@@ -208,7 +224,10 @@ class Renderer:
             sections.append((f"contacts.{self.called(f)}", text + ("\nopens = true" if c.opens else "")))
         for p, i in m.impacts.items():
             sections.append(
-                (f"impacts.{self.called(p)}", f'gap = "{self.text(i.gap)}"\nrestitution = "{self.text(i.restitution)}"')
+                (
+                    f"impacts.{self.called(p)}",
+                    f'gap = "{self.text(i.gap)}"\nrestitution = "{self.text(i.restitution)}"',
+                )
             )
         for r, e in m.relays.items():
             if r in self.signs:
@@ -227,7 +246,8 @@ class Renderer:
                 times = ", ".join(self.time(e) for e in schedule.times)
                 sections.append((f"schedules.{self.called(s)}", f"times = [{times}]\nreset = {resets}"))
             else:
-                text = f'period = "{self.text(schedule.period, True)}"\noffset = {self.time(schedule.times[0])}\nset = {resets}'
+                offset = self.time(schedule.times[0])
+                text = f'period = "{self.text(schedule.period, True)}"\noffset = {offset}\nset = {resets}'
                 sections.append((f"clocks.{self.called(s)}", text))
         return self.laid_out(sections, numbers)
 
@@ -244,13 +264,21 @@ class Renderer:
                     if choice.reset or choice.adds:
                         parts.append(f"reset = {self.resets(choice.reset, choice.adds)}")
                     choices.append("{ " + ", ".join(parts) + " }")
-                lines.append(f'guards.{g} = {{ expr = "{self.text(guard.expr)}", then = [{", ".join(choices)}] }}')
+                lines.append(
+                    f'guards.{g} = {{ expr = "{self.text(guard.expr)}", then = [{", ".join(choices)}] }}'
+                )
             if mode.rates:
-                lines.append("der = { " + ", ".join(
-                    f'{self.called(k)} = "{self.scaled(k, e)}"' for k, e in mode.rates.items()) + " }")
+                lines.append(
+                    "der = { "
+                    + ", ".join(f'{self.called(k)} = "{self.scaled(k, e)}"' for k, e in mode.rates.items())
+                    + " }"
+                )
             if mode.sets:
-                lines.append("set = { " + ", ".join(
-                    f'{self.called(k)} = "{self.text(e)}"' for k, e in mode.sets.items()) + " }")
+                lines.append(
+                    "set = { "
+                    + ", ".join(f'{self.called(k)} = "{self.text(e)}"' for k, e in mode.sets.items())
+                    + " }"
+                )
             out.append((f"components.{name}.modes.{mode_name}", "\n".join(lines)))
         return out
 
@@ -272,4 +300,4 @@ class Renderer:
             if lines:
                 whole.append((header, "\n".join(lines)))
         self.shuffle(whole)
-        return "schema = 1\nname = \"combined\"\n" + "".join(f"\n[{h}]\n{text}\n" for h, text in whole)
+        return 'schema = 1\nname = "combined"\n' + "".join(f"\n[{h}]\n{text}\n" for h, text in whole)

@@ -28,7 +28,7 @@ def horner(row: list[Any], s: Any) -> Any:
 
 
 def first_negative(row: list[Any], h: Any, tol: float) -> tuple[Any | None, float | None]:
-    """The first s in (0, h] at which a function that is positive just after 0 becomes negative; the first near touch."""
+    """The first s in (0, h] at which a function, positive just after 0, becomes negative; the first near touch."""
     m = 0
     while m < len(row) and -tol <= row[m] <= tol:
         m += 1

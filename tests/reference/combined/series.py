@@ -49,13 +49,21 @@ class Tape:
             other = Node("cos" if e.op == "sin" else "sin", e.args)
             here, there = self._new(), self._new()
             self.at[e], self.at[other] = here, there
-            self.ops.append(("sincos", here if e.op == "sin" else there, (here + there - (here if e.op == "sin" else there), first)))
+            self.ops.append(
+                (
+                    "sincos",
+                    here if e.op == "sin" else there,
+                    (here + there - (here if e.op == "sin" else there), first),
+                )
+            )
             return here
         else:
             data = tuple(self.add(a) for a in e.args)
         slot = self._new()
         self.at[e] = slot
-        if e.op in ("num", "const") or (e.op in ("add", "sub", "mul", "div", "neg") and self.fixed.issuperset(data)):
+        if e.op in ("num", "const") or (
+            e.op in ("add", "sub", "mul", "div", "neg") and self.fixed.issuperset(data)
+        ):
             self.fixed.add(slot)
         self.ops.append((e.op, slot, data))
         return slot
@@ -177,10 +185,10 @@ def series(tape: Tape, start: list[Any], s: Surroundings, order: int) -> Slots |
                 for slot in unknown:
                     c[slot][0] = 1
                     one_pass(tape, c, 0, s)
-                    columns.append([c[q][0] - l for q, l in zip(tape.constraints, left)])
+                    columns.append([c[q][0] - free for q, free in zip(tape.constraints, left)])
                     c[slot][0] = 0
                 effect = [[column[i] for column in columns] for i in range(len(left))]
-            answer = solved(effect, [-l for l in left])
+            answer = solved(effect, [-free for free in left])
             if answer is None:
                 return None
             for slot, value in zip(unknown, answer):

@@ -57,4 +57,5 @@ def small(seed: int, draw: int, integrator: str, tries: int = 150) -> str:
     holds(model)
     motion = found["truth"]
     events = [(round(t, 6), who, what) for t, who, what in motion.events[:8]]
-    return f"{found['text']}\n# {found['verdict']}\n# judge: {motion.status} {motion.message} until {motion.end}: {events}"
+    judge = f"# judge: {motion.status} {motion.message} until {motion.end}: {events}"
+    return f"{found['text']}\n# {found['verdict']}\n{judge}"

@@ -1,0 +1,121 @@
+"""Random whole models that combine forms, against a judge of their own; `studies/combined_forms.py` runs thousands."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import pytest
+from reference.combined.compare import judged
+from reference.combined.forms import TIME, Abstract, Contact, Impact, Node, abs_, node, sin, var
+from reference.combined.parts import alone
+from reference.combined.shrink import shrunk
+from reference.combined.trial import single_runs
+from reference.combined.values import Digits
+
+PARTS = (
+    "thermostat",
+    "twins",
+    "doses",
+    "clock",
+    "kick",
+    "bouncing",
+    "walls",
+    "stack",
+    "relay",
+    "monitor",
+    "sampled",
+)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_alone_moves_as_the_judge_says(part: str) -> None:
+    found = [record for seed in (1, 2) for record in single_runs(alone(part, seed).m, seed, 2)]
+    assert Counter(record["kind"] for record in found)["agrees"] >= 6
+    assert [record for record in found if record["kind"] not in ("agrees", "names refused", "cannot")] == []
+
+
+# -- the judge -----------------------------------------------------------------------------------------------------
+
+
+def value(motion, time: float, model: Abstract) -> dict[str, float]:  # type: ignore[no-untyped-def]
+    return motion.at(time, list(model.states))
+
+
+def test_the_judge_knows_a_ball_that_bounces_to_rest() -> None:
+    model = Abstract(duration=3.0)
+    model.states = {"h": (node(1), var("w")), "w": (node(0), var("p") - node("9.81"))}
+    model.impacts = {"p": Impact(var("h"), node("0.5"))}
+    motion, _, certain = judged(model, {})
+    first = math.sqrt(2 / 9.81)
+    assert motion.status == "finished" and certain == 3
+    assert motion.jumps[0] == pytest.approx(first, abs=1e-12)
+    assert motion.jumps[2] == pytest.approx(
+        2 * first, abs=1e-12
+    )  # each instant is noted by its blow and by the step
+    assert value(motion, 2.5, model)["h"] == pytest.approx(0, abs=1e-9)
+    assert max(t for t, who, _ in motion.events if who == "p") == pytest.approx(3 * first, abs=1e-5)
+
+
+def test_the_judge_knows_a_block_that_stops_and_is_pulled_loose() -> None:
+    model = Abstract(duration=3.0)
+    model.states = {"v": (node(1), TIME - var("f"))}
+    model.contacts = {"f": Contact(var("v"), node(4), node("0.5"))}
+    motion, _, _ = judged(model, {})
+    stop = 2 - math.sqrt(2)  # 1 - 2 t + t^2/2 = 0
+    assert [(round(t, 9), what) for t, who, what in motion.events] == [
+        (round(stop, 9), "stick"),
+        (2.0, "slip+"),
+    ]
+    assert value(motion, 3.0, model)["v"] == pytest.approx(0.5, abs=1e-12)
+
+
+def test_the_judge_keeps_energy_and_angular_momentum_inside_a_circle() -> None:
+    model = Abstract(duration=20.0)
+    x, y, p = var("x"), var("y"), var("p")
+    r = Node("sqrt", (x * x + y * y,))
+    model.states = {
+        "x": (node("0.3"), var("u")),
+        "y": (node(0), var("w")),
+        "u": (node("0.4"), -(p * x) / r),
+        "w": (node("0.9"), -(p * y) / r),
+    }
+    model.impacts = {"p": Impact(1 - r, node(1))}
+    motion, _, _ = judged(model, {})
+    end = value(motion, 20.0, model)
+    assert end["x"] * end["w"] - end["y"] * end["u"] == pytest.approx(0.27, abs=1e-9)
+    assert end["u"] ** 2 + end["w"] ** 2 == pytest.approx(0.97, abs=1e-9)
+    assert [end[k] for k in "xyuw"] == pytest.approx(
+        [0.08174826, 0.64156937, -0.30136915, 0.93764419], abs=1e-7
+    )
+
+
+def test_the_judge_names_two_motions_where_there_are_two() -> None:
+    model = Abstract()
+    f, p = var("f"), var("p")
+    model.states = {
+        "h": (node(0), var("w")),
+        "w": (node(0), 1 + p + 2 * f),
+        "u": (node(-1), -(5 * f) - 2 * p),
+    }
+    model.impacts = {"p": Impact(var("h"), node(0))}
+    model.contacts = {"f": Contact(var("u"), p, node(1))}
+    assert judged(model, {})[0].status == "nonunique"
+
+
+def test_the_judge_is_the_same_in_doubles_and_in_forty_digits() -> None:
+    model = Abstract(duration=4.0)
+    model.states = {
+        "q": (node("0.3"), var("v")),
+        "v": (node(0), 2 * sin(3 * TIME) - 4 * abs_(var("q")) - var("f")),
+    }
+    model.contacts = {"f": Contact(var("v"), node(1), node("0.4"), node("0.2"))}
+    one, two = judged(model, {})[0], judged(model, {}, Digits())[0]
+    assert [(who, what) for _, who, what in one.events] == [(who, what) for _, who, what in two.events]
+    assert value(one, 3.9, model)["q"] == pytest.approx(value(two, 3.9, model)["q"], abs=1e-11)
+
+
+def test_what_the_disagreement_does_not_need_is_taken_away() -> None:
+    model = alone("walls", 1).m
+    small = shrunk(model, lambda m: len(m.impacts) > 0 and m.duration > 0)
+    assert len(small.impacts) == 1 and not small.states and not small.contacts
