@@ -145,14 +145,16 @@ with hybridsim. The models combine the forms that people combine:
 - Names, the order of declaration, the scale and sign of the states and the origin of time are drawn as well. One run in
   ten is stopped in the middle and resumed.
 
-*The judge* (`tests/reference/combined`) reads an abstract form of the model, not the model file. It follows the motion by
-Taylor series in each configuration, finds zeros by dense sampling and bisection, and decides an instant by definition: it
-tries every combination of modes and sides, and keeps those whose conditions hold just after the instant. Impulses are
-found by enumeration as well. A disagreement is judged again in 40 digits. A run is compared only as long as the
-motion is certain: not beyond a touch of zero within 1e-6, and not beyond an instant that the rules leave open.
+*The judge* (`tests/reference/combined`) reads an abstract form of the model, not the model file. It follows the motion
+by Taylor series in each configuration, finds zeros by dense sampling and bisection, and decides an instant by
+definition: it tries every combination of modes and sides, and keeps those whose conditions hold just after the
+instant. Impulses are found by enumeration as well. A disagreement is judged again in 40 digits. A run is compared only
+as long as the motion is certain: not beyond a touch of zero within 1e-6, and not beyond an instant that the rules leave
+open.
 
-A run *agrees* if all states and discrete states are within {allowed:g} of the motion's size at {points} times, and its monitors
-fire as often as they should. A run that stops with a named status before the judge's motion ends is counted separately.
+A run *agrees* if all states and discrete states are within {allowed:g} of the motion's size at {points} times, and its
+monitors fire as often as they should. A run that stops with a named status before the judge's motion ends is counted
+separately.
 
 """
 
