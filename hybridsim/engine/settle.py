@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridsim.engine.at_zero import at_zero, cross, past_zero
 from hybridsim.engine.candidates import all_verdicts, verdicts_on
+from hybridsim.engine.corner_sides import sides_along, take_corners
 from hybridsim.engine.decide import (
     LEAVES,
     NONE,
@@ -23,6 +24,7 @@ from hybridsim.engine.decide import (
 from hybridsim.engine.diagnosis import rates_without_value
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
+from hybridsim.engine.first_modes import as_given, certainly_leaving
 from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import (
@@ -70,6 +72,7 @@ class Settling:
         self.changes: list[Change] = []
         self.warnings: list[str] = []
         self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        self.is_kinked = False  # a corner has changed its side: the field goes on, its slope does not
         # guards in the order in which they came to zero
         self.rank: dict[int, int] = {}
         self.releases = Releases(system, before)
@@ -89,10 +92,8 @@ class Settling:
         self.fired[list(located)] = True
         self.releases.locate(located)
         surfaces = self._surface_components()
-        open_ = {c for c, _, _ in self._fired_guards()}
-        if (self.system.is_corner[list(open_)]).any():
-            open_ = self._past_corners(open_)
-        failure = self._transitions(open_ - surfaces, list(resets))
+        open_ = self._past_corners({c for c, _, _ in self._fired_guards()})
+        failure = self._transitions(open_ - surfaces, list(resets)) or self._first_modes(surfaces)
         if failure:
             return self._stop(*failure)
         open_ &= surfaces
@@ -103,6 +104,7 @@ class Settling:
             failure = strike(self, open_) or self._decide(open_)
             if failure:
                 return self._stop(*(("inconsistent", lost) if lost else failure))
+            take_corners(self)
             verdicts = self._judge_all()
             leaving = {c for c, v in verdicts.items() if v == LEAVES}
             for c, v in verdicts.items():
@@ -113,7 +115,8 @@ class Settling:
             fatal = said_by_leaving(self.system, self.at.z, leaving, self.sides)
             if fatal:
                 return self._stop("inconsistent", fatal)
-            failure = self._transitions(leaving - surfaces, [])
+            failure = self._transitions(leaving - surfaces - set(self.system.led), [])
+            failure = failure or self._first_modes(surfaces)
             if failure:
                 return self._stop(*failure)
             open_ = leaving & surfaces
@@ -132,19 +135,36 @@ class Settling:
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Let corners change their sides; return the other components whose guards fire on these sides as well.
+        """Let corners take their sides first; return the other components whose guards fire on these sides as well.
 
         What was located by a series past a corner, such as a zero of a guard that turns back there, does not.
         """
-        corners = {c for c in open_ if self.system.is_corner[c]}
-        self._transitions(corners, [])
+        others = open_.difference(self.system.led)
+        if not take_corners(self):
+            return others
         decreed = self._decreed(self.at.z, continuous=False)
         staying = set()
-        for c in open_ - corners - self._surface_components():
+        for c in others - self._surface_components():
             if self._judge(self.at.z, self.at.x, decreed, [c]) != LEAVES:
                 staying.add(c)
                 self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
-        return open_ - corners - staying
+        return others - staying
+
+    def _first_modes(self, surfaces: set[int]) -> tuple[str, str] | None:
+        """Corners take the sides of a state that has changed; automata leave modes that no decision could keep.
+
+        A contact that is decided in the mode of an automaton that lasts for no time would go on by what held then.
+        """
+        take_corners(self)
+        if not surfaces or not (self.jumped or (self.at.z < 0).any()):
+            return None
+        for _ in range(_ROUNDS_PER_MODE * len(self.system.automata)):
+            leaving = certainly_leaving(self)
+            failure = self._transitions(leaving, []) if leaving else None
+            if failure or not leaving:
+                return failure
+            take_corners(self)
+        return None
 
     def take_sides(self) -> set[int]:
         """Give every surface component the mode of the side it is on; return those that are on the surface."""
@@ -225,6 +245,7 @@ class Settling:
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
         taken: list[tuple[int, str, int, int]] = []
+        given = as_given(system, at)
         for c in sorted(components, key=lambda c: (self._place(c), c)):
             automaton, mode = system.automata[c], int(at.z[c])
             guards = automaton.guards[mode]
@@ -236,7 +257,7 @@ class Settling:
             for j in leaving[:1]:
                 if automaton.fatal[mode][j]:
                     return "inconsistent", str(automaton.fatal[mode][j])
-                number = system.choose(c, mode, j, at.s, at.x, at.p, at.z)
+                number = system.choose(c, mode, j, at.s, at.x, given.p, given.z)
                 name = automaton.guard_names[mode][j]
                 if number < 0:
                     return "inconsistent", (
@@ -247,15 +268,16 @@ class Settling:
                 resets.append(("choice", c, mode, j, number))
                 taken.append((c, name, mode, target))
                 z_plus[c] = target
-            if not automaton.is_corner:  # a corner is still at zero, on its other side
-                self.fired[list(guards)] = False
-        if resets or any(not self.system.is_corner[c] for c, *_ in taken):
-            self.fired[self.system.is_corner[self.system.owner]] = False
-        clash = merged_resets(system, at, resets, x_plus, p_plus, x_error)
+            self.fired[list(guards)] = False
+            for g in guards:  # modes share the numbers of their guards, and the next mode's were not located
+                self.rank.pop(g, None)
+        if resets:
+            self.fired[system.is_corner[system.owner]] = False
+        clash = merged_resets(system, given, resets, x_plus, p_plus, x_error)
         if clash:
             return "inconsistent", clash
         self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
-        self.jumped = self.jumped or any(not system.is_corner[c] for c, *_ in taken) or bool(resets)
+        self.jumped = self.jumped or bool(taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
         return None
 
@@ -365,10 +387,10 @@ class Settling:
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """The modes as they are, but for those of some components."""
+        """The modes as they are, but for those of some components, and of corners on their sides along that motion."""
         z = self.at.z.copy()
         z[components] = modes
-        return np.maximum(z, 0)
+        return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)
 
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
         """Whether the guards of some components admit the modes z just after the event."""
@@ -433,7 +455,7 @@ class Settling:
             np.where(self.orders > 0, series.guard_bounds[:, 0], 0.0),
             np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
             self.changes,
-            self._continuous(at.z, range(len(self.system.automata))),
+            not self.is_kinked and self._continuous(at.z, range(len(self.system.automata))),
             "",
             "",
             self.warnings,

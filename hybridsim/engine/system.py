@@ -20,7 +20,8 @@ from hybridsim.engine.registers import Registers
 from hybridsim.engine.rows import evaluate, evaluate_rows
 from hybridsim.engine.signals import Signal
 from hybridsim.engine.timepair import Instant, phase_of
-from hybridsim.model.component import Corner
+from hybridsim.model.component import Corner, LoadAutomaton
+from hybridsim.model.jumps import SIGN
 from hybridsim.model.smoothing import smoothed
 from hybridsim.model.toml_automata import SINGLE
 
@@ -48,6 +49,8 @@ class Automaton:
     is_unilateral: bool = False  # its surface is a gap: there is no mode below
     is_unique: bool = False  # its surface takes a motion only where no other is admissible
     is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
+    is_step: bool = False  # but for those of a step in time
+    is_load: bool = False  # the load of a contact that opens
     limit: int = -1  # the mode that is entered where its transitions accumulate
 
     @property
@@ -133,6 +136,8 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         is_unilateral=bool(surface and surface.is_unilateral),
         is_unique=bool(surface and surface.unique),
         is_corner=isinstance(component, Corner),
+        is_step=isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables),
+        is_load=isinstance(component, LoadAutomaton),
         limit=names.index(component.limit.to) if component.limit else -1,
     )
 
@@ -155,6 +160,7 @@ class _Frame:
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
         self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
         self.is_unilateral = np.array([a.is_unilateral for a in self.automata], dtype=np.bool_)
+        self.led = tuple(c for c, a in enumerate(self.automata) if a.is_corner or a.is_load)
         self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
         self.component_numbers = np.arange(len(self.automata))
         self.guard_table = self._guard_table()
@@ -196,6 +202,7 @@ class System:
         self.has_surface: np.ndarray = frame.has_surface
         self.is_corner: np.ndarray = frame.is_corner
         self.is_unilateral: np.ndarray = frame.is_unilateral
+        self.led: tuple[int, ...] = frame.led  # corners and loads: their modes follow from the state
         # by impacts or resets; friction and relays alone do not
         self.may_bounce = bool((frame.is_unilateral | ~(frame.has_surface | frame.is_corner)).any())
         self.owner: np.ndarray = frame.owner  # component of each guard

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.checkpoint import Checkpoint
 from hybridsim.engine.diagnosis import power_without_value
+from hybridsim.engine.first_modes import as_given
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.limits import Gauge, LimitReached
@@ -353,10 +354,14 @@ class FixedStepRun:
         if s_error:
             x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
+        if starting:  # resets read contacts on the sides on which they are
+            at.z[system.has_surface] = self.task.z0[system.has_surface]
+            at.z = as_given(system, at).z
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
         outcome = Settling(system, at, before, forward=True, scope=self.declared).run(fired, resets)
-        self.x, self.z, self.discrete = outcome.x, outcome.z, system.discrete(outcome.p).copy()
+        self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()
+        self.z = np.where(system.has_surface, self.z, outcome.z)
         self._record_monitors(instant, seen, x_minus, outcome.x)
         for change in outcome.changes:
             automaton = system.automata[change.component]

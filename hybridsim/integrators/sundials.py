@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from hybridsim.engine.hermite import hermite
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.stepping import Dense, Flow, Root, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.past_steps import MOST, converges, through
@@ -24,6 +25,7 @@ _TANGENT = (
 )
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
+_CLEAR = 8.0  # times its rounding: a guard that has grown to this has the sign that it should
 _SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
 
 
@@ -121,20 +123,21 @@ class CvodeStepper:
     def _events(self, x0: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], None]:
         """The functions to watch; what is zero at the start by decree is taken out, the rest divided by its power of s.
 
-        So no function starts at zero and none can fire again from the zero that ended the last segment.
+        So no function starts at zero and none can fire again from the zero that ended the last segment. Until the power
+        with its factor exceeds the rounding of the states, the function has the value that it starts with.
         """
         flow, watch = self.flow, self.watch
-        zero = np.zeros(flow.n)
-        at_start = flow.system.series(0.0, x0, flow.p, flow.z, zero, 0.0)
+        at_start = flow.system.series(0.0, x0, flow.p, flow.z, UNIT * np.abs(x0), 0.0)
         count = len(self.kinds)
-        orders, start = np.zeros(count, dtype=np.int64), np.zeros(count)
+        orders, start, rounding = np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros(count)
         decreed = np.zeros((count, at_start.guards.shape[1]))  # Taylor coefficients that are zero by decree
         for k, (number, is_monitor) in enumerate(self.kinds):
             side = (watch.monitor_sides if is_monitor else watch.sides)[number]
             order = int((watch.monitor_orders if is_monitor else watch.orders)[number]) if side else 0
             series = (at_start.monitors if is_monitor else at_start.guards)[number]
+            bounds = (at_start.monitor_bounds if is_monitor else at_start.guard_bounds)[number]
             orders[k], start[k] = order, side * abs(series[order])
-            decreed[k, :order] = series[:order]
+            decreed[k, :order], rounding[k] = series[:order], _CLEAR * bounds[0]
         powers = np.arange(decreed.shape[1])
 
         def events(s: float, x: np.ndarray, out: np.ndarray) -> None:
@@ -142,10 +145,11 @@ class CvodeStepper:
             values = flow.guards(time, state)[0][watch.guards]
             if len(watch.monitor_sides):
                 values = np.concatenate([values, flow.monitors(time, state)[0]])
-            if s == 0.0:
-                out[:] = np.where(orders > 0, start, values)
-            else:
-                out[:] = (values - decreed @ s**powers) / abs(s) ** orders
+            power = abs(s) ** orders
+            is_start = (orders > 0) & (np.abs(start) * power <= rounding)
+            out[:] = np.where(
+                is_start, start, (values - decreed @ s**powers) / np.where(is_start, 1.0, power)
+            )
 
         # scikit-sundae reads the directions off the function itself; a function has no such attribute by its type
         events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]  # read off the function

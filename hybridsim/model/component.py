@@ -264,3 +264,8 @@ class Corner(Component):
     Or of a jump in time alone, such as ``sign(t - 1)``. It is decided as any other. A run keeps it apart from what the
     model declares (`hybridsim.model.smoothing`).
     """
+
+
+@dataclass(frozen=True)
+class LoadAutomaton(Component):
+    """The automaton of the load of a contact that opens: its mode is that of the load's sign."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.expr.evaluate import dependency_order
-from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
+from hybridsim.model.component import Choice, Component, Guard, LoadAutomaton, Mode, Surface
 from hybridsim.model.declared import Declared
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.law import LOAD_RATE, NORMAL, SPEED, FrictionLaw
@@ -172,7 +172,7 @@ class Contact(Declared):
             closed[self.variable(LOAD_RATE)] = values[LOAD_RATE]
             opened[self.variable(LOAD_RATE)] = parse(0)
         modes = (Mode("closed", (away,), set=closed), Mode("open", (back,), set=opened))
-        return Component(name, modes, initial="closed", place=place)
+        return LoadAutomaton(name, modes, initial="closed", place=place)
 
     def _set_valued(self, loaded: tuple[Guard, ...]) -> Component:
         force = parse(self.name, self.place)

@@ -55,6 +55,20 @@ class Programs:
             changed[c] = surface.hold
         return tuple(changed)
 
+    def given(self, point: Point, modes: Modes) -> Modes:
+        """Components without a mode are read on the side on which the state is, and as holding where it is on none."""
+        if UNDECIDED not in modes:
+            return modes
+        decided = self.decided(modes)
+        expansion, changed = self.expand(point, decided), list(decided)
+        owners = [c for c, component in enumerate(self.components) if component.surface]
+        for c, watched in zip(owners, expansion.surfaces, strict=True):
+            surface = self.components[c].surface
+            assert surface is not None and surface.below is not None  # models with impacts are refused
+            if modes[c] == UNDECIDED and not expansion.is_zero(watched):
+                changed[c] = surface.above if watched.c[0] > 0 else surface.below
+        return tuple(changed)
+
     def program(self, modes: Modes) -> Program:
         """The equations in these modes."""
         if modes not in self._programs:

@@ -2,9 +2,16 @@
 
 The rules, in words:
 
+0.  A corner, a step in time and the load of a contact that opens have the side on which their argument is just after.
+    They take it before anything else is looked at: at the start, at what was located, after each reset and each change
+    of another component, and in each combination of modes that is tried. While a contact has no mode yet, their values
+    alone say where they are.
 1.  Guards of the present modes that are zero here and would be negative just after have fired. Of an automaton with
     choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors
-    among them, are evaluated at x- and made at once; two that set one variable to different values are an error.
+    among them, are evaluated at x- and made at once; two that set one variable to different values are an error. Of
+    guards that a reset has made negative, or that are so at a start, the first that is declared is taken. Automata
+    whose guard is negative, and holds no force of a contact, leave before contacts are decided. A contact that has no
+    mode yet is read on the side on which it is.
 2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
 3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
     combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of
@@ -35,6 +42,7 @@ from typing import TYPE_CHECKING
 from hybridsim.analysis.multiple_precision.expansion import Expansion
 from hybridsim.analysis.multiple_precision.program import Point
 from hybridsim.analysis.multiple_precision.programs import UNDECIDED, Modes, Programs
+from hybridsim.analysis.multiple_precision.sides import Sides
 from hybridsim.analysis.multiple_precision.transitions import Move, Transitions
 from hybridsim.errors import SimulationError, UsageError
 
@@ -61,7 +69,7 @@ class Rules:
 
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
-        self.transitions = Transitions(programs)
+        self.transitions, self.sides = Transitions(programs), Sides(programs)
 
     def settle(
         self,
@@ -74,27 +82,45 @@ class Rules:
         moves: list[Move] = []
         fired = set(located)
         self.programs.new_instant()
+        now = self.sides.taken(point, modes, moves)
         if fired:
-            fired.update(self.programs.leaving(self.programs.expand(point, modes)))
-        due = list(resets)
+            leaving = self._leaving(point, now)
+            fired = leaving if now != modes else self.sides.others(fired) | leaving
+        modes, due, is_located = now, list(resets), bool(fired)
         for _ in range(_MOST_ROUNDS):
             names = {
                 c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)
             }
-            point, modes = self.transitions.take(point, modes, fired, due, moves)
+            point, modes = self.transitions.take(point, modes, fired, due, moves, is_located)
+            modes = self.sides.taken(point, modes, moves)
+            point, modes = self._leave_in_any_case(point, modes, moves)
             modes, open_ = self._take_sides(point, modes, moves)
             open_ |= {c for c in names if self.components[c].surface}
             point, modes = self._decide(point, modes, open_, names, moves)
-            expansion = self.programs.expand(point, modes)
-            fired, due = set(self.programs.leaving(expansion)), []
+            modes = self.sides.taken(point, modes, moves)
+            fired, due, is_located = self._leaving(point, modes), [], False
             if not fired:
-                return Settled(point, modes, expansion, moves)
+                return Settled(point, modes, self.programs.expand(point, modes), moves)
         moving = ", ".join(sorted({self.components[move.component].name for move in moves[-8:]}))
         raise UsageError(
             f"at t = {float(point.t)!r} the transitions of {moving} follow each other over and over: motion along a "
             "surface of a general automaton is not supported by the multiple-precision run",
             remedy="compare against runs",
         )
+
+    def _leaving(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
+        """The guards that are negative just after, those of corners and loads left out: these have their sides."""
+        return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
+
+    def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
+        """Let automata leave whose guards are negative and free of the forces that are still to be decided."""
+        for _ in range(_MOST_ROUNDS if self._surfaces() else 0):
+            leaving = self.sides.leaving_in_any_case(point, modes)
+            if not leaving:
+                break
+            point, modes = self.transitions.take(point, modes, leaving, [], moves)
+            modes = self.sides.taken(point, modes, moves)
+        return point, modes
 
     def _surfaces(self) -> list[int]:
         return [c for c, component in enumerate(self.components) if component.surface]
@@ -172,7 +198,7 @@ class Rules:
             candidate = list(self.programs.decided(modes))
             for c, mode in zip(chosen, combination, strict=True):
                 candidate[c] = mode
-            trial = tuple(candidate)
+            trial = self.sides.along(point, tuple(candidate))
             expansion = self.programs.expand(point, trial)
             if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
                 kept = [c for c in chosen if trial[c] == modes[c]]

@@ -41,9 +41,13 @@ class Transitions:
         fired: Iterable[tuple[int, int]],
         resets: list[Mapping[str, Expression]],
         moves: list[Move],
+        is_located: bool = False,
     ) -> tuple[Point, Modes]:
-        """Take the declared choices of the guards that fired, and make all resets at once."""
-        after = list(modes)
+        """Take the declared choices of the guards that fired, and make all resets at once.
+
+        is_located: the guards came to zero together, so that none of one component is before another.
+        """
+        after, modes = list(modes), self.programs.given(point, modes)
         ways: dict[int, tuple[str, Mapping[str, Expression]]] = {}
         for c, j in sorted(fired):
             component = self.programs.components[c]
@@ -67,11 +71,11 @@ class Transitions:
                 )
             if c not in ways:
                 moves.append(Move(c, modes[c], choice.to, guard.name))
-            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset):
+            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset) and is_located:
                 raise SimulationError(
                     f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
                 )
-            after[c] = choice.to
+            after[c] = ways[c][0]
         values = self._reset_values(point, modes, [*(reset for _, reset in ways.values()), *resets])
         x = tuple(values.get(name, value) for name, value in zip(self.states, point.x, strict=True))
         discrete = tuple(

@@ -18,6 +18,7 @@ from hybridsim.testing.catalogue import (
     sensitivity,
     sliding,
     stability,
+    starts,
     stiffness,
     stops,
     thresholds,
@@ -29,7 +30,7 @@ from hybridsim.testing.stories import with_stories
 # Models whose rates or guards are not linear in the states: v**2, exp(v), tanh(v/eps), 1/(1 + delta |v|), x*y, ...
 NONLINEAR = {
     "belt", "stribeck", "corridor-modes", "circle", "vdp", "tanh", "parachute", "tank", "disc", "powers",
-    "drag", "circle-surface", "sliding-circle", "drum", "discs",
+    "drag", "circle-surface", "sliding-circle", "drum", "discs", "sides-of-contacts",
 }  # fmt: skip
 
 
@@ -47,6 +48,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             instants,
             corners,
             conditions,
+            starts,
             oscillators,
             contacts,
             thresholds,

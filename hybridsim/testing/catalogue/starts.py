@@ -1,0 +1,127 @@
+"""Scenes in which a start or a jump leaves corners, steps in time and loads on another side than the one before."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from hybridsim.testing.scene import Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Guards, contacts, a relay and a gap beside corners; a clock at the start; the order of guards; a flat corner."""
+    return _guards(), _contacts(), _relay(), _gap(), _sampled(), _order(), _flat()
+
+
+def _guards() -> Scene:
+    """All states move at constant rates, so that each guard is made of straight lines."""
+    events = (
+        (0.5, "nested:after"),
+        (1.0, "largest:after"),
+        (1.0, "mover:after"),
+        (1.0, "swapped:after"),
+        (2.0, "inside:after"),
+        (2.5, "sum:after"),
+        (4.5, "moved:after"),
+        (5.5, "set:after"),
+    )
+    states = (
+        (0.75, (0.25, -2.25, -1.75, 1.15, 0.75, -5.0)),
+        (6.0, (-5.0, 3.0, -7.0, -0.1, 6.0, 5.0)),
+    )
+    return Scene(
+        "sides-of-guards",
+        "sides-of-guards",
+        (0.0, 6.0),
+        Truth(events, states),
+        needs("transitions", "scheduled"),
+    )
+
+
+def _contacts() -> Scene:
+    """The limits of rest are 0.8, 3.5, 3.6, 0.8 and 0: three bodies rest, one starts at t = 2, one slides freely."""
+    events = ((0.0, "lifted_N:open"), (2.0, "step:slip+"))
+    states = (
+        (1.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.0, 0.5)),
+        (3.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 1.7, -1.0, 1.5)),
+    )
+    return Scene(
+        "sides-of-contacts",
+        "sides-of-contacts",
+        (0.0, 3.0),
+        Truth(events, states),
+        needs("contacts", "transitions", "exact-stick"),
+    )
+
+
+def _relay() -> Scene:
+    return Scene(
+        "sides-of-a-relay",
+        "sides-of-a-relay",
+        (0.0, 4.0),
+        Truth((), ((1.0, (0.0, -0.5)), (4.0, (0.0, 1.0)))),
+        needs("sliding"),
+    )
+
+
+def _gap() -> Scene:
+    """The force is -3 at the start, -5 after the jump, and -1 + 3 y where y > 0: it lifts the ball at y = 1/3."""
+    lifted = 0.5 + 2.0 + 1.0 / 3.0
+    rise = 4.0 - lifted
+    states = ((0.25, (0.0, 0.0, -0.75)), (2.5, (0.0, 0.0, 0.0)), (4.0, (0.5 * rise**3, 1.5 * rise**2, 1.5)))
+    return Scene(
+        "sides-of-a-gap",
+        "sides-of-a-gap",
+        (0.0, 4.0),
+        Truth(((lifted, "p:open"),), states),
+        needs("impacts", "scheduled"),
+    )
+
+
+def _sampled() -> Scene:
+    """At t = 1 the ball is half a metre lower and the body rises from -0.7 to -0.2; f was -0.5 all the while."""
+    read = tuple(
+        (partial(_read, name, t), value)
+        for t, values in (
+            (0.5, {"height": 3.0, "speed": -0.7, "force": -0.5}),
+            (1.25, {"height": 2.5, "speed": -0.2, "force": -0.5}),
+        )
+        for name, value in values.items()
+    )
+    return Scene(
+        "sampled-start",
+        "sampled-start",
+        (0.0, 1.5),
+        Truth(None, ((0.5, (2.875, -0.5, -0.45)), (1.25, (3.0 - 0.5 * 1.25**2, -1.25, -0.075))), read),
+        needs("impacts", "contacts", "scheduled"),
+    )
+
+
+def _read(name: str, t: float, solution: Any) -> float:
+    return float(solution.output(name, t))
+
+
+def _order() -> Scene:
+    events = ((1.0, "few:second"), (1.0, "few:third"), (1.0, "more:second"), (1.0, "more:third"))
+    return Scene(
+        "order-of-guards",
+        "order-of-guards",
+        (0.0, 2.0),
+        Truth(events, ((2.0, (-3.0, -3.4)),)),
+        needs("transitions"),
+        tol_t=1e-12,
+    )
+
+
+def _flat() -> Scene:
+    """c = 9 + cos(t)."""
+    return Scene(
+        "flat-corner",
+        "flat-corner",
+        (0.0, 2.0),
+        Truth(
+            ((math.pi / 3, "band:outside"),), ((0.5, (9.0 + math.cos(0.5),)), (2.0, (9.0 + math.cos(2.0),)))
+        ),
+        needs("transitions"),
+    )
