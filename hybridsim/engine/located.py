@@ -1,13 +1,14 @@
-"""What is known of an event as it was located: the state with bounds of its errors, and the guards zero together."""
+"""What is known of an event as it was located: the state with bounds of its errors, and what is zero together."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.decide import side_after
+from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.segment import Arrival, SegmentRun
@@ -19,13 +20,15 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
     zero = np.zeros(system.n)
-    series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-    located = series.guards[list(arrival.fired)].tolist() + series.monitors[list(arrival.stopping)].tolist()
+    located: list[Any] = []
+    if arrival.fired or arrival.stopping:
+        series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
+        located = [*series.guards[list(arrival.fired)], *series.monitors[list(arrival.stopping)]]
     # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
     least = UNIT * float(segment.tolerances.atol.min(initial=math.inf))
-    for value, slope, *_ in located:
-        if max(abs(value), abs(slope)) > least and slope != 0.0 and math.isfinite(value / slope):
-            s_error = max(s_error, abs(value / slope))
+    for series_of_zero in located:
+        if np.abs(series_of_zero[:2]).max() > least:
+            s_error = max(s_error, distance_of_zero(series_of_zero))
     slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     x_error = segment.rounding() + s_error * slopes
     holding = system.evaluated(flow.z)
@@ -33,34 +36,57 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
 
 
-def with_monitors(system: System, at: Situation, arrival: Arrival, sides: np.ndarray) -> Arrival:
-    """The arrival with all monitors that reset and cross zero at its instant, so that their resets see one state.
+def distance_of_zero(series: Any) -> float:
+    """How far in time the zero of a function is, by its Taylor coefficients; 0 where they do not tell.
 
-    sides are those of the monitors just before.
+    A function that only touches zero has a slope that tells nothing: a double zero is sqrt(2 |g/g''|) away.
     """
-    resetting = [k for k, m in enumerate(system.model.monitors) if m.action == "reset" and sides[k] != 0]
-    if not set(resetting).difference(arrival.stopping):
-        return arrival
-    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
-    stopping = set(arrival.stopping)
-    for k in resetting:
-        value, bound = series.monitors[k], series.monitor_bounds[k]
-        wanted = {"up": 1, "down": -1, "both": -int(sides[k])}[system.model.monitors[k].direction]
-        if abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] == wanted == -sides[k]:
-            stopping.add(k)
-    return replace(arrival, stopping=tuple(sorted(stopping)))
+    value, slope, bend = (abs(float(c)) for c in series[:3])
+    by_slope = value / slope if slope > 0.0 else math.inf
+    by_bend = math.sqrt(value / bend) if bend > 0.0 else math.inf
+    distance = min(by_slope, by_bend)
+    return distance if math.isfinite(distance) else 0.0
 
 
-def coincident(system: System, origin: Instant, at: Situation, fired: tuple[int, ...]) -> dict[int, int]:
-    """The located guards and those that are zero with them and leave, with the order of their times."""
-    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+def time_error(series: Any, bounds: Any) -> float:
+    """How well the time of a zero is known, by the bound of the function's value there."""
+    return distance_of_zero((bounds[0], *series[1:]))
+
+
+@dataclass(frozen=True)
+class Located:
+    """One instant at which a segment ended.
+
+    Parameters
+    ----------
+    at : the state just before it.
+    fired : guards that are zero and leave, with the order of their times.
+    stopping : monitors that are zero and whose resets are due, or one that ends the run and is alone.
+    sides : sides of the monitors just before it.
+    is_met : whether what is due beforehand falls on it.
+    """
+
+    at: Situation
+    fired: dict[int, int]
+    stopping: tuple[int, ...]
+    sides: np.ndarray
+    is_met: bool
+
+
+def coincident(
+    system: System, origin: Instant, at: Situation, fired: tuple[int, ...], known: Any = None
+) -> dict[int, int]:
+    """The located guards and those that are zero with them and leave, with the order of their times.
+
+    known: the series there, if they are at hand.
+    """
+    series = known or system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     together: dict[int, float] = {}
     for g in map(int, np.flatnonzero(system.active(at.z))):
         value, bound = series.guards[g], series.guard_bounds[g]
-        distance, rate = value[:2].tolist()
         leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
         if g in fired or leaves:
-            together[g] = -distance / rate if rate != 0.0 else 0.0
+            together[g] = math.copysign(distance_of_zero(value), float(value[0]))
     # guards within one ulp of the time are at one place of the order
     ulp = math.ulp(max(abs(float(origin.plus(at.s))), math.ulp(1.0)))
     order: dict[int, int] = {}
@@ -70,3 +96,86 @@ def coincident(system: System, origin: Instant, at: Situation, fired: tuple[int,
             place, last = place + 1, together[g]
         order[g] = place
     return order
+
+
+def located(
+    system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
+) -> Located:
+    """What is zero where a segment ended, and what is to be settled there.
+
+    is_due: something is due at the local time `target`, which may be this very instant.
+    """
+    at, is_met = situation(system, arrival, segment), False
+    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+    if is_due:  # at a known time it counts how well the motion is known there
+        wide = replace(at)
+        add_steps(system, wide, segment.scale + np.abs(arrival.x - segment.states[0]), len(segment.knots))
+        known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+        zeros = [(known.guards[g], known.guard_bounds[g]) for g in arrival.fired]
+        zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
+        late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
+        is_met = abs(target - arrival.s) <= at.s_error + late
+        at, series = (wide, known) if is_met else (at, series)
+    fired = coincident(system, origin, at, arrival.fired, series)
+    sides = _before_instant(series, arrival, segment)
+    stopping, monitors = set(arrival.stopping), system.model.monitors
+    for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
+        if monitors[k].action != "reset" or sides[k] == 0:
+            continue
+        wanted = {"up": 1, "down": -1, "both": -int(sides[k])}[monitors[k].direction]
+        if abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] == wanted == -sides[k]:
+            stopping.add(k)
+    resetting = {k for k in stopping if monitors[k].action == "reset"}
+    if fired or resetting or is_met:  # what ends a run by itself is judged when all of this has been settled
+        stopping = resetting
+    return Located(at, fired, tuple(sorted(stopping)), sides, is_met)
+
+
+def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:
+    """Sides of the monitors just before an instant; those that are zero within rounding have not crossed yet.
+
+    Where they were seen to cross, the sighting is taken back: the sides before and after the instant decide.
+    """
+    sides, watch = segment.locator.monitor_sides.copy(), segment.watch
+    for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
+        before = side_before(value, bound, 1)[0] if abs(value[0]) <= bound[0] else 0
+        near = 2.0 * time_error(value, bound)
+        if before == 0 or (
+            watch.monitor_orders[k] > 0 and abs(arrival.s) <= near
+        ):  # it still leaves the last zero
+            continue
+        sides[k] = before
+        segment.sightings = [
+            seen for seen in segment.sightings if seen.number != k or abs(arrival.s - seen.s) > near
+        ]
+    return sides
+
+
+def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
+    """The same backward in time, where an instant has no further changes."""
+    at = situation(system, arrival, segment)
+    fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
+    return Located(at, fired, arrival.stopping, segment.locator.monitor_sides, True)
+
+
+def before_appointment(
+    system: System, target: Instant, at: Situation, steps: int, scale: np.ndarray
+) -> dict[int, int]:
+    """Guards that are zero and leave at a time known beforehand, which a compiled loop has reached: they come first.
+
+    It took so many steps, with states of this size; the errors in `at` are completed by their rounding.
+    """
+    at.x_error = at.x_error + 4.0 * UNIT * scale
+    at.s_error = math.ulp(float(target))
+    add_steps(system, at, scale, steps)
+    return coincident(system, target, at, ())
+
+
+def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int) -> None:
+    """Add to the errors of the states what so many steps have rounded away.
+
+    A step sums up to sixteen stages (dop853), each rounded. scale: of the states and of the way they went.
+    """
+    held = system.evaluated(at.z)
+    at.x_error = at.x_error + 16.0 * UNIT * steps * scale
+    at.x_error[held] = UNIT * np.abs(at.x[held])

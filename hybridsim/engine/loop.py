@@ -15,7 +15,7 @@ from hybridsim.engine.gathering import behind, closed_now, holds_several
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
-from hybridsim.engine.located import coincident, situation, with_monitors
+from hybridsim.engine.located import Located, before_appointment, located, located_backward
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
@@ -138,14 +138,19 @@ class ModeLoop:
                 appointment = Appointment(target, (), is_renewal=True)
             segment = self._segment_run()
             bound = target.minus(self.origin)
+            found: Located | None = None
             try:
                 arrival = segment.run(bound, step_size)
+                at_target = arrival.s == bound
+                is_due = appointment is not None and not appointment.is_renewal
+                if self.forward and (arrival.fired or arrival.stopping or (at_target and appointment)):
+                    found = located(self.system, self.origin, arrival, segment, bound, is_due)
+                    at_target = at_target or found.is_met
             finally:
                 self._keep(segment)
                 self.notices.look()
-            at_target = arrival.s == bound
             instant = target if at_target else self.origin.plus(arrival.s)
-            stop = self._settle(instant, arrival, appointment if at_target else None, segment)
+            stop = self._settle(instant, arrival, appointment if at_target else None, segment, found)
             step_size = segment.last_step if self.outcome.continuous else None
 
     def _mark(self, step_size: float | None) -> None:
@@ -180,6 +185,7 @@ class ModeLoop:
 
     def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
         """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
+        steps, x_before = self.record.counters.steps, self.standing.read()[0].x.copy()
         while True:
             landing = leaper.leap(self.origin, *self.standing.read(), target, self.record)
             self.origin = landing.origin
@@ -205,9 +211,21 @@ class ModeLoop:
             self._tell(self.origin)
             return True, True
         self.timetable.kept(target)
+        at, steps = self._at_target(target), self.record.counters.steps - steps
+        scale = np.maximum(np.abs(x_before), np.abs(at.x)) + np.abs(at.x - x_before)
+        if fired := before_appointment(self.system, target, at, steps, scale):
+            x, settled = at.x.copy(), Settling(self.system, at, at.z.copy(), True).run(fired, ())
+            if self._adopt(target, settled, x, (), ()):
+                return True, True
         x = self.outcome.x
         settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
         return True, self._adopt(target, settled, x, appointment.schedules, ())
+
+    def _at_target(self, target: Instant) -> Situation:
+        """The state just before an instant that a compiled loop has reached."""
+        outcome = self.outcome
+        p = self.system.vector(target, self.system.discrete(outcome.p), not self.forward)
+        return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
 
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
@@ -249,7 +267,12 @@ class ModeLoop:
     # -- events ---------------------------------------------------------------------------------------------
 
     def _settle(
-        self, instant: Instant, arrival: Arrival, appointment: Appointment | None, segment: SegmentRun
+        self,
+        instant: Instant,
+        arrival: Arrival,
+        appointment: Appointment | None,
+        segment: SegmentRun,
+        found: Located | None,
     ) -> bool:
         """Settle what happens where a segment ended; True where the run stops."""
         schedules = appointment.schedules if appointment else ()
@@ -263,45 +286,43 @@ class ModeLoop:
         if not (arrival.fired or arrival.stopping or appointment):
             self.origin = instant
             return True
-        if not self.forward:
+        if found is None:
             refused = has_no_past(self.system, self.outcome.z, arrival.fired, arrival.stopping, schedules)
             if refused:
                 self.origin = instant
                 self.record.status, self.record.message = "backward-nonunique", refused
                 return True
-        sides = segment.locator.monitor_sides
-        x_minus = arrival.x
-        if arrival.fired or arrival.stopping:
-            at = situation(self.system, arrival, segment)
-            if self.forward:
-                arrival = with_monitors(self.system, at, arrival, sides)
-            outcome = self._settle_located(at, arrival)
+            found = located_backward(self.system, self.origin, arrival, segment)
+        sides, x_minus, error = found.sides, arrival.x, segment.rounding()
+        if found.fired or found.stopping:
+            outcome = self._settle_located(found)
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
             stop = None if limit is None else self._gathered(limit)
             if stop is not None:
                 return stop
-            outcome = self._apply_crossed(outcome, arrival.s, sides, arrival.stopping)
-            if self._adopt(instant, outcome, x_minus, (), arrival.stopping, sides):
+            outcome = self._apply_crossed(outcome, arrival.s, sides, found.stopping)
+            settled = [*found.stopping, *self.crossed_by_reset]
+            if self._adopt(instant, outcome, x_minus, (), found.stopping, sides, appointment is None):
                 return True
-            sides, x_minus = outcome.monitor_sides, outcome.x
+            sides, x_minus, error = sides.copy(), outcome.x, outcome.x_error
+            sides[settled] = outcome.monitor_sides[settled]
         if appointment:
             if not appointment.is_renewal:
                 self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
-            outcome = self._settle_appointment(instant, x_minus, schedules, segment.rounding())
+            outcome = self._settle_appointment(instant, x_minus, schedules, error)
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
         return self._accumulated(instant, arrival.x, arrival.fired)
 
-    def _settle_located(self, at: Situation, arrival: Arrival) -> Outcome:
+    def _settle_located(self, found: Located) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
-        resets = [("monitor", k) for k in arrival.stopping if self.system.model.monitors[k].action == "reset"]
-        fired = coincident(self.system, self.origin, at, arrival.fired) if arrival.fired or resets else {}
-        if fired and not self.forward:
-            return cross_backward(self.system, at, tuple(fired))
-        return Settling(self.system, at, at.z.copy(), self.forward).run(fired, resets)
+        resets = [("monitor", k) for k in found.stopping if self.system.model.monitors[k].action == "reset"]
+        if found.fired and not self.forward:
+            return cross_backward(self.system, found.at, tuple(found.fired))
+        return Settling(self.system, found.at, found.at.z.copy(), self.forward).run(found.fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, sides: np.ndarray, done: tuple[int, ...]) -> Outcome:
         """Apply the resets of the monitors that an event carried to their other side, each once."""
@@ -415,8 +436,12 @@ class ModeLoop:
         schedules: tuple[int, ...],
         stopping: tuple[int, ...],
         monitor_sides: np.ndarray | None = None,
+        is_last: bool = True,
     ) -> bool:
-        """Make the state after an event the start of the next segment and record the event; True to stop."""
+        """Make the state after an event the start of the next segment and record the event; True to stop.
+
+        is_last: nothing follows at this instant; else only the monitors that stopped it are recorded yet.
+        """
         system, record = self.system, self.record
         self.origin = self.adopted = instant
         self._stand(instant, lambda: outcome)
@@ -441,7 +466,7 @@ class ModeLoop:
             schedule = system.model.schedules[k]
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
-        terminated += self._crossed_monitors(instant, outcome, x_minus, stopping, monitor_sides)
+        terminated += self._crossed_monitors(instant, outcome, x_minus, stopping, monitor_sides, is_last)
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
@@ -464,6 +489,7 @@ class ModeLoop:
         x_minus: np.ndarray,
         stopping: tuple[int, ...],
         monitor_sides: np.ndarray | None,
+        is_last: bool,
     ) -> list[str]:
         """Record the monitors whose side differs across the event; return those that end the run."""
         ended = []
@@ -474,7 +500,7 @@ class ModeLoop:
                 self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
                 continue
             after = int(outcome.monitor_sides[k])
-            if k not in stopping and (before == 0 or after in (0, before)):
+            if k not in stopping and (not is_last or before == 0 or after in (0, before)):
                 continue
             direction = after if after and after != before else -before
             if {"up": 1, "down": -1, "both": direction}[monitor.direction] != direction:

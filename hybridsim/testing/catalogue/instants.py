@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from hybridsim.testing.checks import equals
+from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Resets that add."""
-    return (_doses(), _counting_balls())
+    """Resets that add, and what comes to zero where a clock ticks."""
+    return (_doses(), _counting_balls(), _guard_and_tick(), _carried_back())
 
 
 def _doses() -> Scene:
@@ -44,3 +45,44 @@ def _counting_balls() -> Scene:
         needs("transitions"),
         unit=fall,
     )
+
+
+def _guard_and_tick() -> Scene:
+    """Every 0.3 the ramp of 0.7 comes to 0.21; 0.7 and 0.21 as doubles make that differ by some roundings."""
+    times = [0.3 * k for k in range(1, 11)]
+    return Scene(
+        "guard-at-each-tick",
+        "guard-and-tick",
+        (0.0, 3.15),
+        Truth(
+            tuple((t, name) for t in times for name in ("top:rising", "back")),
+            ((1.6, (0.07,)), (3.15, (0.105,))),
+            checks=(("", equals(3.15, passed=10.0)),),
+        ),
+        needs("transitions", "scheduled", "adaptive"),
+        unit=0.3,
+        count_scheduled=True,
+        tol_t=1e-12,
+    )
+
+
+def _carried_back() -> Scene:
+    """The monitor touches zero and changes its side at no instant."""
+    return Scene(
+        "monitor-carried-back",
+        "carried-back",
+        (0.0, 3.15),
+        Truth(
+            None,
+            ((1.6, (0.07,)), (3.15, (0.105,))),
+            checks=(("", equals(3.15, ticks=10.0)), ("", _never_crossed)),
+        ),
+        needs("transitions", "monitors", "scheduled", "adaptive"),
+        unit=0.3,
+        tol_t=1e-12,
+    )
+
+
+def _never_crossed(solution: Any) -> list[str]:
+    crossed = [event.t for event in solution.events if event.kind == "monitor"]
+    return [f"the monitor fires {at_times(crossed)} instead of never"] if crossed else []
