@@ -19,6 +19,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.analysis.variations.parameters import expression_slope
+from hybridsim.analysis.variations.rounds import (
+    Rounds,
+    batches,
+    component_of,
+    guard_number,
+    is_knot,
+    lifted_vector,
+)
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
 from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
@@ -79,9 +87,7 @@ class Carrier:
                 remedy="write it with a guard and a reset, or compare runs with parameters that differ",
             )
         module: Any = self.system.code.module
-        self._reset, self._project, self._rates = (
-            differentiated(f) for f in (module.reset, module.project, module.rates)
-        )
+        self._project, self._rates = (differentiated(f) for f in (module.project, module.rates))
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
 
@@ -127,10 +133,28 @@ class Carrier:
                 f"{scheduled[0].component} happens at the start of the run, and its time depends on what is changed",
                 remedy="begin the run a little earlier or later",
             )
-        nothing = np.zeros(Y.shape[1])
-        for one in happened:
-            Y, Yd = self._after_reset(segment, one, float(segment.s[0]), Y, Yd, G, nothing)
+        if happened:
+            z = segment.z.copy()
+            for one in reversed(happened):
+                if one.kind not in ("monitor", "scheduled"):
+                    c, automaton = component_of(self.system, one)
+                    z[c] = automaton.modes.index(one.source)
+            before = happened[0].x_minus, self.system.discrete_start, z
+            rounds = self._rounds(before, Y, Yd, G, np.zeros(Y.shape[1]))
+            for batch in batches(happened):
+                rounds.at_appointment(segment.start, batch)
+            Y, Yd = rounds.Y, rounds.Yd
         return self._projected(segment, Y, Yd, G), Yd
+
+    def _rounds(
+        self,
+        before: tuple[np.ndarray, np.ndarray, np.ndarray],
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+        shift: np.ndarray,
+    ) -> Rounds:
+        return Rounds(self.system, *before, Y, Yd, G, self._rate_slopes() @ G, shift, self._scale)
 
     def _refuse_inputs(self, G: np.ndarray) -> None:
         """Derivatives of an input's shape by its parameters are not known."""
@@ -157,7 +181,8 @@ class Carrier:
         def slopes(s: np.ndarray) -> np.ndarray:
             return tape(s, segment.dense(s), segment.p, seeds[:, chosen]).slopes
 
-        total = transition(slopes, segment.s, self._scale)
+        values = np.abs(np.concatenate([self.system.discrete(segment.p), segment.p[: len(G)]]))[moving]
+        total = transition(slopes, segment.s, self._scale, np.where(values > 0.0, values, 1.0))
         Y = total[:, :n] @ Y + total[:, n:] @ constant[moving]
         return self._projected(segment, Y, Yd, G, at_end=True)
 
@@ -199,8 +224,17 @@ class Carrier:
         shift = self._shift(segment, happened, s, x, Y, Yd, G)
         before = rates_of(system, s, x, segment.p, segment.z)
         Y = Y + np.outer(before, shift)
-        for one in happened:
-            Y, Yd = self._after_reset(segment, one, s, Y, Yd, G, shift)
+        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y, Yd, G, shift)
+        groups = batches(happened)
+        for k, batch in enumerate(groups):
+            is_due = any(one.kind == "scheduled" for one in batch) or (
+                k == len(groups) - 1 and is_knot(system, following.start)
+            )
+            if is_due:
+                rounds.at_appointment(following.start, batch)
+            else:
+                rounds.at_end(segment, batch)
+        Y, Yd = rounds.Y, rounds.Yd
         after = rates_of(system, float(following.s[0]), following.x[0], following.p, following.z)
         Y = Y - np.outer(after, shift)
         return self._projected(following, Y, Yd, G), Yd, shift
@@ -220,10 +254,18 @@ class Carrier:
         if not happened:
             return np.zeros(G.shape[1])
         shifts = [self._scheduled_shift([o], G) for o in scheduled]
+        if is_knot(self.system, segment.end):  # inputs whose knots move are refused
+            shifts.append(np.zeros(G.shape[1]))
         for one in happened:
             if one.kind == "monitor" or one.guard:
                 shift = self._located_shift(segment, one, s, x, Y, Yd, G, is_first=not shifts)
                 shifts += [] if shift is None else [shift]
+        if not shifts:
+            raise UsageError(
+                f"what set off the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is not "
+                "known, and so the derivatives of its time are not",
+                remedy="take other parameters, or a run that ends before",
+            )
         largest = max(np.abs(shift).max(initial=0.0) for shift in shifts)
         if any((np.abs(shift - shifts[0]) > _ALIKE * largest).any() for shift in shifts):
             raise UsageError(
@@ -246,9 +288,14 @@ class Carrier:
     ) -> np.ndarray | None:
         """Of an event at a zero of a guard or monitor; None for one that followed from another."""
         system, n = self.system, self.system.n
-        if one.kind != "monitor" and one.source != self._mode(one, segment.z):
-            return None
-        number, is_monitor = self._function(one, segment.z)
+        is_monitor = one.kind == "monitor"
+        if is_monitor:
+            number = system.monitor_names.index(one.component)
+        else:
+            c, automaton = component_of(system, one)
+            number = guard_number(system, one)
+            if number < 0 or automaton.modes[segment.z[c]] != one.source:
+                return None
         tape = TangentTape(system, segment.z, *(((), (number,)) if is_monitor else ((number,), ())))
         found = tape(np.array([s]), x[None, :], segment.p, self._seeds(segment))
         row = found.slopes[0, n]
@@ -268,19 +315,6 @@ class Carrier:
         change = row[:n] @ Y + row[n + 1 :] @ np.concatenate([Yd, G])
         return -change / rate
 
-    def _mode(self, one: Occurrence, z: np.ndarray) -> str:
-        c = [a.name for a in self.system.automata].index(one.component)
-        return self.system.automata[c].modes[z[c]]
-
-    def _function(self, occurrence: Occurrence, z: np.ndarray) -> tuple[int, bool]:
-        """Number of the guard or monitor that made something happen."""
-        system = self.system
-        if occurrence.kind == "monitor":
-            return system.monitor_names.index(occurrence.component), True
-        automaton = next(a for a in system.automata if a.name == occurrence.component)
-        mode = automaton.modes.index(occurrence.source)
-        return automaton.guards[mode][automaton.guard_names[mode].index(occurrence.guard)], False
-
     def _scheduled_shift(self, scheduled: list[Occurrence], G: np.ndarray) -> np.ndarray:
         model, shift = self.system.model, np.zeros(G.shape[1])
         if not scheduled:
@@ -297,60 +331,6 @@ class Carrier:
         by_start = expression_slope(declared.start, values, slopes, G.shape[1])
         return by_start + k * expression_slope(declared.period, values, slopes, G.shape[1])
 
-    def _after_reset(
-        self,
-        segment: Segment,
-        one: Occurrence,
-        s: float,
-        Y: np.ndarray,
-        Yd: np.ndarray,
-        G: np.ndarray,
-        shift: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives behind one reset; everything is taken at x-."""
-        system = self.system
-        key = self._key(segment, one, s)
-        if key not in system.resets:
-            return Y, Yd
-        x, p = self._lifted(segment, one.x_minus, Y, Yd, G)
-        if one.instant.minus(segment.start) <= 0.0:  # what it set stands in p already
-            p[system.layout.discrete_slice] = with_slopes(system.discrete_start, Yd)
-        out = [*x, *p[system.layout.discrete_slice]]
-        self._reset(Dual(s, shift), x, p, np.array([*segment.z, system.resets[key][0]]), out)
-        slopes = values_and_slopes(out, Y.shape[1])[1]
-        return slopes[: system.n], slopes[system.n :]
-
-    def _key(self, segment: Segment, one: Occurrence, s: float) -> tuple[Any, ...]:
-        system, model = self.system, self.system.model
-        if one.kind == "monitor":
-            return "monitor", system.monitor_names.index(one.component)
-        if one.kind == "scheduled":
-            return "schedule", next((k for k, c in enumerate(model.schedules) if c.name == one.component), -1)
-        if not one.guard:
-            return ("none",)
-        names = [a.name for a in system.automata]
-        c = names.index(one.component)
-        automaton = system.automata[c]
-        m = automaton.modes.index(one.source)
-        g = automaton.guard_names[m].index(one.guard)
-        if automaton.has_surface:
-            return ("none",)
-        return "choice", c, m, g, system.choose(c, m, g, s, one.x_minus, segment.p, segment.z)
-
-    def _lifted(
-        self, segment: Segment, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray
-    ) -> tuple[list[Dual], list[Any]]:
-        """States and run-time vector as numbers with their derivatives in the M directions."""
-        layout = self.system.layout
-        p: list[Any] = list(segment.p)
-        P = layout.parameters
-        p[:P] = with_slopes(segment.p[:P], G)
-        p[layout.discrete_slice] = with_slopes(self.system.discrete(segment.p), Yd)
-        rates = self._rate_slopes() @ G * float(segment.origin)
-        at = layout.phases_at
-        p[at : at + layout.phases] = with_slopes(segment.p[at : at + layout.phases], rates)
-        return with_slopes(x, Y), p
-
     def _projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, at_end: bool = False
     ) -> np.ndarray:
@@ -358,7 +338,9 @@ class Carrier:
         system, k = self.system, -1 if at_end else 0
         if not system.holds(segment.z):
             return Y
-        x, p = self._lifted(segment, segment.x[k], Y, Yd, G)
+        by_angles = self._rate_slopes() @ G * float(segment.origin)
+        p = lifted_vector(system.layout, segment.p, G, by_angles, system.discrete(segment.p), Yd)
+        x = with_slopes(segment.x[k], Y)
         out: list[Any] = [0.0] * system.n
         self._project(float(segment.s[k]), x, p, segment.z, out)
         return values_and_slopes(out, Y.shape[1])[1]

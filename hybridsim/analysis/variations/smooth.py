@@ -18,6 +18,9 @@ _RESOLVED = (
 _TAIL = 2
 _NOISE = 1e-5  # below that, what halving does not make smaller is rounding
 _HALVINGS = 30
+_CANCELS = (
+    1e-5  # times _RESOLVED: a change of the states, in units of their sizes, of a few hundred roundings
+)
 
 _X, _W = legendre.leggauss(_STAGES)
 NODES, _B = 0.5 * (1.0 + _X), 0.5 * _W
@@ -31,16 +34,17 @@ Slopes = Callable[[np.ndarray], np.ndarray]
 """Derivatives (m, n, n + q) of the rates at local times (m,): by the states, then by q things that stay constant."""
 
 
-def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray) -> np.ndarray:
     """d(states at the last knot)/d(states at the first, things that stay constant), (n, n + q).
 
-    knots: local times, ascending, between which the flow is smooth. scale (n,): sizes of the states, all above zero.
+    knots: local times, ascending, between which the flow is smooth. scale (n,), constants (q,): sizes of the states and
+    of what stays constant, all above zero.
     """
     begins, ends = knots[:-1], knots[1:]
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
-        found, tails = _pieces(slopes, begins, ends, scale)
+        found, tails = _pieces(slopes, begins, ends, scale, constants)
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
         pieces.append((begins[good], found[good]))
@@ -61,7 +65,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray) -> np.ndarr
 
 
 def _pieces(
-    slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray
+    slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The transition (K, n, n + q) over each piece, and how well the rates are resolved on it (K,)."""
     lengths = ends - begins
@@ -84,5 +88,6 @@ def _pieces(
     # the states by the states as one matrix without units; each of the constants by itself
     resolved = tails[:, :, :n].max(axis=(1, 2)) / sizes[:, :, :n].max(axis=(1, 2))
     others, largest = tails[:, :, n:].max(axis=1), sizes[:, :, n:].max(axis=1)
-    relative = np.divide(others, largest, out=np.zeros_like(others), where=largest > 0.0)
+    # what a change of a constant by its own size does: below that it cancels, and rounding is left
+    relative = others / np.maximum(largest, _CANCELS / constants)
     return moved, np.maximum(resolved, relative.max(axis=1, initial=0.0))

@@ -1,0 +1,199 @@
+"""Resets of one instant with their derivatives: in the rounds in which they follow from each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.reset_keys import added
+from hybridsim.engine.tangents import TangentTape
+from hybridsim.engine.timepair import Instant
+
+if TYPE_CHECKING:
+    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.system import System
+
+_AT_ZERO = 1e-9  # of what a guard's terms are: it is at its zero, and so has fired by itself
+
+
+def is_knot(system: System, instant: Instant) -> bool:
+    """Whether an input has a knot at an instant, to rounding."""
+    slack = 4.0 * math.ulp(float(instant))
+    for signal in system.signals:
+        knot = signal.next_knot(instant.plus(-slack), True)
+        if knot is not None and abs(knot.minus(instant)) <= slack:
+            return True
+    return False
+
+
+def batches(happened: Sequence[Occurrence]) -> list[list[Occurrence]]:
+    """What happened at one instant, apart where the state was recorded in between."""
+    found: list[list[Occurrence]] = []
+    for one in happened:
+        if (
+            found
+            and (one.x_minus == found[-1][0].x_minus).all()
+            and (one.x_plus == found[-1][0].x_plus).all()
+        ):
+            found[-1].append(one)
+        else:
+            found.append([one])
+    return found
+
+
+class Rounds:
+    """States, discrete states and modes at one instant, with derivatives in M directions.
+
+    Parameters
+    ----------
+    x, d, z : values (n,), (d,) and modes before.
+    Y, Yd : derivatives (n, M), (d, M).
+    G, by_rates : derivatives of the parameters (P, M), and of the forcing's angular rates (R, M).
+    shift : derivatives (M,) of the time of the instant.
+    scale : (n,) sizes of the states.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        x: np.ndarray,
+        d: np.ndarray,
+        z: np.ndarray,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        G: np.ndarray,
+        by_rates: np.ndarray,
+        shift: np.ndarray,
+        scale: np.ndarray,
+    ) -> None:
+        self.system, self.x, self.d, self.z, self.Y, self.Yd = system, x.copy(), d.copy(), z.copy(), Y, Yd
+        self._G, self._by_rates, self._shift, self._scale = G, by_rates, shift, scale
+        self._reset = differentiated(system.code.module.reset)
+        self._names = [*system.names, *(v.name for v in system.model.discrete)]
+
+    def at_end(self, segment: Segment, happened: Sequence[Occurrence]) -> None:
+        """Behind events that were found along a segment."""
+        self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
+
+    def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
+        """Behind what was due at an instant, inputs as they are from then on."""
+        self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
+
+    def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
+        scheduled = [one for one in happened if one.kind == "scheduled"]
+        pending = [one for one in happened if one.kind != "scheduled"]
+        self.x = happened[0].x_minus.copy()
+        if scheduled:
+            self._apply(scheduled, p, s, origin)
+        while pending:
+            fired = [one for one in pending if self._has_fired(one, p, s)]
+            fired = fired or pending
+            self._apply(fired, p, s, origin)
+            pending = [one for one in pending if not any(one is other for other in fired)]
+
+    def _has_fired(self, one: Occurrence, p: np.ndarray, s: float) -> bool:
+        """Whether a guard or monitor is at its zero, or beyond: what is not follows from another reset."""
+        system, n = self.system, self.system.n
+        if one.kind == "monitor":
+            chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
+                (),
+                (system.monitor_names.index(one.component),),
+            )
+        else:
+            c, automaton = component_of(system, one)
+            if automaton.modes[self.z[c]] != one.source:
+                return False
+            number = guard_number(system, one)
+            if number < 0:
+                return True
+            chosen = ((number,), ())
+        values = self._with_discrete(p)
+        tape = TangentTape(system, self.z, *chosen)
+        found = tape(np.array([s]), self.x[None, :], values, np.eye(n + 1 + len(p), n))
+        value, size = float(found.values[0, n]), float(np.abs(found.slopes[0, n]) @ self._scale)
+        return abs(value) <= _AT_ZERO * size or (one.kind != "monitor" and value <= 0.0)
+
+    def _with_discrete(self, p: np.ndarray) -> np.ndarray:
+        values = p.copy()
+        values[self.system.layout.discrete_slice] = self.d
+        return values
+
+    def _apply(self, fired: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
+        """All resets of one round: each reads the state before; those that add are summed."""
+        system, n = self.system, self.system.n
+        values = self._with_discrete(p)
+        x, lifted = self._lifted(values, origin)
+        before = [*x, *lifted[system.layout.discrete_slice]]
+        after, width = list(before), self.Y.shape[1]
+        modes = self.z.copy()
+        for one in fired:
+            key = self._key(one, values, s)
+            if one.kind not in ("monitor", "scheduled"):
+                c, automaton = component_of(system, one)
+                modes[c] = automaton.modes.index(one.target)
+            if key not in system.resets:
+                continue
+            amounts = set(system.resets[added(key)][1]) if added(key) in system.resets else set()
+            for part, names in ((key, set(system.resets[key][1]) - amounts), (added(key), amounts)):
+                if not names:
+                    continue
+                out = list(before)
+                z = np.array([*self.z, system.resets[part][0]])
+                self._reset(Dual(s, self._shift), x, lifted, z, out)
+                for name in names:
+                    k = self._names.index(name)
+                    after[k] = out[k] if part is key else after[k] + out[k]
+        found, slopes = values_and_slopes(after, width)
+        self.x, self.d, self.Y, self.Yd = found[:n], found[n:], slopes[:n], slopes[n:]
+        self.z = modes
+
+    def _lifted(self, p: np.ndarray, origin: float) -> tuple[list[Dual], list[Any]]:
+        """States and run-time vector as numbers with their derivatives."""
+        layout = self.system.layout
+        return with_slopes(self.x, self.Y), lifted_vector(
+            layout, p, self._G, self._by_rates * origin, self.d, self.Yd
+        )
+
+    def _key(self, one: Occurrence, p: np.ndarray, s: float) -> tuple[Any, ...]:
+        system = self.system
+        if one.kind == "monitor":
+            return "monitor", system.monitor_names.index(one.component)
+        if one.kind == "scheduled":
+            names = [schedule.name for schedule in system.model.schedules]
+            return "schedule", names.index(one.component) if one.component in names else -1
+        c, automaton = component_of(system, one)
+        if automaton.has_surface or guard_number(system, one) < 0:
+            return ("none",)
+        m = automaton.modes.index(one.source)
+        g = automaton.guard_names[m].index(one.guard)
+        return "choice", c, m, g, system.choose(c, m, g, s, self.x, p, self.z)
+
+
+def lifted_vector(
+    layout: Any, p: np.ndarray, G: np.ndarray, by_angles: np.ndarray, d: np.ndarray, Yd: np.ndarray
+) -> list[Any]:
+    """The run-time vector as numbers with the derivatives of parameters, angles and discrete states."""
+    found: list[Any] = list(p)
+    P, at = layout.parameters, layout.phases_at
+    found[:P] = with_slopes(p[:P], G)
+    found[layout.discrete_slice] = with_slopes(d, Yd)
+    found[at : at + layout.phases] = with_slopes(p[at : at + layout.phases], by_angles)
+    return found
+
+
+def component_of(system: System, one: Occurrence) -> tuple[int, Any]:
+    """The component of a transition, by number and as the engine sees it."""
+    c = [a.name for a in system.automata].index(one.component)
+    return c, system.automata[c]
+
+
+def guard_number(system: System, one: Occurrence) -> int:
+    """Number of the guard that a transition names; -1 where none of its mode did it: a jump, a limit."""
+    _, automaton = component_of(system, one)
+    m = automaton.modes.index(one.source)
+    names = automaton.guard_names[m]
+    return automaton.guards[m][names.index(one.guard)] if one.guard in names else -1
