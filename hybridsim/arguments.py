@@ -37,13 +37,37 @@ def without_a_name(value: Any) -> UsageError:
 
 
 def number(value: Any, what: str, remedy: str = "give a number") -> float:
-    """A real number as a double; a text, a truth value or a sequence is none."""
-    if not isinstance(value, str | bytes | bool | np.bool_):
-        try:
-            return float(value)
-        except (TypeError, ValueError, OverflowError):
-            pass
-    raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    """A real number as a double; a text, a truth value, a complex number or a sequence is none."""
+    found = as_real(value)
+    if found is None:
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    return found
+
+
+def as_real(value: Any) -> float | None:
+    """A real number as a double, or None; NumPy would drop the imaginary part of a complex one with a warning."""
+    if isinstance(value, str | bytes | bool | np.bool_ | complex | np.complexfloating) or is_row(value):
+        return None
+    if isinstance(value, np.ndarray) and value.dtype.kind not in "iufO":
+        return None
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
+    """Finite real numbers in an array of any shape."""
+    try:
+        found = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        raise UsageError(f"{what} is {value!r}", remedy=remedy) from None
+    if found.dtype.kind == "O":
+        items = [as_real(item) for item in found.flat]
+        found = np.array([math.nan if item is None else item for item in items]).reshape(found.shape)
+    if found.dtype.kind not in "iuf" or not np.isfinite(found).all():
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    return found.astype(float)
 
 
 def is_row(value: Any) -> bool:

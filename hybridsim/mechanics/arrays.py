@@ -12,7 +12,7 @@ STICK, OPEN_END = (
     2.0**1000,
 )
 VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that reaches no further
-DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST = range(6)  # why the loop came back
+DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST, LIMITED = range(7)  # why the loop came back, or was left
 
 
 # numbers that a kernel reached by its address is given; FIRST: where a run of neighbours begins, -1 where it is none

@@ -40,7 +40,7 @@ def _hold(plant: Any, state: Any, room: Any) -> None:
 @kernel
 def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, left: float) -> bool:
     """Expand all nodes at the origin of a step, and set its length."""
-    rtol, longest, top, keep = control
+    rtol, longest, top, keep, _ = control
     _hold(plant, state, room)
     count = plant.node_dof.shape[0] - 1
     state.origin[:] = 0.0
@@ -161,7 +161,7 @@ def _restart(
     plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
     """Expand a patch around node j at tau: 1 done, 0 it would be most of the system, -1 there are no series."""
-    rtol, _, top, keep = control
+    rtol, _, top, keep, _ = control
     nodes = plant.node_dof.shape[0] - 1
     left = state.clock[2] - tau
     radius = max(state.flags[RADIUS], 1)
@@ -239,12 +239,17 @@ def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
 
 @kernel
 def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, target: Any) -> int:
-    """Go on to the target (high, low), or until the record is full (FULL) or nothing can follow (see `arrays`)."""
+    """Go on to the target (high, low), or until nothing can follow (see `arrays`).
+
+    FULL says that the record is full, or that as many steps or events are done as one call may take.
+    """
     nodes, m, n = plant.node_dof.shape[0] - 1, plant.con_node.shape[0], plant.dof_node.shape[0]
     while True:
         room_left = record.piece.shape[0] - record.used[0] >= nodes
         room_left = room_left and record.series.shape[0] - record.used[1] >= n
         if (control[3] and not room_left) or record.event.shape[0] - record.used[2] < m:
+            return FULL
+        if state.counts[0] + state.counts[1] >= control[4]:
             return FULL
         if state.flags[FRESH]:
             left = (target[0] - state.clock[0]) + (target[1] - state.clock[1])

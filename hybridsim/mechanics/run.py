@@ -12,9 +12,11 @@ from scipy.sparse import csr_array
 
 from hybridsim.engine.bernstein_code import LEADING, bernstein_code
 from hybridsim.engine.eight import WIDTH, room_for
-from hybridsim.engine.jit import ENABLED, call_kernel, kernel, kernel_address
+from hybridsim.engine.jit import ENABLED, call_kernel, kernel, kernel_address, seconds_compiling
+from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached, Limits
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series import series_order
+from hybridsim.engine.stepping import Counters
 from hybridsim.engine.timepair import phase_of
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import (
@@ -26,6 +28,7 @@ from hybridsim.mechanics.arrays import (
     FIRED,
     FULL,
     INCONSISTENT,
+    LIMITED,
     LOST,
     NODE,
     NONUNIQUE,
@@ -43,9 +46,13 @@ from hybridsim.mechanics.steps import stretch
 
 STATUS = {
     DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
+    LIMITED: "limit",
 }  # fmt: skip
 _ROOM = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events that one call has room for, beside those of one node
+_WORK = (
+    1 << 20
+)  # coordinates times steps and events of one call: some 0.1 s, after which limits are looked at
 _TIGHTEST = 1e-15
 _RADIUS = 2  # of the first patch; it adapts
 _RANGE = 280  # decades of a double, some left for what the powers are multiplied with
@@ -71,12 +78,12 @@ class MechanicalRun:
     """One run; `go` carries it out."""
 
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
-                 max_step: float, keep: bool) -> None:  # fmt: skip
+                 max_step: float, keep: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
         self.built, self.span = built, span
         self.rtol, self.keep = max(rtol, _TIGHTEST), keep
         # coupled coordinates make the linear part of a series the dearer one, as where there is no convolution at all
         self.order = min(series_order(self.rtol, linear=True), _order_in_range(built, span))
-        self.max_step = max_step
+        self.max_step, self.limits = max_step, limits
         self.state = new_state(built, self.order)
         self.room = new_room(built, self.order)
         self.state.x[:] = x.reshape(2, -1)[:, built.dofs]
@@ -86,30 +93,43 @@ class MechanicalRun:
         self.events: list[np.ndarray] = []
         self.when: list[np.ndarray] = []
         self.first_modes = np.zeros(0, dtype=np.int64)
-        self.code, self.kernel_time = DONE, 0.0
+        self.code, self.kernel_time, self.limit_message = DONE, 0.0, ""
+        self.counters, self.compile_time = Counters(), 0.0
 
     def go(self, progress: Callable[[float], None] | None) -> None:
         """Run to the end of the span, or to where nothing can follow."""
         plant, laws = packed(self.built.plant), packed(self.built.laws)
         state, room = packed(self.state), packed(self.room)
-        began = perf_counter()
+        began, compiled = perf_counter(), seconds_compiling()
+        gauge = Gauge(self.limits, self.counters)
         reach_kernels(self.state, plant, laws, state, room)
         if ENABLED:
             self.state.kernels[BERNSTEIN:], self._code = bernstein_code(self.order - 1)
         self.code = self._settle_start(plant, laws, state, room)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
-        control = (self.rtol, self.max_step, self.order, self.keep)
         target = np.array([self.span[1], 0.0])
         while self.code in (DONE, FULL):
             record = self._record()
+            until = int(self.state.counts[:2].sum()) + max(_WORK // len(self.built.dofs), 16)
+            control = (self.rtol, self.max_step, self.order, self.keep, until)
             self.code = run(plant, laws, state, room, packed(record), control, target)
             self._collect(record)
             if self.code != FULL:
                 break
             if progress is not None:
                 progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
-        self.kernel_time = perf_counter() - began
+            self._count()
+            try:
+                gauge.check()
+            except LimitReached as reached:
+                self.code, self.limit_message = LIMITED, str(reached)
+        self.compile_time = seconds_compiling() - compiled
+        self.kernel_time = perf_counter() - began - self.compile_time
+
+    def _count(self) -> None:
+        """Bring the counters of steps and events up to date."""
+        self.counters.steps, self.counters.events = self.state.counts[:2].tolist()
 
     def _settle_start(self, *packs: Any) -> int:
         """Modes at the start: by the sign of what moves, decided where it does not."""

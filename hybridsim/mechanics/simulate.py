@@ -22,7 +22,6 @@ _OF_MODELS = {
     "params": "put the values into its arrays, or run to_model()",
     "z0": "leave it out: who sticks at the start follows from x0",
     "first_step": "leave it out: a series knows its own step",
-    "limits": "leave it out, or run to_model()",
 }
 _OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
 
@@ -42,6 +41,7 @@ def simulate_mechanical(
     max_step: float = math.inf,
     t_eval: Sequence[float] | None = None,
     save: str | float = "all",
+    limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **refused: Any,
 ) -> MechanicalSolution | SteppedSolution:
@@ -93,29 +93,30 @@ def simulate_mechanical(
         raise UsageError(
             f"t_span is {t_span!r}", remedy="a MechanicalSystem runs forward only; to_model() backward"
         )
-    if save not in ("all", "events", "nothing"):
+    if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(f"save is {save!r}", remedy="a MechanicalSystem keeps 'all', 'events' or 'nothing'")
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
     longest = arguments.step_bound(max_step, "max_step")
     refuse_endless(longest, span, "max_step")
     grid = None if t_eval is None else arguments.time_grid(t_eval, span, ALL, save)
-    callback = arguments.callback(progress)
+    callback, most = arguments.callback(progress), arguments.run_limits(limits)
     announce_compilation()
     began = time.perf_counter()
     if method is not None:
         from hybridsim.mechanics.stepped_run import SteppedRun
         from hybridsim.mechanics.stepped_solution import SteppedSolution
 
-        stepped = SteppedRun(system, method, span, start, save == "all")
+        stepped = SteppedRun(system, method, span, start, save == "all", most)
         refuse_longer(stepped.step, longest, name)
         built_in = time.perf_counter() - began
         stepped.go(callback)
         built_in += stepped.compile_time
         return SteppedSolution(stepped, grid, str(save), time.perf_counter() - began - built_in, built_in)
-    run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all")
+    run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all", most)
     built_in = time.perf_counter() - began
     run.go(callback)
+    built_in += run.compile_time
     wall_time = time.perf_counter() - began - built_in
     return MechanicalSolution(system, run, grid, str(save), wall_time, built_in)
 

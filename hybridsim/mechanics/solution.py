@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.arguments import as_times
 from hybridsim.engine.packs import packed
 from hybridsim.errors import UsageError, nearest
-from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LOST
+from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.run import STATUS, new_room, new_state, reach_kernels
 from hybridsim.mechanics.trajectory import Pieces, instants, quantities
@@ -236,6 +236,8 @@ class MechanicalSolution(ArraysResult):
         code, t = self._run.code, self.t_end
         if code == DONE:
             return f"reached t = {t!r} with taylor, order {self._run.order}"
+        if code == LIMITED:
+            return f"stopped at t = {t!r}: {self._run.limit_message}"
         names = [self.model.contacts[i].name for i in self._run.node_contacts]
         shown = ", ".join(names[:8]) + (f", ... ({len(names)} contacts)" if len(names) > 8 else "")
         reasons = {

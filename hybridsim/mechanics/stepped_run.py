@@ -12,7 +12,9 @@ import numpy as np
 from hybridsim.engine.eight import WIDTH, room_for
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import seconds_compiling
+from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached, Limits
 from hybridsim.engine.packs import packed
+from hybridsim.engine.stepping import Counters
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.plant import rates_of
 from hybridsim.mechanics.stepped_kernels import ABOVE, HOLDS, Bench, Kept, Stand, steps
@@ -34,7 +36,13 @@ class SteppedRun:
     """
 
     def __init__(
-        self, system: MechanicalSystem, method: Moreau, span: tuple[float, float], x: np.ndarray, keep: bool
+        self,
+        system: MechanicalSystem,
+        method: Moreau,
+        span: tuple[float, float],
+        x: np.ndarray,
+        keep: bool,
+        limits: Limits = UNLIMITED,
     ) -> None:
         self.system, self.span, self.keep, self.start = system, span, keep, x
         self.count = max(math.ceil((span[1] - span[0]) / _length(system, method) * (1.0 - _EQUAL)), 1)
@@ -52,6 +60,7 @@ class SteppedRun:
         self.first_modes = np.zeros(m, dtype=np.int64)
         self.status, self.done, self.kernel_time, self.compile_time = "finished", 0, 0.0, 0.0
         self.overlaps: list[str] = []
+        self.limits, self.counters, self.limit_message = limits, Counters(), ""
 
     def go(self, progress: Callable[[float], None] | None) -> None:
         """Step to the end of the span, or to where states are no numbers."""
@@ -63,6 +72,7 @@ class SteppedRun:
         packs = [packed(a) for a in (self.plant, self.laws, state, self.room)]
         began, compiled, m = perf_counter(), seconds_compiling(), len(state.mode)
         rows = max(_ROOM // (2 * system.n + m), 16)
+        gauge = Gauge(self.limits, self.counters)
         while self.done < self.count:
             wanted = min(rows, self.count - self.done)
             kept = Kept(
@@ -81,6 +91,13 @@ class SteppedRun:
                 break
             if progress is not None:
                 progress(self.done / self.count)
+            self.counters.steps, self.counters.events = self.done, self.counters.events + int(kept.used[1])
+            if self.done < self.count:
+                try:
+                    gauge.check()
+                except LimitReached as reached:
+                    self.status, self.limit_message = "limit", str(reached)
+                    break
         self.compile_time = seconds_compiling() - compiled
         self.kernel_time = perf_counter() - began - self.compile_time
 

@@ -234,6 +234,8 @@ class SteppedSolution(ArraysResult):
         """One sentence about how the run ended."""
         if self.success:
             return f"reached t = {self.t_end!r} with moreau, step {self._run.step:g}"
+        if self._run.limit_message:
+            return f"stopped at t = {self.t_end!r}: {self._run.limit_message}"
         if self._run.overlaps:
             names = ", ".join(self._run.overlaps[:8])
             return f"stopped at t = {self.t_end!r}: the gap of {names} is below zero"

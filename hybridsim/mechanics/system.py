@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from hybridsim.arguments import as_real, is_row, real_array
 from hybridsim.errors import UsageError
 from hybridsim.expr import Expression
 from hybridsim.expr.evaluate import resolve
 from hybridsim.mechanics.direction import finite, weights
 from hybridsim.mechanics.impact import MechanicalImpact
-from hybridsim.model.declared import Declared
+from hybridsim.mechanics.mass import require_positive_definite
+from hybridsim.model.declared import Declared, as_tuple
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.library import load_law
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
+
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,15 @@ class Harmonic:
     omega: float
     sin: float = 0.0
     cos: float = 0.0
+
+    def __post_init__(self) -> None:
+        for what in ("omega", "sin", "cos"):
+            value = as_real(getattr(self, what))
+            if value is None or not math.isfinite(value):
+                raise UsageError(
+                    f"Harmonic: {what} is {getattr(self, what)!r}", remedy="give a finite number"
+                )
+            object.__setattr__(self, what, value)
 
 
 @dataclass(frozen=True)
@@ -184,20 +198,44 @@ class MechanicalSystem:
         title: str = "",
         source: str = "",
     ) -> None:
+        for what, text in (("name", name), ("title", title), ("source", source)):
+            if not isinstance(text, str):
+                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="give a text")
         self.name, self.title, self.source = name, title, source
         self.M = _matrix(M, "M", None)
+        require_positive_definite(self.M, name)
         self.n = self.M.shape[0]
         self.C, self.K = _matrix(C, "C", self.n), _matrix(K, "K", self.n)
-        self.contacts, self.impacts = tuple(contacts), tuple(impacts)
+        self.contacts = self._parts(contacts, "contacts", MechanicalContact)
+        self.impacts = self._parts(impacts, "impacts", MechanicalImpact)
         self.forcing = self._forces(forcing)
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
-        self.names = tuple(names) if names is not None else tuple(f"q{i + 1}" for i in range(self.n))
+        self.names = tuple(f"q{i + 1}" for i in range(self.n)) if names is None else as_tuple(names)
+        if not all(isinstance(x, str) for x in self.names):
+            raise UsageError(f"{name}: names is {names!r}", remedy=f"give {self.n} texts")
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
+
+    def _parts(self, given: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
+        """A tuple of contacts or impacts."""
+        parts = as_tuple(given)
+        for part in parts:
+            if not isinstance(part, kind):
+                raise UsageError(
+                    f"{self.name}: {what} hold {part!r}", remedy=f"give hs.{kind.__name__}(...) objects"
+                )
+        return parts
 
     def _forces(self, forcing: Any) -> dict[int, tuple[float | Harmonic, ...]]:
         if forcing is None:
             return {}
+        if not isinstance(forcing, Mapping):
+            if not is_row(forcing):
+                raise UsageError(
+                    f"{self.name}: forcing is {forcing!r}",
+                    remedy="give one entry for each coordinate, or a mapping from coordinates",
+                )
+            forcing = tuple(forcing)
         if not isinstance(forcing, Mapping) and len(forcing) != self.n:
             raise UsageError(
                 f"{self.name}: forcing has {len(forcing)} entries for {self.n} coordinates",
@@ -212,7 +250,9 @@ class MechanicalSystem:
                 )
             terms = given if isinstance(given, tuple | list) else (given,)
             for term in terms:
-                if not isinstance(term, Harmonic) and not isinstance(term, int | float | np.number):
+                if not isinstance(term, Harmonic) and not math.isfinite(
+                    math.nan if (n := as_real(term)) is None else n
+                ):
                     raise UsageError(
                         f"{self.name}: forcing of coordinate {i} holds {term!r}",
                         remedy="give numbers and hs.Harmonic(omega, ...); write others in an hs.Model",
@@ -223,9 +263,10 @@ class MechanicalSystem:
         return found
 
     def _start(self, given: Any, what: str) -> np.ndarray:
-        values = np.zeros(self.n) if given is None else np.array(given, dtype=float)
-        if values.shape != (self.n,) or not np.isfinite(values).all():
-            raise UsageError(f"{self.name}: {what} is {given!r}", remedy=f"give {self.n} finite numbers")
+        remedy = f"give {self.n} finite numbers"
+        values = np.zeros(self.n) if given is None else real_array(given, f"{self.name}: {what}", remedy)
+        if values.shape != (self.n,):
+            raise UsageError(f"{self.name}: {what} is {given!r}", remedy=remedy)
         return values
 
     def _check(self) -> None:
@@ -237,12 +278,6 @@ class MechanicalSystem:
             raise UsageError(
                 f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own"
             )
-        for part, kind in (("contacts", MechanicalContact), ("impacts", MechanicalImpact)):
-            for given in getattr(self, part):
-                if not isinstance(given, kind):
-                    raise UsageError(
-                        f"{self.name}: {part} hold {given!r}", remedy=f"give hs.{kind.__name__}(...) objects"
-                    )
         for contact in self.all_contacts:
             what = "contact" if isinstance(contact, MechanicalContact) else "impact"
             if contact.weights not in (0, self.n):
@@ -302,16 +337,17 @@ def _matrix(given: Any, what: str, n: int | None) -> Any:
     if given is None and n is not None:
         return sparse.csr_array((n, n))
     if sparse.issparse(given):
+        real_array(given.data, what, "give finite real numbers")
         matrix = sparse.csr_array(given, dtype=float)
     else:
-        dense = np.array(given, dtype=float)
+        dense = real_array(given, what, "give finite real numbers, (n, n), or (n,) for a diagonal")
         if dense.ndim not in (1, 2):
             raise UsageError(
                 f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal"
             )
         matrix = sparse.csr_array(sparse.diags_array(dense) if dense.ndim == 1 else dense)
+    if not matrix.shape[0]:
+        raise UsageError(f"{what} is empty", remedy="give at least one coordinate")
     if matrix.shape[0] != matrix.shape[1] or (n is not None and matrix.shape[0] != n):
         raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"give ({n or 'n'}, {n or 'n'})")
-    if not np.isfinite(matrix.data).all():
-        raise UsageError(f"{what} holds what is no finite number")
     return matrix

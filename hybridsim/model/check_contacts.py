@@ -85,6 +85,13 @@ def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
 def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
     """Report parts that the form of the law has no use for, and modes that change what is not the law's."""
     if law.is_set_valued:
+        for table in law.tables:
+            if table.over.text == SPEED and table.at[0] < 0.0:
+                scope.fail(
+                    table,
+                    f"{what}, table {table.name}: the argument {table.at[0]:g} is negative, and v is a magnitude",
+                    "begin at 0; what differs by direction goes into slip_backward, with a table of its own.",
+                )
         for field in ("states", "definitions", "modes", "copies"):
             if getattr(law, field):
                 scope.fail(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybridsim.expr.grammar import RESERVED
@@ -33,6 +33,7 @@ def check_names(scope: Scope) -> None:
     check_labels(scope, "component", [*model.contacts, *model.surfaces, *model.impacts, *model.components])
     check_labels(scope, "event", [*model.monitors, *model.schedules])
     _made_labels(scope)
+    _events(scope, seen)
     check_labels(scope, "output", model.outputs)
     for output in model.outputs:
         check_identifier(scope, output, "output", output.name)
@@ -57,6 +58,19 @@ def _made_labels(scope: Scope) -> None:
                 )
                 scope.fail(contact, message, "rename one of them.")
             seen.setdefault(name, f"an automaton of contact '{contact.name}'")
+
+
+def _events(scope: Scope, seen: Mapping[str, str]) -> None:
+    """Report a monitor or schedule that has the name of something else: `Solution.event_times` goes by names."""
+    model = scope.model
+    taken = dict(seen)
+    parts: tuple[Any, ...] = (*model.contacts, *model.surfaces, *model.impacts, *model.components)
+    taken |= {part.name: "component" for part in parts if part.name not in taken}
+    for kind, events in (("monitor", model.monitors), ("schedule", model.schedules)):
+        for event in events:
+            if event.name in taken:
+                message = f"the {kind} '{event.name}' has the name of a {taken[event.name]}"
+                scope.fail(event, message, f"rename the {kind}.")
 
 
 def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> bool:

@@ -48,7 +48,7 @@ def _schedule(scope: Scope, schedule: Schedule) -> None:
     if schedule.count is not None:
         if schedule.period is None:
             scope.fail(schedule, f"{what} has count = {schedule.count} but no period", "give a period.")
-        if isinstance(schedule.count, bool) or not isinstance(schedule.count, int) or schedule.count < 1:
+        if schedule.count < 1:
             scope.fail(schedule, f"{what}: count is {schedule.count}", "it must be a whole number >= 1.")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.evaluate import dependency_order
@@ -9,6 +11,7 @@ from hybridsim.model.check_impacts import check_restitution
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared
 from hybridsim.model.inputs import Input
+from hybridsim.model.law import SPEED
 from hybridsim.model.model import Model
 from hybridsim.model.scope import Scope
 
@@ -32,8 +35,7 @@ def check_values(scope: Scope) -> None:
         _value(scope, discrete.start, values)
     for state in model.states:
         _value(scope, state.start, values)
-        if state.nominal is not None and not 0 < state.nominal < float("inf"):
-            scope.fail(state, f"state {state.name}: nominal is {state.nominal!r}", "give a size above zero.")
+        _size(scope, state, f"state {state.name}: nominal", state.nominal)
     for schedule in model.schedules:
         for time in (*schedule.times, *([schedule.start] if schedule.start else [])):
             _value(scope, time, values)
@@ -82,6 +84,12 @@ def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | 
         return None
 
 
+def _size(scope: Scope, part: Declared, what: str, size: float | None) -> None:
+    """Report a typical size that is none."""
+    if size is not None and not 0 < size < math.inf:
+        scope.fail(part, f"{what} is {size!r}", "give a size above zero.")
+
+
 def _positive(
     scope: Scope, part: Declared, what: str, field: str, expr: Expression | None, values: dict[str, float]
 ) -> None:
@@ -117,6 +125,8 @@ def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, f
 def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
     """Loads, and forces at the onset of slip, as far as they are constant."""
     what = f"contact {contact.name}"
+    for name, size in contact.nominal.items():
+        _size(scope, contact, f"{what}: nominal of {name}", size)
     if contact.normal.names <= values.keys():
         load = _value(scope, contact.normal, values)
         if load is not None and load < 0:
@@ -127,6 +137,7 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
         return
     for backward in (False, True):
         _onset(scope, contact, values, backward)
+        _slip_at_points(scope, contact, values, backward)
 
 
 def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
@@ -147,3 +158,17 @@ def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: b
     if onset - limit > ROUNDING * onset:
         message = f"{what}: the limit of stick {limit:g} is below the slip force at v = 0, {onset:g}"
         scope.fail(contact, message, "static friction is at least kinetic friction: mu_s >= mu_k.")
+
+
+def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
+    """The slip force at the speeds of the points of tables, in one direction."""
+    if backward and contact.law.slip_backward is None:
+        return
+    speeds = {speed for table in contact.law.tables if table.over.text == SPEED for speed in table.at}
+    for speed in sorted(speeds):
+        force = contact.slip_force_at(speed, backward)
+        value = _value(scope, force, values) if force.names <= values.keys() else None
+        if value is not None and value < 0:
+            message = f"contact {contact.name}: the slip force at v = {speed:g} is {value:g}"
+            scope.fail(contact, message, "a friction force must not be negative.")
+            return

@@ -68,7 +68,8 @@ class Contact(Declared):
         self._texts("name")
         self._expressions("velocity", "normal")
         self._maps("arguments", "start")
-        object.__setattr__(self, "nominal", FrozenMap(self.nominal))
+        self._flags("opens")
+        self._sizes("nominal")
         law: object = self.law
         if isinstance(law, str):
             from hybridsim.model.library import load_law
@@ -213,6 +214,13 @@ class Contact(Declared):
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # a set-valued law has it
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
+
+    def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
+        """Magnitude of the force when sliding at a speed that is a number, which tables over it have a value for."""
+        names = {t.name: parse(t.value(speed)) for t in self.law.tables if t.over.text == SPEED}
+        slip = (self.law.slip_backward if backward else None) or self.law.slip
+        assert slip is not None  # a set-valued law has it
+        return substitute(self._form("slip", slip=slip), {SPEED: parse(speed), **self.values(), **names})
 
     def limit_force(self, backward: bool = False) -> Expression:
         """The most that stick can carry, over the model's names."""

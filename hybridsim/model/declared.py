@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field
 from inspect import Signature, signature
+from numbers import Real
 from typing import Any
 
 from hybridsim.calls import refuse_unless_taken
@@ -23,6 +25,11 @@ class _Refusing(type):
         return Signature(parameters)
 
     def __call__(cls, *args: Any, **keywords: Any) -> Any:
+        place = keywords.get("place")
+        if not (place is None or isinstance(place, Place)):
+            raise UsageError(
+                f"{cls.__name__}: place is {place!r}", remedy="give hs.Place(...), or leave it out"
+            )
         try:
             return super().__call__(*args, **keywords)
         except TypeError:
@@ -87,12 +94,38 @@ class Declared(metaclass=_Refusing):
             }
             object.__setattr__(self, name, FrozenMap(parsed))
 
+    def _sizes(self, *fields: str) -> None:
+        """Make mappings from names to typical sizes; validation says whether these are above zero."""
+        for name in fields:
+            items = getattr(self, name)
+            if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
+                raise self._fault(f"{name} is {items!r}", "give a mapping from names to numbers")
+            sizes = {key: self._real(f"{name}[{key!r}]", value) for key, value in items.items()}
+            object.__setattr__(self, name, FrozenMap(sizes))
+
+    def _real(self, what: str, value: object) -> float:
+        """A real number as a double; one beyond all doubles is infinite."""
+        if not isinstance(value, Real):
+            raise self._fault(f"{what} is {value!r}", "give a number, or leave it out")
+        try:
+            return float(value)
+        except OverflowError:
+            return math.inf
+
     def _functions(self, *fields: str) -> None:
         """See to it that functions are callable; None stays None."""
         for name in fields:
             value = getattr(self, name)
             if not (value is None or callable(value)):
                 raise self._fault(f"{name} is {value!r}", "give a Python function of (t, x, p)")
+
+    def _flags(self, *fields: str) -> None:
+        """See to it that switches are truth values."""
+        for name in fields:
+            value = getattr(self, name)
+            if type(value).__name__ != "bool":  # NumPy's truth values have the same name
+                raise self._fault(f"{name} is {value!r}", "give True or False")
+            object.__setattr__(self, name, bool(value))
 
     def _parts(self, field: str, kind: type[Declared]) -> None:
         """Make a tuple of parts of one kind; a single one becomes a tuple of one."""
@@ -108,7 +141,7 @@ class Declared(metaclass=_Refusing):
             given = getattr(self, name)
             try:
                 object.__setattr__(self, name, tuple(float(number) for number in as_tuple(given)))
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise self._fault(f"{name} is {given!r}", "give numbers") from None
 
     def _has_default(self, field: str) -> bool:
@@ -129,7 +162,10 @@ class Declared(metaclass=_Refusing):
 
 
 def as_tuple(value: Any) -> tuple[Any, ...]:
-    """A single thing becomes a tuple of one; a text counts as a single thing."""
-    if isinstance(value, Iterable) and not isinstance(value, (str, Mapping)):
-        return tuple(value)
+    """A single thing becomes a tuple of one; a text and an array without dimensions count as single things."""
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping)):
+        try:
+            return tuple(value)
+        except TypeError:  # an array without dimensions calls itself iterable
+            pass
     return (value,)

@@ -95,7 +95,12 @@ class FrictionLaw(Declared):
         self._expressions("slip", "stick", "slip_backward", "stick_backward", "force")
         given: object = self.parameters
         if not isinstance(given, Mapping):
-            object.__setattr__(self, "parameters", dict.fromkeys(as_tuple(given)))
+            names = as_tuple(given)
+            if not all(isinstance(name, str) for name in names):
+                raise self._fault(
+                    f"parameters is {given!r}", "give names, or a mapping from names to defaults"
+                )
+            object.__setattr__(self, "parameters", dict.fromkeys(names))
         self._maps("parameters", "definitions")
         self._parts("states", State)
         self._parts("modes", Mode)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Real
 
 from hybridsim.expr import Expression
 from hybridsim.model.declared import Declared
@@ -83,9 +82,8 @@ class State(Declared):
     def __post_init__(self) -> None:
         self._texts("name", "unit")
         self._expressions("start", "der")
-        nominal: object = self.nominal
-        if not (nominal is None or isinstance(nominal, Real)):
-            raise self._fault(f"nominal is {self.nominal!r}", "give a number, or leave it out")
+        if self.nominal is not None:
+            object.__setattr__(self, "nominal", self._real("nominal", self.nominal))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Integral
 
 from hybridsim.expr import Expression, parse
 from hybridsim.model.declared import Declared, as_tuple
@@ -58,4 +59,8 @@ class Schedule(Declared):
         if self.start is None and self.period is not None:
             object.__setattr__(self, "start", parse(0))
         self._expressions("start", "period")
+        self._flags("terminate")
+        count: object = self.count
+        if not (count is None or isinstance(count, Integral)) or isinstance(count, bool):
+            raise self._fault(f"count is {count!r}", "give a whole number >= 1, or leave it out")
         self._maps("reset", functions=True)

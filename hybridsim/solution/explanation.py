@@ -123,9 +123,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     if event.guard == LIMIT and (segment is None or not _is_declared(solution, event)):
         return Explanation(event, (), (), _of_accumulation(solution, event), _state(solution, event))
     if segment is None:
-        raise UsageError(
-            f"no segment ends at t = {event.t!r}", remedy="an event at the start of a run has no past"
-        )
+        return Explanation(event, (), (), _without_a_segment(solution, event), _state(solution, event))
     run, system = solution._run, solution._system
     fired = fired_guards(system, segment, together, run.method)
     at = situation(system, segment, fired)
@@ -198,6 +196,18 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
         f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
         f"and {event.target} is entered there{end}"
     )
+
+
+def _without_a_segment(solution: Solution, event: Event) -> str:
+    """Why a mode changed at an instant to which no motion leads: the start of a run, or where it ended."""
+    if event.t == solution.t[0]:
+        return (
+            "the run starts here: the sides of corners and the modes that the initial values leave admissible are "
+            "found before anything moves"
+        )
+    if not solution.success and event.t == solution.t[-1]:
+        return f"the run ended here: {solution.message}"
+    return "it followed at once on the events before it at this instant: nothing moved in between"
 
 
 def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.at_once import AtOnce
+from hybridsim.engine.jit import seconds_compiling
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.model.hygiene import jumps_of
 from hybridsim.solution.solution import Solution
@@ -50,9 +51,10 @@ class Run:
         self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
     ) -> Solution:
         """The solution; before: seconds that an earlier part of it took."""
-        began = time.perf_counter()
+        began, compiled = time.perf_counter(), seconds_compiling()
         trajectory = self.method.run(self.system, self.task, progress)
-        wall_time = time.perf_counter() - began
+        within = seconds_compiling() - compiled  # kernels that no earlier run of this process has needed
+        wall_time = time.perf_counter() - began - within
         if isinstance(trajectory, AtOnce):
             trajectory.then(self._close)
         else:
@@ -61,7 +63,7 @@ class Run:
         # a solution holds on to what the run left, not to what it began with
         if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
-        return Solution(run, trajectory, before + wall_time, compile_time)
+        return Solution(run, trajectory, before + wall_time, compile_time + within)
 
     def _close(self, trajectory: Trajectory) -> None:
         """Add what is to be said of the run, and let go of what is not to be kept."""

@@ -1,0 +1,52 @@
+"""The mass matrix is checked when a mechanical system is declared: symmetric and positive definite."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError
+
+_PIVOT = (
+    2.0**-49
+)  # for each coordinate: a pivot below this share of its diagonal entry is the rounding of zero
+_ASYMMETRY = 1e-12  # of the largest entry: what assembling a matrix in doubles leaves
+
+
+def require_positive_definite(M: Any, name: str) -> None:
+    """Refuse a mass matrix that is not symmetric, or not positive definite beyond rounding.
+
+    A symmetric matrix is positive definite if and only if all pivots of its elimination without exchanges are
+    positive. A pivot that is no larger than the rounding of its diagonal entry counts as zero.
+
+    Raises
+    ------
+    UsageError
+        For a matrix that is not symmetric and one that is not positive definite.
+    """
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    if abs(M - M.T).max() > _ASYMMETRY * abs(M).max():
+        raise UsageError(f"{name}: M is not symmetric", remedy="give a symmetric mass matrix")
+    diagonal = M.diagonal()
+    pivots = diagonal
+    if (diagonal > 0.0).all() and M.nnz > len(diagonal):
+        try:
+            factors = splu(
+                csc_array(M),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:  # a pivot is zero
+            pivots = np.zeros(1)
+        else:
+            place = np.argsort(factors.perm_c)
+            pivots = factors.U.diagonal() / diagonal[place]
+    least = 0.0 if pivots is diagonal else len(diagonal) * _PIVOT
+    if not (pivots > least).all():
+        raise UsageError(
+            f"{name}: M is not positive definite", remedy="give every coordinate a mass above zero"
+        )
