@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.corner_sides import sides_along
+from hybridsim.engine.decide import side_after, side_before
+from hybridsim.engine.jets import ORDER
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.one_sided import names_of
 
@@ -14,6 +19,9 @@ if TYPE_CHECKING:
     from hybridsim.engine.outcome import Situation
     from hybridsim.engine.settle import Settling
     from hybridsim.engine.system import System
+
+
+_MOST_FLOWS = 3**4  # combinations of modes that are looked at; each costs a series
 
 
 def as_given(system: System, at: Situation) -> Situation:
@@ -43,36 +51,68 @@ def as_given(system: System, at: Situation) -> Situation:
 
 
 def certainly_leaving(settling: Settling) -> set[int]:
-    """Automata with a negative guard that no force of a surface enters: they leave, whatever is decided there.
+    """Automata with a guard that is negative just after, whatever is decided at the surfaces that are at zero.
 
-    Their guards have their sides from the values alone.
+    Their guards have the sides that this is known of. Where these surfaces have too many combinations of modes, the
+    values alone of guards that no force enters are known.
     """
+    system = settling.system
+    owners = [c for c in settling.scope if not (system.has_surface[c] or c in system.led)]
+    if not owners:
+        return set()
+    z, on = _resting(settling)
+    modes = [range(len(system.automata[c].modes)) for c in on]
+    if math.prod(map(len, modes)) > _MOST_FLOWS:
+        free = system.code.shared("guards without forces", lambda: _without_forces(system))
+        negative = {g for g in _negative(settling, owners, z, order=0) if free[g][z[system.owner[g]]]}
+    else:
+        negative = set()
+        for number, chosen in enumerate(product(*modes)):
+            z[on] = chosen
+            found = _negative(settling, owners, sides_along(settling, z, settling.at.x)[0])
+            negative = negative & found if number else found
+            if not negative:
+                return set()
+    for g in range(system.guard_count):
+        if system.owner[g] in owners:
+            settling.sides[g] = -1 if g in negative else 1
+    return {int(system.owner[g]) for g in negative}
+
+
+def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
+    """The modes, each surface that is off zero in that of its side; and the components whose surfaces are at zero."""
     at, system = settling.at, settling.system
-    free = system.code.shared("guards without forces", lambda: _without_forces(system))
-    series = settling.series_of(np.maximum(at.z, 0))
-    found = set()
-    for c in settling.scope:
-        if not free[c]:
-            continue
-        guards = system.automata[c].guards[at.z[c]]
-        is_negative = [
-            bool(is_free and series.guards[g, 0] < -series.guard_bounds[g, 0])
-            for g, is_free in zip(guards, free[c][at.z[c]], strict=True)
-        ]
-        settling.sides[list(guards)] = np.where(is_negative, -1, 1)
-        if any(is_negative):
-            found.add(c)
-    return found
+    p = at.p.copy()
+    p[system.layout.pin_at] = 0.0
+    z = np.maximum(at.z, 0)
+    series: Any = system.series(at.s, at.x, p, z, at.x_error, at.s_error)
+    values, bounds = series.surfaces[:, 0], series.surface_bounds[:, 0]
+    on = []
+    for k, c in enumerate(system.surface_of):
+        automaton = system.automata[c]
+        if abs(values[k]) <= bounds[k]:
+            on.append(c)
+        elif values[k] > 0.0 or not automaton.is_unilateral:
+            z[c] = automaton.above if values[k] > 0.0 else automaton.below
+    return z, on
 
 
-def _without_forces(system: System) -> list[list[list[bool]]]:
-    """For each declared automaton, mode and guard: whether no force of a surface enters it. Empty for others."""
-    meanings = Meanings(system.model)
-    found: list[list[list[bool]]] = []
-    for automaton, component in zip(system.automata, system.model.all_components(), strict=True):
-        is_other = automaton.has_surface or automaton.is_corner or automaton.is_load
-        modes = () if is_other else component.modes
-        found.append(
-            [[not names_of(guard.expr.tree) & meanings.forced for guard in mode.guards] for mode in modes]
-        )
+def _negative(settling: Settling, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
+    """The guards of some components that are negative just after in the modes z, by coefficients up to an order."""
+    series = settling.series_of(z)
+    side_of = side_after if settling.forward else side_before
+    numbers = [g for c in owners for g in settling.system.automata[c].guards[z[c]]]
+    found = ((g, side_of(series.guards[g], series.guard_bounds[g], 0)) for g in numbers)
+    return {g for g, (side, place) in found if side < 0 and place <= order}
+
+
+def _without_forces(system: System) -> list[list[bool]]:
+    """For each guard number and mode of its component whether no force of a surface enters the guard there."""
+    meanings, components = Meanings(system.model), system.model.all_components()
+    found: list[list[bool]] = [[] for _ in range(system.guard_count)]
+    for automaton, component in zip(system.automata, components, strict=True):
+        for guards, mode in zip(automaton.guards, component.modes, strict=True):
+            for g in {g for numbers in automaton.guards for g in numbers}:
+                own = [guard for number, guard in zip(guards, mode.guards, strict=True) if number == g]
+                found[g].append(all(not names_of(guard.expr.tree) & meanings.forced for guard in own))
     return found

@@ -282,7 +282,10 @@ class FixedStepRun:
             return self._monitor_events(instant, crossed, np.where(after > 0.0, 1, -1), best)
         first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
         self.x = best
-        fired = sorted((g for g in watched if last[g] < 0.0), key=lambda g: first[g] / (first[g] - last[g]))
+        shares = {
+            g: first[g] / (first[g] - last[g]) if first[g] > 0.0 else 0.0 for g in watched if last[g] < 0.0
+        }
+        fired = sorted(shares, key=shares.__getitem__)
         return self._settle(instant, tuple(fired), (), best)
 
     def _watched(self) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,11 +107,27 @@ def test_a_body_at_rest_beside_a_spring_that_jumps() -> None:
     assert sol.output("v", 3.0) == 0.0
 
 
-def test_a_contact_is_decided_in_the_mode_that_lasts() -> None:
+@pytest.mark.parametrize("integrator", ["taylor", "moreau", "reference"])
+@pytest.mark.parametrize(
+    ("guard", "w", "rate"),
+    [("y", 0, "0"), ("w", 0, "-1"), ("w", 0, "-t"), ("-w**2", 0, "1"), ("2 - w", 2, "t")],
+)
+def test_a_contact_is_decided_in_the_mode_that_lasts(
+    guard: str, w: float, rate: str, integrator: str
+) -> None:
     """The first mode of the automaton would let the body go, and ends as it begins."""
-    pull = hs.Mode("pull", [hs.Guard("below", "y", "rest")], set={"pulled": "2"})
+    pull = hs.Mode("pull", [hs.Guard("below", guard, "rest")], set={"pulled": "2"})
     component = hs.Component("c", [pull, hs.Mode("rest", set={"pulled": "0.5"})], initial="pull")
-    sol = hs.simulate(rubbing("pulled", components=[component]), (0, 2))
+    model = rubbing("pulled", components=[component])
+    model = replace(model, states=(*model.states, hs.State("w", w, der=rate)))
+    if integrator == "reference":
+        truth = multiple_precision_trajectory(model, (0, 2))
+        assert [event.target for event in truth.events] == ["rest"]
+        assert truth.states(np.array([2.0]), "+").ravel()[1] == 0.0
+        return
+    sol = hs.simulate(
+        model, (0, 2), integrator=integrator, **({"step": 1e-3} if integrator == "moreau" else {})
+    )
     assert [event.target for event in sol.events] == ["rest"]
     assert sol.output("v", 2.0) == 0.0
 

@@ -10,8 +10,8 @@ The rules, in words:
     choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors
     among them, are evaluated at x- and made at once; two that set one variable to different values are an error. Of
     guards that a reset has made negative, or that are so at a start, the first that is declared is taken. Automata
-    whose guard is negative, and holds no force of a contact, leave before contacts are decided. A contact that has no
-    mode yet is read on the side on which it is.
+    whose guard is negative in every combination of modes of the contacts at rest leave before these are decided. A
+    contact that has no mode yet is read on the side on which it is.
 2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
 3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
     combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 
 from hybridsim.analysis.multiple_precision.program import Point
@@ -12,6 +13,7 @@ from hybridsim.model.component import Corner, LoadAutomaton
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.one_sided import names_of
 
+_MOST_AT_REST = 4  # contacts whose combinations of modes are tried
 _ROUNDS_PER_MODE = 4  # a corner waits for those inside it, and for the orders of series before its own
 
 
@@ -21,6 +23,7 @@ class Sides:
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
         self.led = [c for c, one in enumerate(self.components) if isinstance(one, (Corner, LoadAutomaton))]
+        self._owners = [c for c, one in enumerate(self.components) if not one.surface and c not in self.led]
         self._forced = Meanings(programs.model).forced
         self._most = _ROUNDS_PER_MODE * sum(len(self.components[c].modes) for c in self.led)
 
@@ -63,16 +66,39 @@ class Sides:
         return after
 
     def leaving_in_any_case(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Guards of declared automata that are negative and free of the forces of contacts."""
-        expansion = self.programs.expand(point, self.programs.decided(modes))
-        found = set()
-        for c, component in enumerate(self.components):
-            if component.surface or c in self.led:
-                continue
-            for j, (guard, watched) in enumerate(
-                zip(component.mode(modes[c]).guards, expansion.guards[c], strict=True)
-            ):
-                is_free = not names_of(guard.expr.tree) & self._forced
-                if is_free and watched.c[0] < 0 and not expansion.is_zero(watched):
-                    found.add((c, j))
+        """Guards of declared automata that are negative just after in every combination of modes of contacts at rest.
+
+        With too many combinations, those that are negative by value and free of the contacts' forces.
+        """
+        if not self._owners:
+            return set()
+        given = list(self.programs.given(point, modes))
+        surfaces = [c for c, component in enumerate(self.components) if component.surface]
+        watched = self.programs.expand(point, tuple(given))
+        zero = [c for c, one in zip(surfaces, watched.surfaces, strict=True) if watched.is_zero(one)]
+        if len(zero) > _MOST_AT_REST:
+            negative = self._negative(point, tuple(given), by_value=True)
+            return {(c, j) for c, j in negative if self._is_free(c, given[c], j)}
+        found: set[tuple[int, int]] = set()
+        combinations = itertools.product(*([mode.name for mode in self.components[c].modes] for c in zero))
+        for number, combination in enumerate(combinations):
+            for c, mode in zip(zero, combination, strict=True):
+                given[c] = mode
+            negative = self._negative(point, self.along(point, tuple(given)))
+            found = found & negative if number else negative
+            if not found:
+                break
         return found
+
+    def _negative(self, point: Point, modes: Modes, by_value: bool = False) -> set[tuple[int, int]]:
+        expansion = self.programs.expand(point, modes)
+        sides = {
+            (c, j): expansion.side_after(guard)
+            for c in self._owners
+            for j, guard in enumerate(expansion.guards[c])
+        }
+        return {place for place, (side, order) in sides.items() if side < 0 and not (by_value and order)}
+
+    def _is_free(self, c: int, mode: str, j: int) -> bool:
+        """Whether no force of a contact enters a guard."""
+        return not names_of(self.components[c].mode(mode).guards[j].expr.tree) & self._forced
