@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Iterator
 
 import numpy as np
 
+from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task
+from hybridsim.expr import rounding_of
 
 _CLOSE = 1e-9  # of the largest state: by how much a surface may be missed where a mode is said to be on it
 _MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
@@ -23,7 +26,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
     known = system.starts.get(key)
     if known is None:
         p = system.vector(origin, task.discrete, task.forward)
-        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), np.zeros(system.n), 0.0)
+        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0)
         resets = [("schedule", k) for k in due]
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
         # a corner has no side to change before it has found one
@@ -33,6 +36,20 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
             system.starts.clear()
         system.starts[key] = known
     return known
+
+
+def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
+    """Bounds of the errors of the states at the start.
+
+    Of an expression that of its evaluation. Of any other number its own roundoff, as the value of some expression that
+    nobody knows; whole numbers are exact.
+    """
+    errors = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
+    declared = system.start_state({})
+    for i, state in enumerate(system.model.states):
+        if x0[i] == declared[i] and not isinstance(state.start.tree, ast.Constant):
+            errors[i] = max(errors[i], rounding_of(state.start, system.values))
+    return errors
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:

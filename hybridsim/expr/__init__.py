@@ -4,6 +4,7 @@ from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function
 from hybridsim.expr.increment import Increment, assignment, parse_reset, substitute_in_reset
 from hybridsim.expr.parse import Expression, of_tree, parse, require_names, substitute
+from hybridsim.expr.rounding import rounding_of
 
 __all__ = [
     "Expression",
@@ -18,6 +19,7 @@ __all__ = [
     "parse_reset",
     "require_names",
     "resolve",
+    "rounding_of",
     "substitute",
     "substitute_in_reset",
 ]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
 
 import hybridsim as hs
+from hybridsim.expr import evaluate, parse, rounding_of
 
 LOCATING = ("dop853", "tsit5", "rodas5p", "exact", "taylor", "scipy-dop853", "cvode-adams", "cvode-bdf")
 
@@ -99,3 +101,68 @@ def test_a_monitor_that_goes_on_is_recorded_once(integrator: str, clock: str) ->
     assert sorted(event.component for event in sol.events if event.kind == "monitor") == ["end", "m"]
     assert [event.t for event in sol.events] == [pytest.approx(0.3, rel=1e-12)] * len(sol.events)
     assert len(sol.events) == (4 if clock else 3)
+
+
+STARTS = {
+    "guard": 'x = {{ start = {start}, der = "1" }}\n[modes.one]\ninitial = true\n'
+    'guards.g = {{ expr = "x - (a + b)", then = "two" }}\n[modes.two]\n',
+    "equal guard": 'x = {{ start = {start}, der = "1" }}\n[modes.one]\ninitial = true\n'
+    'guards.g = {{ expr = "x - b - a", then = "two" }}\n[modes.two]\n',
+    "gap": 'x = {{ start = {start}, der = "v" }}\nv = {{ start = 1, der = "p" }}\n'
+    '[impacts.p]\ngap = "x - (a + b)"\nrestitution = 0.5\n',
+    "belt": 'x = {{ start = {start}, der = "0.1 - f" }}\n'
+    '[contacts.f]\nvelocity = "x - (a + b)"\nnormal = "1"\nlaw = {{ name = "coulomb", mu = 0.5 }}\n',
+    "monitor": 'x = {{ start = {start}, der = "1" }}\n[monitors.m]\nexpr = "x - (a + b)"\n',
+}
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853", "cvode-bdf"])
+@pytest.mark.parametrize("kind", STARTS)
+@pytest.mark.parametrize("is_expression", [True, False])
+def test_a_start_that_is_the_zero_of_a_guard_is_on_it(
+    integrator: str, kind: str, is_expression: bool
+) -> None:
+    draw = random.Random(3)
+    for _ in range(12):
+        a, b = round(draw.uniform(-3, 3), 2), round(draw.uniform(-3, 3), 3)
+        start = '"a + b"' if is_expression else repr(a + b)
+        text = f"[parameters]\na = {a!r}\nb = {b!r}\n[states]\n" + STARTS[kind].format(start=start)
+        sol = hs.simulate(model(text), (0, 0.05), integrator=integrator)
+        assert (sol.status, len(sol.events), sol.warnings) == ("finished", 0, ()), text
+        if kind == "belt":
+            assert sol(0.05)[0] == pytest.approx(a + b, rel=1e-15)
+
+
+def test_a_rimless_wheel_keeps_its_speed_where_it_starts() -> None:
+    # the angle begins at the guard's own zero, ga - al, and the next spoke strikes later
+    text = (
+        '[parameters]\nga = 0.08\nal = 0.4\n[states]\nth = { start = "ga - al", der = "w" }\n'
+        'w = { start = 1.2, der = "sin(th)" }\n'
+        '[modes.rolling]\ninitial = true\nguards.back = { expr = "th - (ga - al)", '
+        'then = { to = "rolling", reset = { w = "w/2" } } }\n'
+        'guards.strike = { expr = "(ga + al) - th", '
+        'then = { to = "rolling", reset = { th = "ga - al", w = "0.9*w" } } }\n'
+    )
+    for integrator in ("taylor", "dop853", "tsit5"):
+        sol = hs.simulate(model(text), (0, 3), integrator=integrator)
+        assert {event.guard for event in sol.events} == {"strike"}
+        assert sol.events[0].t > 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "exact"),
+    [
+        ("a + b", (0.1, 0.7), lambda a, b: a + b),
+        ("a*b - 0.07", (0.1, 0.7), lambda a, b: a * b - Fraction(0.07)),
+        ("a/b/7", (1.0, 3.0), lambda a, b: a / b / 7),
+        ("(a + b) - 1e8", (1e8, 0.1), lambda a, b: a + b - 10**8),
+        ("2 + 3", (0.0, 0.0), lambda a, b: Fraction(5)),
+        ("(a + b)**3", (0.1, 0.2), lambda a, b: (a + b) ** 3),
+    ],
+)
+def test_the_error_of_an_expression_is_within_its_bound(
+    text: str, values: tuple[float, float], exact: Callable[[Fraction, Fraction], Fraction]
+) -> None:
+    expr, given = parse(text), dict(zip("ab", values, strict=True))
+    off = abs(float(exact(*map(Fraction, values)) - Fraction(evaluate(expr, given))))
+    assert off <= rounding_of(expr, given) <= off + 1e-7 * abs(evaluate(expr, given)) * 2.0**-20

@@ -1,0 +1,65 @@
+"""How far rounding may put the value of an expression off, by a walk over its tree."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import math
+import operator
+from collections.abc import Mapping
+from fractions import Fraction
+
+from hybridsim.expr.parse import Expression
+from hybridsim.expr.walk import NoValue, value_of
+
+_UNIT = 2.0**-53  # unit roundoff of a double
+_EXACT = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+_WIDER = 2.0**10  # arguments are moved by so much more than their errors, which doubles may not show
+_OF_FUNCTIONS = 2.0  # units of roundoff that the functions of the mathematics library are within
+
+
+def rounding_of(expr: Expression, values: Mapping[str, float]) -> float:
+    """Bound of the error of an expression's value, at values of its names that count as exact."""
+    return _with_error(expr.tree, values)[1]
+
+
+def _with_error(node: ast.expr, values: Mapping[str, float]) -> tuple[float, float]:
+    value = float(value_of(node, values))
+    match node:
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
+            return value, _with_error(operand, values)[1]
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            return _with_error(body if value_of(test, values) else orelse, values)
+        case ast.BinOp(left=left, op=op, right=right):
+            (a, da), (b, db) = _with_error(left, values), _with_error(right, values)
+            if isinstance(op, ast.Pow):
+                return value, _carried(node, [(a, da), (b, db)], value)
+            off = float(abs(_EXACT[type(op)](Fraction(a), Fraction(b)) - Fraction(value)))
+            if isinstance(op, ast.Mult):
+                return value, abs(a) * db + da * (abs(b) + db) + off
+            if isinstance(op, ast.Div):
+                least = abs(b) - db
+                return value, ((da + abs(value) * db) / least if least > 0.0 else math.inf) + off
+            return value, da + db + off
+        case ast.Call(args=args):
+            return value, _carried(node, [_with_error(arg, values) for arg in args], value)
+    return value, 0.0
+
+
+def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:
+    """The error of a function's value: its own, and what the errors of its arguments make of it."""
+    names = [f"a{k}" for k in range(len(arguments))]
+    parts: list[ast.expr] = [ast.Name(name) for name in names]
+    again = (
+        ast.BinOp(parts[0], node.op, parts[1])
+        if isinstance(node, ast.BinOp)
+        else ast.Call(node.func, parts, [])
+    )
+    most = 0.0
+    for shifts in itertools.product((-1.0, 1.0), repeat=len(arguments)):
+        moved = [a + shift * _WIDER * e for (a, e), shift in zip(arguments, shifts, strict=True)]
+        try:
+            most = max(most, abs(float(value_of(again, dict(zip(names, moved, strict=True)))) - value))
+        except NoValue:
+            continue  # the argument is at the border of the function's domain
+    return most / _WIDER + _OF_FUNCTIONS * _UNIT * abs(value)
