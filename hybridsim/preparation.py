@@ -22,7 +22,7 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task
 from hybridsim.errors import UsageError
-from hybridsim.integrators.automatic import choose
+from hybridsim.integrators.automatic import choose, successor_of
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.fixed_step_length import refuse_endless
 from hybridsim.integrators.registry import integrator_class, list_integrators, make_integrator
@@ -103,7 +103,10 @@ def prepared(
     keep = arguments.kept(save, system)
     grid = arguments.time_grid(t_eval, span, keep, save)
     discrete = system.discrete_start
-    task = Task(*span, start, modes, tolerances, discrete, keep, arguments.run_limits(limits))
+    task = Task(
+        *span, start, modes, tolerances, discrete, keep, arguments.run_limits(limits),
+        successor=successor_of(name, system) if reason else None,
+    )  # fmt: skip
     refuse_driving(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
     if question is not None and not isinstance(system.code, PythonCode):  # which may change its answers

@@ -25,6 +25,7 @@ PLACES = {
     "errors": (0, 0.0),
     "files": (1, 2.2),
     "calls": (1, -2.2),
+    "forks": (0, -2.2),
     "expr": (1, 0.0),
     "model": (2, 0.0),
     "engine": (3, 0.0),

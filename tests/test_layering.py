@@ -20,6 +20,7 @@ FLOORS = (
     "errors",
     "files",
     "calls",
+    "forks",
     "expr",
     "model",
     "engine",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jit import call, kernel
-from hybridsim.engine.linear_kernels import moved, states_of
+from hybridsim.engine.linear_kernels import functions_of_time, moved, states_near_start, states_of
 from hybridsim.engine.linear_tables import LinearTables
 from hybridsim.engine.pieces import Segment, end_point
 from hybridsim.engine.system import System
@@ -19,13 +19,14 @@ from hybridsim.engine.timepair import Instant
 
 @kernel
 def closed_form_states(
-    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, c: Any, x: Any, out: Any
+    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, room: Any, out: Any
 ) -> None:
     """States out (m, n) at local times s (m,) of the segments of these numbers; see `ClosedFormBlock`.
 
-    c, x: room for modal coordinates and states.
+    room: for modal coordinates, states, values of atoms, functions of time, and terms near a start.
     """
     ends, rows, coordinates, modes, vectors, jumps = record
+    c, x, factors, w, terms = room
     for m in range(s.shape[0]):
         i = index[m]
         if s[m] == 0.0 or s[m] >= ends[i]:
@@ -35,6 +36,9 @@ def closed_form_states(
             continue
         moved(lin, rows[i], coordinates[i], s[m], c)
         states_of(lin, rows[i], c, x)
+        if s[m] < lin.near[rows[i]]:
+            functions_of_time(lin, 0.0, vectors[i], factors, w)
+            states_near_start(lin, rows[i], jumps[i, 0], w, s[m], terms, x)
         if pinned:
             call(project, s[m], x, vectors[i], modes[i], out[m])
         else:
@@ -90,11 +94,21 @@ class ClosedFormBlock(Sequence[Segment]):
             index,
             s,
             (self.ends, self.rows, self.coordinates, self.modes, self.vectors, self.jumps),
-            np.empty(self.coordinates.shape[1], dtype=complex),
-            np.empty(n),
+            self._room(),
             out,
         )
         return out
+
+    def _room(self) -> tuple[np.ndarray, ...]:
+        lin, n = self.tables, self.system.n
+        factors = np.ones((2 * len(lin.kinds) + 1, 2))
+        return (
+            np.empty(self.coordinates.shape[1], dtype=complex),
+            np.empty(n),
+            factors,
+            np.empty(len(lin.factors)),
+            np.empty((2, lin.flows.shape[1])),
+        )
 
     def at_end(self) -> Segment:
         """The end of the last segment."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from contextlib import suppress
 from pathlib import Path
-from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +20,7 @@ from hybridsim.engine.mode_tables import Tapes
 from hybridsim.engine.packs import packed
 from hybridsim.engine.series_code import ModeTape
 from hybridsim.engine.system import System
+from hybridsim.forks import SharedLock
 
 
 class CodeShelf(ABC):
@@ -39,7 +39,7 @@ class CodeShelf(ABC):
 
     def __init__(self, system: System, kind: str) -> None:
         self.system, self.kind = system, kind
-        self._lock = Lock()
+        self._lock = SharedLock()
         self._engines: list[Any] = []  # what keeps the code alive
         self._known: tuple[Tapes | None, Any, Any] = (None, self._blank(0), None)
 

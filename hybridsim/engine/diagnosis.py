@@ -65,6 +65,12 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     return _steep(system, record, s, x, p, z, rates, first, reach)
 
 
+def advice_on_sizes(system: System) -> str:
+    """What to do where steps collapse and nothing is in their way: what is asked for is below what can be computed."""
+    is_sized = all(state.nominal is not None for state in system.model.states)
+    return "pass a larger atol or rtol" if is_sized else "declare `nominal` sizes or pass atol"
+
+
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # it looks for what is no number
 def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
     """The states whose rates are no numbers in the modes z, and why, in words; empty where all have a value."""
@@ -113,7 +119,7 @@ def _steep(
         start = record.segments[0]
         rates_before = system.flow(0.0, start.x[0], start.p, start.z)
         guards_before = system.series(0.0, start.x[0], start.p, start.z, none, 0.0).guards[:, 0]
-    steep = np.abs(rates) * reach > np.maximum(first, np.abs(x))
+    steep = (np.abs(rates) * reach > np.maximum(first, np.abs(x))) & (x != 0.0)  # from zero anything is fast
     faster = np.abs(rates) > _FASTER * np.abs(rates_before)
     found = [
         f"{system.names[i]} = {x[i]:.3g} has the rate {rates[i]:.3g}" for i in np.flatnonzero(steep & faster)

@@ -14,7 +14,7 @@ from hybridsim.engine.event_work import LEAP, ROW, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.jit import call, call_kernel, inlined, kernel, kernel_address, merged
+from hybridsim.engine.jit import call, call_apart, call_kernel, inlined, kernel, kernel_address, merged
 from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.linear_guards import TERMS
 from hybridsim.engine.linear_kernels import (
@@ -27,6 +27,7 @@ from hybridsim.engine.linear_kernels import (
     moved,
     slopes_of,
     state_sizes,
+    states_near_start,
     states_of,
     to_modal,
 )
@@ -52,7 +53,7 @@ class Room(NamedTuple):
     target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
     followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, TERMS), those at the start (G, TERMS + 2),
     a state; hints (K, G): how long after these modes were entered a guard was zero when they were met last in this run,
-    0 where it was not; former (G,): a row of it before the segment under way.
+    0 where it was not; former (G,): a row of it before the segment under way; terms near a start (2, n + M).
     """
 
     rates: np.ndarray
@@ -68,6 +69,7 @@ class Room(NamedTuple):
     starts: np.ndarray
     hints: np.ndarray
     former: np.ndarray
+    series: np.ndarray
     scale: np.ndarray
     pace: np.ndarray
 
@@ -156,6 +158,7 @@ def room_for(system: Any, tables: Any) -> Room:
             starts=np.zeros((system.guard_count, TERMS + 2)),
             hints=np.zeros(tables.farthest.shape),
             former=np.zeros(tables.farthest.shape[1]),
+            series=np.zeros((2, tables.flows.shape[1])),
             scale=np.empty(n),
             pace=np.empty(3),
         )
@@ -213,6 +216,8 @@ def exact_leap(
             return stopped(hints, k, former)
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
+        if s < lin.near[k]:
+            call_apart(states_near_start, (lin, k, x, work.w, s, room.series, y))
         state_sizes(lin, k, c, v, room.sizes, scale)
         if holding(automata, z):
             call(functions.project, s, y, p, z, y1)

@@ -129,6 +129,14 @@ if ENABLED:
     for _kind in (_COMPILING, _LOCKED):
         event.register(_kind, _compiling)
 
+    def _free_in_child() -> None:
+        """A child that was forked while another thread was compiling finds numba's lock free."""
+        if hasattr(compiler_lock.global_compiler_lock, "_lock"):
+            compiler_lock.global_compiler_lock._lock = threading.RLock()
+
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_free_in_child)
+
     def seconds_compiling() -> float:
         """Seconds that this thread has spent so far on getting kernels ready."""
         return _compiling.of.spent

@@ -17,7 +17,15 @@ from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.modes_index import find_modes
-from hybridsim.engine.segment_end import is_crowded, is_hidden, is_shallow, settle_and_move_on, state_errors
+from hybridsim.engine.rk_step import on_the_grid
+from hybridsim.engine.segment_end import (
+    is_crowded,
+    is_hidden,
+    is_shallow,
+    moved_on,
+    settle_and_move_on,
+    state_errors,
+)
 from hybridsim.engine.stepping import IN_A_ROW, STANDSTILL
 from hybridsim.engine.steps_ahead import (
     BETWEEN,
@@ -34,7 +42,7 @@ from hybridsim.engine.timepair import phase_of
 AT_TARGET, STOPPED, FULL = 0, 1, 2
 _SHORTER = 0.25
 _TRIALS = 30
-_SMALLEST = 10.0
+LEAST = 64  # steps of a piece of a segment that there is no room for: with less it waits for the next call
 
 
 class Room(NamedTuple):
@@ -195,7 +203,8 @@ def leap(
     codes: machine code of the tapes, where there is some. places: rates, then where in p the origin and the phases are.
     control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
     the segment, moved on. state: x, x_error, z, p, sides, orders, floors at the start of the segment, moved on. room:
-    scratch arrays. record: what the committed steps, segments and events are written to.
+    scratch arrays. record: what the committed steps, segments and events are written to; a segment with more steps than
+    there is room for is committed in pieces.
     """
     rates, origin_at, phases_at = places
     rtol, atol, order, max_step, longest = control
@@ -246,7 +255,9 @@ def leap(
             scale[i] = abs(x[i])
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
-                return FULL, first_step, n_segments
+                if n_segments > 0 or n_steps < LEAST:
+                    return FULL, first_step, n_segments
+                break
             if s > longest:
                 return STOPPED, first_step, n_segments
             coefficients = series[n_steps]
@@ -271,8 +282,10 @@ def leap(
                 sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
                 min(left, max_step), powers, totals,
             )  # fmt: skip
+            if h < left:
+                h = on_the_grid(s, h)
             short = short + 1 if h < STANDSTILL * s else 0
-            if not h > _SMALLEST * 2.0**-52 * s or short >= IN_A_ROW:
+            if not h > 0.0 or short >= IN_A_ROW:
                 return STOPPED, first_step, n_segments
             outcome, g, d = earliest_exit(
                 tapes,
@@ -301,7 +314,9 @@ def leap(
                         where_it_ends, (u, kind, order, d, room.a, room.stack, codes.bernstein[1])
                     )
                     if end < d:
-                        d, outcome = end, NEVER
+                        d, outcome = on_the_grid(s, end), NEVER
+            if not d > 0.0:
+                return STOPPED, first_step, n_segments
             trials = 0
             first_look = len(BETWEEN)
             if seems_straight(tapes.computed[k], coefficients, order, powers, rtol, atol):
@@ -326,8 +341,8 @@ def leap(
                     holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
                 if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
                     break
-                d, outcome, trials = _SHORTER * d, NEVER, trials + 1
-                if trials > _TRIALS:
+                d, outcome, trials = on_the_grid(s, _SHORTER * d), NEVER, trials + 1
+                if trials > _TRIALS or not d > 0.0:
                     return STOPPED, first_step, n_segments
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             n_steps += 1
@@ -357,6 +372,9 @@ def leap(
             put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
+            if s < bound:  # a segment that is too long for the room is cut in two
+                move_on(s, clock, sides, orders, floors)
+                return FULL, n_steps, n_segments + 1
             clock[0], clock[1] = target[0], target[1]
             return AT_TARGET, n_steps, n_segments + 1
         if is_crowded(s, clock, pace):
@@ -381,6 +399,14 @@ def leap(
             return STOPPED, first_step, n_segments
         put(work.x_after, jumps[n_segments, 1])
         n_segments += 1
+
+
+@inlined
+def move_on(s: float, clock: Any, sides: Any, orders: Any, floors: Any) -> None:
+    """Begin anew at local time s inside a segment, where all guards that are looked at are positive."""
+    clock[0], clock[1] = moved_on(clock[0], clock[1], s)
+    for g in range(sides.shape[0]):
+        sides[g], orders[g], floors[g] = 1, 0, 0.0
 
 
 @inlined

@@ -18,7 +18,7 @@ from hybridsim.engine.code_shelf import CodeShelf
 from hybridsim.engine.desk import Desk, Laid, laid_out
 from hybridsim.engine.event_work import functions_of, work_space
 from hybridsim.engine.jit import Door
-from hybridsim.engine.leap import Record, Room, leap
+from hybridsim.engine.leap import LEAST, Record, Room, leap
 from hybridsim.engine.leapt import Leapt
 from hybridsim.engine.linear_tables import no_tables
 from hybridsim.engine.mode_code import most_fading
@@ -45,9 +45,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Trajectory
 
 _SEGMENTS = 1024  # room for one call
-# doubles for the steps of one call, those of a block that is handed on; how many steps there is room for in any case
-_ROOM, _FEWEST = LARGEST // 8, 64
-_GROWTH, _LONGEST = 8, 1 << 23  # of that room, for a segment that is longer
+_ROOM = LARGEST // 8  # doubles for the steps of one call, those of a block that is handed on
 _NONE = np.zeros(0, dtype=np.int64)
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels that take their modes by series
@@ -115,7 +113,7 @@ class Leaper(ABC):
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
         self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
-        self.steps = max((_ROOM - beside) // (system.n * columns + 2), _FEWEST)  # that there is room for
+        self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)  # that there is room for
         self._renew()
 
     def anew(self) -> Leaps:
@@ -247,10 +245,7 @@ class Leaper(ABC):
         while True:
             self.memory = leapt.memory
             self.count(leapt, record.counters)
-            is_too_long = leapt.is_full and leapt.count == 0 and self.used == (0, 0)  # a single segment
-            if is_too_long and self.steps * _GROWTH * self.system.n * self.columns <= _LONGEST:
-                self.steps, is_too_long = self.steps * _GROWTH, False
-            is_full = leapt.is_full and not is_too_long
+            is_full = leapt.is_full
             if leapt.count:
                 self._commit(leapt, record)
                 instants.append(leapt.instants)

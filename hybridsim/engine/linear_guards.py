@@ -79,6 +79,13 @@ def modal_guards(
                 for m in range(size):
                     total += rows[k, g, m] * basis[k, m, j]
                 gamma[j] = total
+            # an entry of the basis is known to rounding of the largest one of its row, if it is not zero for certain
+            known = 0.0
+            for m in range(size):
+                largest = 0.0
+                for j in range(counts[k]):
+                    largest = max(largest, abs(basis[k, m, j]))
+                known += abs(rows[k, g, m]) * largest
             waves[k, g] = _wave(gamma, counts[k], values[k], upper[k])
             first = 0
             fastest = growing = 0.0
@@ -90,6 +97,8 @@ def modal_guards(
                 for j in range(first, end):
                     sizes[k, g, j] = math.sqrt(square)
                     rests[k, g, j] = sizes[k, g, j] * flows.powers[k, j] / _FACTORIAL
+                    if square > 0.0:
+                        sizes[k, g, j] = max(sizes[k, g, j], known)
                     if rests[k, g, j] > 0.0:
                         fastest, growing = max(fastest, flows.speeds[k, j]), max(growing, flows.growth[k, j])
                         turning[k, g] = max(turning[k, g], growing, abs(values[k, j].imag))

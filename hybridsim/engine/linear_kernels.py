@@ -29,6 +29,7 @@ from hybridsim.engine.panels import LANES, dot, product, times
 _SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
 _PARTS = 10**6  # of that size: a second's work
 _ITERATIONS = 100
+_TERMS = 30  # of a series near its start, at most, beyond as many as there are states
 # From so many points a guard is followed: a second; a run that is to be stopped must not wait for more. A block of many
 # coordinates moves as much more slowly as it has entries.
 POINTS = 10**6
@@ -257,6 +258,36 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
 def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
     """States at modal coordinates c."""
     product(lin.states, k, (c,), x)
+
+
+@kernel
+def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, out: Any) -> None:
+    """States a short time s after y = (x, w), each to rounding of itself: the Taylor series, summed term by term.
+
+    Modal coordinates know a state to rounding of the largest one alone, and one that grows from zero is less than that
+    at first. terms (2, n + M): room. See `LinearTables.near`.
+    """
+    n, size = x.shape[0], terms.shape[1]
+    term, following = terms[0], terms[1]
+    for i in range(size):
+        term[i] = x[i] if i < n else w[i - n]
+    for i in range(n):
+        out[i] = x[i]
+    for order in range(1, size + _TERMS):
+        is_small = order > size  # until then a state may have no term yet
+        for i in range(size):
+            total = 0.0
+            for j in range(size):
+                if lin.flows[k, i, j] != 0.0:
+                    total += lin.flows[k, i, j] * term[j]
+            following[i] = total * (s / order)
+        for i in range(size):
+            term[i] = following[i]
+        for i in range(n):
+            out[i] += term[i]
+            is_small = is_small and abs(term[i]) <= 0.125 * UNIT * abs(out[i])
+        if is_small:
+            break
 
 
 @inlined

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,14 @@ from hybridsim.engine.linear_form import Atoms, Form, Monomial
 from hybridsim.engine.linear_modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.recipe import Numbers, Recipe
 from hybridsim.engine.system import System
+from hybridsim.forks import SharedLock
 
 _MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
 _MOST_VECTORS = 64  # sets of modes that plans are kept for
 
 Entries = np.ndarray  # (2, entries): where each goes, and the register that has its value
 
-_lock = Lock()
+_lock = SharedLock()
 
 
 class LinearPlan:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +15,19 @@ from hybridsim.engine.modal import modals
 from hybridsim.engine.packs import packed
 from hybridsim.engine.panels import LANES, panels_of, rows_of
 from hybridsim.engine.system import System
+from hybridsim.forks import SharedLock
 
 _LARGEST = 1e150  # the square of it has a value yet
 _MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _PARTING = 2.0  # exponent by which coordinates of one block may grow apart
+# In units of the fastest rate: so near to its start a state that grows from zero is what modal coordinates cancel to,
+# and the first terms of its series are all of it.
+_NEAR, _SLOWEST = 0.125, 1e-300
 _KEPT = 64  # tables of a structure, one for each set of parameter values
 _MOST_BYTES = 1 << 28  # of all of these, but for the last ones
 
 
-_lock = Lock()
+_lock = SharedLock()
 
 
 class LinearTables(NamedTuple):
@@ -43,7 +46,8 @@ class LinearTables(NamedTuple):
     but for a factor; turning (K, G): the fastest of the speeds and rates of growth that a guard sees, which make the
     more of a rounding the longer they go on. waves (K, G): the modal coordinate that turns without damping, where a
     guard sees one such and else constants; -1 otherwise. lasting (K,): how long the motion may be followed from one
-    point: of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one.
+    point: of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one. flows (K, n + M, n + M): from y to its
+    rate; near (K,): up to when a state is summed from these.
     """
 
     kinds: np.ndarray
@@ -74,6 +78,8 @@ class LinearTables(NamedTuple):
     turning: np.ndarray
     waves: np.ndarray
     lasting: np.ndarray
+    flows: np.ndarray
+    near: np.ndarray
 
 
 def no_tables() -> LinearTables:
@@ -86,6 +92,7 @@ def no_tables() -> LinearTables:
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
         np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros(0),
+        np.zeros((0, 0, 0)), np.zeros(0),
     ))  # fmt: skip
     return tables
 
@@ -250,6 +257,8 @@ def of_matrices(
         "lasting": np.array(
             [_lasting(*row) for row in zip(flows.values.real, flows.ends, flows.counts, strict=True)]
         ),
+        "flows": A.copy(),
+        "near": _NEAR / np.maximum(flows.speeds.max(axis=1, initial=0.0), _SLOWEST),
     }
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.backward import cross_backward, has_no_past, held, said_of_direction
 from hybridsim.engine.checkpoint import Checkpoint
-from hybridsim.engine.diagnosis import in_the_way
+from hybridsim.engine.diagnosis import advice_on_sizes, in_the_way
 from hybridsim.engine.gathering import behind, closed_now, holds_several
+from hybridsim.engine.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
@@ -24,7 +25,7 @@ from hybridsim.engine.segment import Arrival, SegmentRun
 from hybridsim.engine.settle import Settling
 from hybridsim.engine.sightings import seen_on_the_way
 from hybridsim.engine.standing import Standing
-from hybridsim.engine.stepping import ARRIVED, PAUSED, Leaps, Method, StepFailure, Watch
+from hybridsim.engine.stepping import ARRIVED, PAUSED, Collapsed, Leaps, Method, StepFailure, Watch
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
@@ -55,7 +56,8 @@ class ModeLoop:
         self.standing: Standing  # what holds at the origin
         self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # by component
-        self.notices = Notices(system, method, task, self.record)
+        self.headway = Headway(system, self.record.counters, self.origin, self.end)
+        self.notices = Notices(system, method, task, self.record, self._is_taken_over)
         self.leaper = leaper or plan.leaper()
         self._told = progress
 
@@ -79,6 +81,29 @@ class ModeLoop:
         if self.gauge is not None:
             self.gauge.check()
 
+    def _stepped(self, instant: Instant, run: SegmentRun) -> None:
+        """The same after a step in Python; raises NoHeadway and TakenOver."""
+        self._progress(instant)
+        self.headway.step(instant, run)
+        if self.task.successor is not None and self.notices.look_on_the_way(run):
+            raise TakenOver
+
+    def _is_taken_over(self, h: float) -> bool:
+        """Whether a stiff method is to go on from here, as stability holds the present one to steps of length h."""
+        task, reached = self.task, self.record.segments
+        if task.successor is None or self.method is task.successor:
+            return False
+        now = reached[-1].end if reached else self.origin
+        return self.headway.is_sooner(now, h, self.leaper is not None)
+
+    def _take_over(self) -> None:
+        """Go on by the stiff method."""
+        assert self.task.successor is not None
+        self.method = self.notices.method = self.task.successor
+        self.leaper = None
+        if self.record.taken_over is None:
+            self.record.taken_over = (self.task.successor.name, float(self.origin))
+
     def _tell(self, instant: Instant) -> None:
         if self._told is not None:
             self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
@@ -90,6 +115,10 @@ class ModeLoop:
         except StepFailure as failure:
             self.record.status = "step-failure"
             why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
+            if isinstance(failure, NoHeadway):
+                why = why or failure.advice
+            elif not why and isinstance(failure, Collapsed):
+                why = advice_on_sizes(self.system)
             reached = self.record.segments[-1].end if self.record.segments else self.origin
             self.record.message = f"after t = {float(reached)!r}: {failure}" + (f"; {why}" if why else "")
         except LimitReached as reached:
@@ -130,6 +159,9 @@ class ModeLoop:
                     step_size = None
                     self._mark(None)
                 self._progress(self.origin)
+                self.headway.leapt(self.origin)
+                if self.notices.takes_over:
+                    self._take_over()
                 if arrived:
                     continue
             reach = min(self.renewal, self.accumulation.reach(float(self.origin)))
@@ -140,7 +172,10 @@ class ModeLoop:
             bound = target.minus(self.origin)
             found: Located | None = None
             try:
-                arrival = segment.run(bound, step_size)
+                arrival = self._arrival(segment, bound, step_size)
+                if arrival.is_bare and arrival.s != bound:  # another method goes on from there
+                    bound, target = arrival.s, self.origin.plus(arrival.s)
+                    appointment = Appointment(target, (), is_renewal=True)
                 at_target = arrival.s == bound
                 is_due = appointment is not None and not appointment.is_renewal
                 if self.forward and (arrival.fired or arrival.stopping or (at_target and appointment)):
@@ -152,6 +187,15 @@ class ModeLoop:
             instant = target if at_target else self.origin.plus(arrival.s)
             stop = self._settle(instant, arrival, appointment if at_target else None, segment, found)
             step_size = segment.last_step if self.outcome.continuous else None
+            if self.notices.takes_over:
+                self._take_over()
+
+    def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
+        """Where a segment ends, or is broken off for another method to go on."""
+        try:
+            return segment.run(bound, step_size)
+        except TakenOver:
+            return segment.cut()
 
     def _mark(self, step_size: float | None) -> None:
         """Note a state from which the run could go on, where an event has just been settled."""
@@ -159,11 +203,14 @@ class ModeLoop:
             return
         standing, origin = self.standing, self.origin
         settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+        headway, taken_over = self.headway.place, self.record.taken_over
         place = None if self.leaper is None else self.leaper.place
 
         def checkpoint(segments: int, occurrences: int) -> Checkpoint:
             size = math.nan if step_size is None else step_size
-            arrays = standing.outcome.arrays() | {"step_size": np.array(size)}
+            arrays = standing.outcome.arrays() | {"step_size": np.array(size), "headway": headway}
+            if taken_over is not None:
+                arrays["taken_over"] = np.array(taken_over[1])
             if place is not None:
                 arrays["place"] = np.concatenate(place)
             return Checkpoint(origin, arrays, settled, paces, segments, occurrences)
@@ -180,6 +227,11 @@ class ModeLoop:
         self._stand(self.origin, lambda: Outcome.of_arrays(arrays))
         if self.leaper is not None and "place" in arrays:
             self.leaper.place = arrays["place"]
+        if "headway" in arrays:
+            self.headway.go_on(arrays["headway"])
+        if "taken_over" in arrays and self.task.successor is not None:
+            self.record.taken_over = (self.task.successor.name, float(arrays["taken_over"]))
+            self._take_over()
         step_size = float(arrays["step_size"])
         return None if math.isnan(step_size) else step_size
 
@@ -201,10 +253,11 @@ class ModeLoop:
                 limit = limit_of_hidden(self.system, self.outcome, last, self.record)
             if self._ends_at(limit):
                 return arrived, True
-            if landing.end != PAUSED:
+            if landing.end != PAUSED or self.notices.takes_over:
                 break
             self._mark(None)
             self._progress(self.origin)
+            self.headway.leapt(self.origin)
         if not arrived:
             return False, False
         if appointment is None:
@@ -251,7 +304,7 @@ class ModeLoop:
             self.task.tolerances,
             self.record.counters,
             self.forward,
-            self._progress,
+            self._stepped,
         )
 
     def _keep(self, run: SegmentRun) -> None:

@@ -6,7 +6,6 @@ import math
 from contextlib import suppress
 from itertools import product
 from pathlib import Path
-from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +27,7 @@ from hybridsim.engine.mode_code import (
 from hybridsim.engine.modes_index import index_of
 from hybridsim.engine.packs import packed
 from hybridsim.engine.system import System
+from hybridsim.forks import SharedLock
 
 _ALL = 27  # vectors of modes, as of three contacts: so many are on a shelf from the first on
 
@@ -166,7 +166,7 @@ class TapeShelf:
         self._counts = [len(automaton.modes) for automaton in system.automata]
         self._met: dict[bytes, np.ndarray] = {}
         self._surrounded: set[bytes] = set()
-        self._lock = Lock()
+        self._lock = SharedLock()
         self._engines: list[Any] = []  # what keeps machine code alive
         self._code = np.zeros((2, 0), dtype=np.int64)
         self._rows: list[_ModeRows] = []  # of the vectors of modes met

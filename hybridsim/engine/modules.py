@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from importlib.abc import InspectLoader
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from threading import Lock
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.engine.cache import model_folder, store
 from hybridsim.engine.private_folder import is_trusted_file
+from hybridsim.forks import SharedLock
 
 if TYPE_CHECKING:
     from hybridsim.engine.python_code import PythonCode
@@ -59,9 +59,10 @@ class Compiled:
 
 
 _loaded: dict[str, Compiled] = {}
+_STRUCTURES = 64  # that are kept, those that were asked for last; others are read from disk again
 _MOST = 16  # models of Python functions that are kept; their functions cannot be found again on disk
 _of_functions: dict[tuple[Any, ...], PythonCode] = {}
-_lock = Lock()  # of these
+_lock = SharedLock()  # of these
 
 
 def compiled(model: Model) -> Compiled | PythonCode:
@@ -69,9 +70,14 @@ def compiled(model: Model) -> Compiled | PythonCode:
     if model.flow is not None:
         return _code_of_functions(model)
     name: str = model.once("module", lambda: _name(model))
-    if name not in _loaded:
-        _loaded.setdefault(name, _load(model, name))
-    return _loaded[name]
+    code = _loaded.get(name) or _load(model, name)
+    with _lock:
+        # another thread may have been first: what it has is in use
+        code = _loaded.pop(name, code)
+        _loaded[name] = code
+        while len(_loaded) > _STRUCTURES:
+            del _loaded[next(iter(_loaded))]
+    return code
 
 
 def _code_of_functions(model: Model) -> PythonCode:
@@ -82,11 +88,11 @@ def _code_of_functions(model: Model) -> PythonCode:
     with _lock:
         if key in _of_functions and not _of_functions[key].is_current:
             del _of_functions[key]
-        if key not in _of_functions:
-            while len(_of_functions) >= _MOST:
-                del _of_functions[next(iter(_of_functions))]
-            _of_functions[key] = PythonCode(model)
-        return _of_functions[key]
+        code = _of_functions.pop(key, None) or PythonCode(model)
+        while len(_of_functions) >= _MOST:
+            del _of_functions[next(iter(_of_functions))]
+        _of_functions[key] = code
+        return code
 
 
 def is_cached(model: Model) -> bool:

@@ -7,26 +7,33 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, kernel
 from hybridsim.engine.pieces import Occurrence
-from hybridsim.engine.stepping import Method
+from hybridsim.engine.stepping import Counters, Flow, Method
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task, Trajectory
+
+if TYPE_CHECKING:
+    from hybridsim.engine.segment import SegmentRun
 
 # Chattering: so many events in a row, between two of which no state moves by more than this share of its range so far.
 _EVENTS, _SHARE = 200, 1e-3
 _FASTER = 0.5  # intervals that shrink by more over these events accumulate, which is another matter
 # Stiff: of the steps looked at so many are longer than this share of what stability allows along the negative axis.
 _STEPS, _LOOKS, _MOST, _NEAR = 500, 8, 6, 0.6
+_DECAYING = 0.25  # share of an eigenvalue that is its decay
 _ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and how well its vector must have settled on a decay
+
+# Of a step the number of its segment, local time and length, the state at its start, run-time vector and modes.
+Sample = tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]
 
 
 @kernel
@@ -57,9 +64,17 @@ class Notices:
     the border of the stability region; lambda, the fastest rate, by the power method on differences of the flow.
     """
 
-    def __init__(self, system: System, method: Method, task: Task, record: Trajectory) -> None:
+    def __init__(
+        self,
+        system: System,
+        method: Method,
+        task: Task,
+        record: Trajectory,
+        is_taken_over: Callable[[float], bool],
+    ) -> None:
         self.system, self.method, self.tolerances, self.record = system, method, task.tolerances, record
         self._events = self._steps = 0  # at the last look
+        self._is_taken_over, self.takes_over = is_taken_over, False
         self._start = task.x0
         self._done: set[str] = set()
 
@@ -81,7 +96,21 @@ class Notices:
             self._look_for_chattering()
         if self.method.stable_to and counters.steps - self._steps >= _STEPS and self.record.segments:
             self._steps = counters.steps
-            self._look_for_stiffness(self.record.segments.blocks[-1])
+            block = self.record.segments.blocks[-1]
+            self._look_for_stiffness(_sampled(block), lambda i: Instant(*block.origins[i].tolist()))
+
+    def look_on_the_way(self, run: SegmentRun) -> bool:
+        """Look at the steps of a segment that is not over yet; whether a stiff method is to take over."""
+        counters = self.record.counters
+        if not self.method.stable_to or counters.steps - self._steps < _STEPS or len(run.knots) <= _STEPS:
+            return False
+        self._steps, first = counters.steps, len(run.knots) - _STEPS
+        samples = [
+            (0, run.knots[k], run.knots[k + 1] - run.knots[k], run.states[k], run.flow.p, run.flow.z)
+            for k in (first + number for number in _evenly(_STEPS - 1, _LOOKS))
+        ]
+        self._look_for_stiffness(samples, lambda _: run.origin)
+        return self.takes_over
 
     # -- chattering -----------------------------------------------------------------------------------------
 
@@ -108,29 +137,47 @@ class Notices:
 
     # -- stiffness ------------------------------------------------------------------------------------------
 
-    def _look_for_stiffness(self, block: Any) -> None:
-        if "stiff" in self._done:
-            return
-        samples = _sampled(block)
-        if len(samples) < _LOOKS:
+    def _look_for_stiffness(self, samples: list[Sample], origin_of: Callable[[int], Instant]) -> None:
+        if "stiff" in self._done or len(samples) < _LOOKS:
             return
         system, floors = self.system, self.tolerances.atol / self.tolerances.rtol
         flow, work = system.address("flow"), np.empty((5, system.n))
-        lengths = [abs(h) * fastest_decay(flow, s, x, p, z, floors, work) for _, s, h, x, p, z in samples]
-        if sum(length >= _NEAR * self.method.stable_to for length in lengths) >= _MOST:
-            self._done.add("stiff")
-            longest = int(np.argmax(lengths))
-            i, s, h, *_ = samples[longest]
-            t, h = float(Instant(*block.origins[i].tolist()).plus(s)), abs(h)
-            self.record.warn(
-                f"stiff: at t = {t:.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the steps at "
-                f"{h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
-            )
+        lengths = []
+        for _, s, h, x, p, z in samples:
+            rate = fastest_decay(flow, s, x, p, z, floors, work)
+            if rate < 0.0 and abs(h * rate) >= _NEAR * self.method.stable_to:
+                rate = self._fastest_turning(s, x, p, z)
+            lengths.append(abs(h) * max(rate, 0.0))
+        if sum(length >= _NEAR * self.method.stable_to for length in lengths) < _MOST:
+            return
+        longest = int(np.argmax(lengths))
+        i, s, h, *_ = samples[longest]
+        h = abs(h)
+        if self._is_taken_over(h):
+            self.takes_over = True
+            return
+        self._done.add("stiff")
+        t = float(origin_of(i).plus(s))
+        self.record.warn(
+            f"stiff: at t = {t:.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the steps at "
+            f"{h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
+        )
+
+    def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
+        """The largest |lambda| of what decays as fast as it turns, which the power method does not settle on."""
+        jacobian = Flow(self.system, p, z, Counters()).jacobian(s, x)
+        if not np.isfinite(jacobian).all():
+            return 0.0
+        values = np.linalg.eigvals(jacobian)
+        decays = np.abs(values)[values.real <= -_DECAYING * np.abs(values)]
+        return float(decays.max(initial=0.0))
 
 
 @kernel
 def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work: Any) -> float:
-    """The largest rate of the flow at a state if it is that of a decay, else 0, by the power method on differences.
+    """The largest rate of the flow at a state, with a minus sign if it is not that of a decay without turning.
+
+    It is found by the power method on differences.
 
     floors (n,): sizes of states that are none; work (5, n) is written to.
     """
@@ -162,7 +209,7 @@ def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work
         rate = math.sqrt(rate)
         for i in range(x.shape[0]):
             v[i] = image[i]
-    return rate if aligned <= -_ALIGNED * rate else 0.0
+    return rate if aligned <= -_ALIGNED * rate else -rate
 
 
 def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -194,14 +241,11 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
     return found
 
 
-def _sampled(block: Any) -> list[tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]]:
-    """Some steps that no event cut short, evenly among the segments of a block.
-
-    Of each the number of the segment, its local time and length, the state there, run-time vector and modes.
-    """
+def _sampled(block: Any) -> list[Sample]:
+    """Some steps that no event cut short, evenly among the segments of a block."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
-    found: list[tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]] = []
+    found: list[Sample] = []
     for i in chosen:
         knots, states, p, z = block.steps_of(i)
         for k in _evenly(len(knots) - 2, share):  # steps but for the last

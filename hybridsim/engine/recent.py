@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from threading import Lock
 from typing import TYPE_CHECKING
 
 from hybridsim.engine.system import System
+from hybridsim.forks import SharedLock
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _MOST = 16  # kept with their models; a loop over a few models finds them all
 
 _kept: dict[int, System] = {}
-_lock = Lock()
+_lock = SharedLock()
 
 
 def known_system(model: Model) -> System | None:

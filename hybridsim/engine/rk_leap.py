@@ -16,9 +16,9 @@ from hybridsim.engine.first_exit import FOUND, OPEN
 from hybridsim.engine.hermite import fit_in_time, holds_between
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
-from hybridsim.engine.leap import AT_TARGET, FULL, STOPPED, holding, landing, load, set_origin
+from hybridsim.engine.leap import AT_TARGET, FULL, LEAST, STOPPED, holding, landing, load, move_on, set_origin
 from hybridsim.engine.modes_index import find_modes
-from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length
+from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length, on_the_grid
 from hybridsim.engine.segment_end import (
     is_crowded,
     is_hidden,
@@ -176,6 +176,9 @@ def land(
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
     places = (inputs.time[0], inputs.states, tapes.derivatives[k])
     low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
+    d = (s + d) - s
+    if not d > 0.0:
+        return LOST, d
     error = 0.0
     if not is_still(room.stages):
         error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
@@ -195,6 +198,7 @@ def land(
         if abs(move) <= 2.0 * 2.0**-52 * (s + d):
             return LANDED, d
         moved = min(max(d + move, low), high)
+        moved = (s + moved) - s  # the event is where the step to it ends
         if moved == d or not moved > 0.0:
             return UNSURE, d
         move, d = moved - d, moved
@@ -324,11 +328,14 @@ def rk_leap(
             return STOPPED, n_steps, n_segments
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
-                return FULL, first_step, n_segments
+                if n_segments > 0 or n_steps < LEAST:
+                    return FULL, first_step, n_segments
+                first[0] = h  # the leap that follows goes on with it
+                break
             # what would be left is too short for a step of its own
             is_last = h >= bound - s - SMALLEST * 2.0**-52 * bound
-            d = bound - s if is_last else h
-            if s > longest or not d > SMALLEST * 2.0**-52 * s:
+            d = bound - s if is_last else on_the_grid(s, h)
+            if s > longest or not d > 0.0:
                 return STOPPED, first_step, n_segments
             for i in range(n):
                 room.dx[i] = left[i, 1]
@@ -424,6 +431,9 @@ def rk_leap(
             put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
+            if s < bound:  # a segment that is too long for the room is cut in two
+                move_on(s, clock, sides, orders, floors)
+                return FULL, n_steps, n_segments + 1
             clock[0], clock[1] = target[0], target[1]
             return AT_TARGET, n_steps, n_segments + 1
         if is_crowded(s, clock, pace):

@@ -16,7 +16,7 @@ from hybridsim.engine.packs import packed
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 _LEAST = 1e-2  # an error below this share of the tolerance says nothing of how errors grow
 _NOTHING = 1e-9  # a coefficient that order conditions make zero, but for rounding
-SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
+SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
 
 
 class Coefficients(NamedTuple):
@@ -132,6 +132,22 @@ def attempt(
         return 0.0
     weighted = square + 0.01 * square_low
     return abs(h) * square / math.sqrt(weighted * n) if weighted > 0.0 else math.nan
+
+
+@kernel
+def on_the_grid(s: float, h: float) -> float:
+    """The length, no longer than h, of a step from s that ends at a double of time; 0 where there is none before h.
+
+    A step that is tried with one length and taken with another, an ulp of time apart, is another step where a state
+    moves far in an ulp; and one that is rejected is to be followed by a shorter one.
+    """
+    end = s + h
+    if abs(end - s) > abs(
+        h
+    ):  # it was rounded away from s: three quarters of an ulp less lead to the double before
+        end = s + (h - math.copysign(0.75 * 2.0**-52 * abs(end), h))
+    moved = end - s
+    return moved if moved * h > 0.0 else 0.0
 
 
 @kernel

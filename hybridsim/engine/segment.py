@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 
@@ -60,6 +61,11 @@ class Arrival:
     stopping: tuple[int, ...] = ()
     entered: str = ""
 
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing happens there."""
+        return not (self.fired or self.stopping or self.entered)
+
 
 # Of a step that says otherwise than the field at its start this part is tried: the first tenth of it is a step of
 # its own, and what it finds there is found again.
@@ -96,7 +102,7 @@ class SegmentRun:
         tolerances: Tolerances,
         counters: Counters,
         forward: bool,
-        progress: Callable[[Instant], None] | None,
+        progress: Callable[[Instant, SegmentRun], None] | None,
     ) -> None:
         self.system, self.method, self.origin = system, method, origin
         self.tolerances, self.counters, self.progress = tolerances, counters, progress
@@ -126,8 +132,7 @@ class SegmentRun:
             try:
                 step = stepper.step()
             except Creeping as failure:
-                self._go_back(failure.since)
-                raise
+                self._collapse(failure.since, str(failure))
             self.counters.steps += 1
             if self.counters.steps == 1:
                 self._check_shape(step)
@@ -150,11 +155,16 @@ class SegmentRun:
             self.states.append(step.x1)
             self.interpolants.append(step.dense)
             if self.progress:
-                self.progress(self.origin.plus(step.s1))
+                self.progress(self.origin.plus(step.s1), self)
             if arrival:
                 return arrival
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
+
+    def cut(self) -> Arrival:
+        """The end of the last step, as far as the segment goes where it is broken off."""
+        s = self.knots[-1]
+        return Arrival(s, self.flow.project(np.array([s]), self.states[-1][None, :])[0])
 
     def _refuse_standstill(self, step: Step) -> None:
         """Stop a run that would not come to an end; what it did at a standstill is left out."""
@@ -166,11 +176,16 @@ class SegmentRun:
             self.since = step.s0
         self.short += 1
         if self.short == IN_A_ROW:
-            self._go_back(self.since)
-            raise StepFailure(
+            self._collapse(
+                self.since,
                 f"{IN_A_ROW} steps in a row, which are left out, were shorter than {STANDSTILL:g} of local time "
-                f"{step.s1!r}, the last {length:.3g}"
+                f"{step.s1!r}, the last {length:.3g}",
             )
+
+    def _collapse(self, since: float, how: str) -> NoReturn:
+        """End the run where its steps began to lead nowhere."""
+        self._go_back(since)
+        raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since))!r}: {how}", since)
 
     def _go_back(self, s: float) -> None:
         """Forget what came after the end of a step."""

@@ -15,6 +15,9 @@ _SMOOTH = 1.5  # times the short order
 # p! rtol = 3**p is met at 16, 20, 24 for rtol = 1e-6, 1e-9, 1e-12: so many times the short order
 _LINEAR = 1.6
 _LITTLE = 2.0**-44  # of the time so far: hardly a step
+# Terms beyond this, or below its inverse, are left out of a series whose first ones are of moderate size: with powers
+# of a step they are of that size again, and those have to be doubles, too.
+_MOST, _MODERATE = 1e250, 1e100
 _TIGHTEST = 1e-15  # what a series in doubles can still be asked for
 
 
@@ -58,14 +61,31 @@ class SeriesRun:
         self.watched = np.concatenate([self.guards, self.lean.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
-        """How far the series from (s, x) reach, at most `longest`; coefficients of the states (n, order + 1)."""
-        expand(self.lean.rows, self.high, self.places, self.order, s, x, self.V)
-        h = self._reach(self.watched, longest)
-        if not h > min(_LITTLE * abs(s), longest):  # no monitor stops a run where it has a pole or no value
-            h = self._reach(self.guards, longest)
-        return float(h), self.V[self.states]
+        """How far the series from (s, x) reach, at most `longest`; coefficients of the states (n, order + 1).
 
-    def _reach(self, watched: np.ndarray, longest: float) -> float:
-        V, order = self.V, self.order
+        They have fewer terms where the unit of time is so far from the motion's that doubles do not hold the rest.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):  # of what is left out, or makes the reach NaN
+            expand(self.lean.rows, self.high, self.places, self.order, s, x, self.V)
+        order = self._representable()
+        h = self._reach(self.watched, order, longest)
+        if not h > min(_LITTLE * abs(s), longest):  # no monitor stops a run where it has a pole or no value
+            h = self._reach(self.guards, order, longest)
+        return float(h), self.V[self.states, : order + 1]
+
+    def _representable(self) -> int:
+        """Up to which order the coefficients of the states are within doubles, those that began so."""
+        sizes = np.abs(self.V[self.states])
+        if not len(sizes):
+            return self.order
+        began = sizes[:, :2].max(axis=1)
+        lost = (sizes > _MOST) & (began <= _MODERATE)[:, None]
+        lost |= (sizes > 0.0) & (sizes < 1.0 / _MOST) & (began >= 1.0 / _MODERATE)[:, None]
+        lost[:, : _SMALLEST_ORDER + 1] = False
+        far = np.flatnonzero(lost.any(axis=0))
+        return int(far[0]) - 1 if len(far) else self.order
+
+    def _reach(self, watched: np.ndarray, order: int, longest: float) -> float:
+        V = self.V
         room = np.empty(order + 1), np.empty(len(watched))
         return reach(0, V, self.states, V, watched, order, self.rtol, self.atol, SLACK, longest, *room)

@@ -30,7 +30,11 @@ class StepFailure(Exception):
     """The integrator cannot go on from here; the message says why."""
 
 
-class Creeping(StepFailure):
+class Collapsed(StepFailure):
+    """No step is short enough."""
+
+
+class Creeping(Collapsed):
     """The integrator has led nowhere for many steps: the solution ends at the local time `since`."""
 
     def __init__(self, message: str, since: float) -> None:
@@ -249,6 +253,10 @@ class Leaps(Protocol):
 
 class Method(Protocol):
     """What the mode loop uses of an integrator."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
 
     @property
     def lacks(self) -> Mapping[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from hybridsim.engine.pieces import Occurrence, Pieces, Segment, end_point
 from hybridsim.engine.stepping import Counters
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
+
+if TYPE_CHECKING:
+    from hybridsim.engine.stepping import Method
 
 # Events that a run may look back on where bounces come to an end. What is shown of it must not change what is found.
 LOOKED_BACK_ON = 4096
@@ -34,8 +37,11 @@ class Trajectory:
 
     segments and occurrences are sequences of `Segment` and `Occurrence`: append objects to them, or add the blocks
     (`hybridsim.engine.blocks`) that a compiled loop leaves behind. What is older than is to be kept is let go on the
-    way, so that a run of any length takes no more memory than what it keeps.
+    way, so that a run of any length takes no more memory than what it keeps. taken_over: the stiff method that went on
+    from some time on, and that time.
     """
+
+    taken_over: tuple[str, float] | None = None
 
     def __init__(self, system: System, keep: Keep = ALL) -> None:
         # the last segment is needed in any case: it says where a run ends
@@ -156,6 +162,7 @@ class Task:
     keep: Keep = ALL
     limits: Limits = UNLIMITED
     record: Trajectory | None = None  # what to go on with, from its checkpoint
+    successor: Method | None = None  # a stiff method, which may take over
 
     @cached_property
     def forward(self) -> bool:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import warnings
-from threading import Lock
 from typing import Any
 
-_lock = Lock()
+from hybridsim.forks import SharedLock
+
+_lock = SharedLock()
 
 
 def python_tree(text: str, mode: str = "exec") -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,10 +15,18 @@ from hybridsim.engine.system import System
 from hybridsim.engine.taylor import advance
 from hybridsim.engine.timepair import Instant
 
+if TYPE_CHECKING:
+    from hybridsim.integrators.base import Integrator
+
 _SMALL = 24  # states and guards up to which tables of closed forms are small
 _TIGHT = 1e-10  # rtol below which series of high order cost least
 _STABLE = 3.0  # |h lambda| at which explicit methods of high order are about to lose stability
 _MANY = 1e6  # steps held down by stability alone: a minute where a stiff method takes less than a second
+_DECAYING = 0.25  # share of an eigenvalue that is its decay, so that rodas5p damps it out
+_MANY_IN_PYTHON = 1e4  # the same where no compiled loop takes them
+_APART = (
+    10.0  # times as fast as all that moves beside it is a decay that is over before anything else happens
+)
 
 
 class Choice(NamedTuple):
@@ -31,7 +39,8 @@ class Choice(NamedTuple):
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
     """The closed form where it goes from event to event, a stiff method where stability would rule, an explicit one.
 
-    Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian.
+    Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian; what begins later is met on the
+    way, see `successor_of`.
     """
     if not system.has_tape:
         return _for_functions(system, x0, z0, span)
@@ -44,7 +53,8 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         what = "monitors" if model.monitors else "inputs"
         rest = f" (they are linear, but with {what} exact cannot go from event to event in compiled code)"
     steps = _steps_for_stability(system, x0, z0, span)
-    if steps > _MANY:
+    in_python = is_watched or system.has_corners or span[1] < span[0]
+    if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
         return Choice("dop853", "its modes are not stiff at the start, and jump inside")
@@ -80,16 +90,36 @@ def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[
     return np.maximum(Settling(system, at, z0.copy(), span[1] >= span[0]).run((), ()).z, 0)
 
 
+def successor_of(name: str, system: System) -> Integrator | None:
+    """The method that goes on where one that was chosen meets stiffness on the way; None where it does not look."""
+    from hybridsim.integrators.rodas5p import Rodas5P
+
+    return Rodas5P() if name == "dop853" and system.has_tape else None
+
+
 def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> float:
     """The largest rate -Re(lambda) at which anything decays at the start."""
-    n = system.n
-    if not n:
-        return 0.0
+    return max(0.0, float(-_eigenvalues(system, x, z, t0).real.min(initial=0.0)))
+
+
+def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
+    """Whether decays are far faster than all that they do not belong to, so that they alone hold the steps down."""
+    values = _eigenvalues(system, x, np.maximum(z, 0), t0)
+    sizes = np.abs(values)
+    stiff = values.real < -_DECAYING * sizes
+    fastest = sizes[stiff].max(initial=0.0)
+    others = sizes[~stiff | (sizes < fastest / _APART)].max(initial=0.0)
+    return bool(fastest > _APART * max(others, system.fastest))
+
+
+def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.ndarray:
+    """Those of the Jacobian at the start; none where it is not finite."""
+    none = np.zeros(0, dtype=complex)
+    if not system.n:
+        return none
     p = system.vector(Instant(t0), system.discrete_start)
     jacobian = _jacobian(system, x, p, z) if system.has_tape else system.jacobian(0.0, x, p, z)
-    if not np.isfinite(jacobian).all():
-        return 0.0
-    return max(0.0, float(-np.linalg.eigvals(jacobian).real.min()))
+    return np.linalg.eigvals(jacobian) if np.isfinite(jacobian).all() else none
 
 
 def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:

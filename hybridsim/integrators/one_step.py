@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.rk_step import SMALLEST, next_length
-from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Tolerances
+from hybridsim.engine.rk_step import SMALLEST, next_length, on_the_grid
+from hybridsim.engine.stepping import Collapsed, Dense, Flow, Step, StepFailure, Tolerances
 from hybridsim.engine.trajectory import Pieces
 
 _MOST_PARTS = 64  # of a step that is repeated up to an event
@@ -98,9 +98,9 @@ class OneStepStepper(ABC):
             h = min(self.h, self.tolerances.max_step)
             # what would be left is too short for a step of its own
             last = h >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
-            h = abs(self.bound - start.s) if last else h
-            if not h >= SMALLEST * math.ulp(start.s):
-                raise StepFailure(f"the step fell to {h:.3g}")
+            h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
+            if not h > 0.0:
+                raise Collapsed(f"the step fell to {h:.3g}")
             trial = self._attempt(start, direction * h)
             self.h = next_length(h, trial.error, self.error_order, self._memory)
             if trial.error <= 1.0:

@@ -31,7 +31,11 @@ class StageDense:
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """States (k, n) at local times (k,)."""
-        theta = ((np.asarray(s, dtype=float) - self.s0) / (self.s1 - self.s0))[:, None]
+        return self._at((np.asarray(s, dtype=float) - self.s0) / (self.s1 - self.s0))
+
+    def _at(self, theta: np.ndarray) -> np.ndarray:
+        """States (k, n) at these shares of the step (k,)."""
+        theta = theta[:, None]
         inner = np.zeros((len(theta), len(self.x0)))
         for row in self.K[::-1]:
             inner = inner * theta + row
@@ -39,6 +43,10 @@ class StageDense:
         out = self.x0 + theta * ((self.x1 - self.x0) + (1.0 - theta) * inner)
         out[theta[:, 0] == 1.0] = self.x1
         return out
+
+    def middle(self) -> np.ndarray:
+        """State (n,) at theta = 1/2, which may be between two doubles of time."""
+        return self._at(np.array([0.5]))[0]
 
     def middle_slope(self) -> np.ndarray:
         """Rate of change (n,) at theta = 1/2."""
@@ -110,7 +118,7 @@ class RosenbrockStepper(OneStepStepper):
         """
         flow, tableau = self.flow, self.tableau
         dense = self._dense(start, end, trial)
-        x = dense(np.array([0.5 * (start.s + end.s)]))[0]
+        x = dense.middle()
         flow.counters.rhs_evaluations += 1
         missed = flow.rhs(0.5 * (start.s + end.s), x) - dense.middle_slope()
         matrix, pivots, _ = self._room

@@ -11,14 +11,15 @@ import numpy as np
 from hybridsim.engine.faint_terms import KINDS, PIECES, power_of, register_of, where_it_ends
 from hybridsim.engine.leaper import TaylorLeaper, compile_leaps
 from hybridsim.engine.mode_code import computed_rates, fading
+from hybridsim.engine.rk_step import on_the_grid
 from hybridsim.engine.series import SeriesRun
-from hybridsim.engine.stepping import Creeping, Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import Collapsed, Creeping, Dense, Flow, Step, Stepper, Tolerances, Watch
 from hybridsim.engine.steps_ahead import BETWEEN
 from hybridsim.engine.system import System
 from hybridsim.engine.taylor import polynomials
 from hybridsim.integrators.base import NEEDS_TAPE, Integrator
 
-_SMALLEST = 10.0  # a step of fewer ulps of the local time makes no progress
+_SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
 _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
 _DEFECT = (
     100.0  # of a step, in units of the tolerance: in the slope the last term of order p is p times as large
@@ -61,15 +62,16 @@ class TaylorStepper:
         self.longest = math.inf
         self.flow.counters.rhs_evaluations += 1
         h, coefficients = self.series.expand(self.s, self.x, longest)
+        order = coefficients.shape[1] - 1
         for number in self.fading:
             u = power_of(number) * self.series.V[register_of(number)]
-            end = where_it_ends(u, number % KINDS, self.series.order, direction * h, *self.pieces, 0)
+            end = where_it_ends(u, number % KINDS, order, direction * h, *self.pieces, 0)
             h = min(h, abs(end))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
             last = h >= left - smallest  # what would be left is too short for a step of its own
-            h = left if last else h
+            h = left if last else h if math.isnan(h) else abs(on_the_grid(self.s, direction * h))
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
             if math.isnan(h) or (
                 self._holds_between(coefficients, direction * h)
@@ -86,12 +88,12 @@ class TaylorStepper:
             self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
             raise Creeping(
-                f"{_CREEPING} steps in a row were a hundredth of what their series reach, the last {h:.3g}, and "
-                f"those since local time {self.since!r} are left out",
+                f"{_CREEPING} steps in a row, which are left out, were a hundredth of what their series reach, "
+                f"the last {h:.3g}",
                 self.since,
             )
-        if not h >= _SMALLEST * math.ulp(self.s):
-            raise StepFailure(f"the step fell to {h:.3g}")
+        if not h > 0.0:
+            raise Collapsed(f"the step fell to {h:.3g}")
         s0, x0 = self.s, self.x
         self.s = self.bound if last else s0 + direction * h
         self.x = self.flow.landed(self.s, x1)

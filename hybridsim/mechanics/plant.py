@@ -173,9 +173,9 @@ def _inverse(system: MechanicalSystem) -> Any:
     ends = np.concatenate([[0], np.cumsum(np.bincount(label))])
     parts = []
     for a, b in pairwise(ends):
-        parts.append(np.linalg.inv(M[order[a:b]][:, order[a:b]].toarray()))
+        parts.append(sparse.csr_array(np.linalg.inv(M[order[a:b]][:, order[a:b]].toarray())))
     back = np.argsort(order)
-    return sparse.csr_array(sparse.block_diag(parts, format="csr"))[back][:, back]
+    return sparse.block_diag(parts, format="csr")[back][:, back]
 
 
 def integers(values: Any) -> np.ndarray:

@@ -92,6 +92,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
         "hidden": len(occurrences) - len(trajectory.occurrences),
         "status": trajectory.status,
         "message": trajectory.message,
+        "taken_over": trajectory.taken_over,
         "warnings": trajectory.warnings,
         "warnings_there": trajectory.warnings_there,
         "counters": asdict(counters),
@@ -212,6 +213,8 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
     trajectory.occurrences.blocks = [shown] if shown else []
     trajectory.counters = Counters(**header["counters"])
     trajectory.status, trajectory.message = header["status"], header["message"]
+    taken_over = header.get("taken_over")
+    trajectory.taken_over = taken_over and (str(taken_over[0]), float(taken_over[1]))
     trajectory.warnings, trajectory.warnings_there = header["warnings"], header["warnings_there"]
     if "checkpoint" in header:
         trajectory.checkpoint = _checkpoint(header["checkpoint"], arrays)
@@ -223,6 +226,7 @@ def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
     from hybridsim.engine.recent import system_of
     from hybridsim.engine.stepping import Tolerances
     from hybridsim.engine.trajectory import Task
+    from hybridsim.integrators.automatic import successor_of
     from hybridsim.integrators.registry import make_integrator
     from hybridsim.model import Model
     from hybridsim.solution.run import Run
@@ -231,7 +235,8 @@ def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
     system = system_of(model)
     tolerances = Tolerances(atol=arrays["atol"], **header["tolerances"])
     (t0, t1), keep = header["span"], Keep(*header["keep"])
-    task = Task(t0, t1, arrays["x0"], arrays["z0"], tolerances, arrays["discrete"], keep)
+    successor = successor_of(header["method"]["name"], system) if header["reason"] else None
+    task = Task(t0, t1, arrays["x0"], arrays["z0"], tolerances, arrays["discrete"], keep, successor=successor)
     method = make_integrator(header["method"]["name"], header["method"]["options"])
     return Run(model, system, method, task, arrays.get("grid"), header["save"], header["reason"])
 

@@ -391,6 +391,11 @@ class Solution(InTables):
         """One sentence about how the run ended."""
         why = f", chosen because {self._reason}" if self._reason else ""
         how = " backward in time" if self.t_end < self.t_start else ""
+        if taken_over := self._trajectory.taken_over:
+            why += (
+                f"; from t = {taken_over[1]:.9g} on with {taken_over[0]}, since stability and not accuracy kept its "
+                "steps short"
+            )
         return self._trajectory.message or f"reached t = {self.t_end!r}{how} with {self.integrator}{why}"
 
     @property

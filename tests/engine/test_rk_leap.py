@@ -198,44 +198,15 @@ def test_dips_within_one_step(method: str) -> None:
 def test_a_segment_of_more_steps_than_there_is_room_for(
     integrator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is given more, by a loop that commits the same steps in blocks of its own."""
+    """The loop commits it in pieces, each in a block of its own, and goes on with the length of step it had."""
     model = hs.Model(
         "spring", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")], parameters={}
     )
     whole = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
     monkeypatch.setattr(leaper, "_ROOM", 0)
-    monkeypatch.setattr(leaper, "_FEWEST", 4)
     cramped = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
-    assert cramped.stats["steps"] == whole.stats["steps"] > 4
-    assert cramped(200.0).tolist() == whole(200.0).tolist()
-    assert [type(b).__name__ for b in cramped._trajectory.segments.blocks] in (
-        ["SeriesBlock"],
-        ["HermiteBlock"],
-    )
-
-
-def test_a_segment_too_long_for_any_room_is_left_to_the_general_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Again and again, and the room does not grow for it."""
-
-    def spring() -> hs.Model:
-        return hs.Model(
-            "spring",
-            states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")],
-            schedules=[hs.Schedule("tick", period=50.0)],
-        )
-
-    whole = hs.simulate(spring(), (0, 200), integrator="dop853", rtol=1e-12)
-    monkeypatch.setattr(leaper, "_ROOM", 0)
-    monkeypatch.setattr(leaper, "_FEWEST", 4)
-    monkeypatch.setattr(leaper, "_LONGEST", 0)
-    made = []
-    renew = leaper.Leaper._renew
-
-    def noted(self: leaper.Leaper) -> None:
-        renew(self)
-        made.append(self)
-
-    monkeypatch.setattr(leaper.Leaper, "_renew", noted)
-    cramped = hs.simulate(spring(), (0, 200), integrator="dop853", rtol=1e-12)
-    assert {one.steps for one in made} == {4}
+    assert cramped.stats["steps"] == pytest.approx(whole.stats["steps"], rel=0.02)
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)
+    kinds = {type(b).__name__ for b in cramped._trajectory.segments.blocks}
+    assert kinds in ({"SeriesBlock"}, {"HermiteBlock"})
+    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // leaper.LEAST

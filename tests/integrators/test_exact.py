@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -189,3 +190,28 @@ def test_what_goes_by_series_stays_at_rounding() -> None:
     )
     sol = hs.simulate(model, (0, 25_000), integrator="exact")
     assert sol.y[0, -1] == pytest.approx(math.cos(25_000), abs=2e-10)
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_a_decision_does_not_hang_on_the_last_bits_of_a_basis(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A body creeps to rest: its velocity fades below what rounding of the basis makes of a part that stays.
+
+    An eigenvector is known to rounding of its largest entry. Whatever that makes of the velocity, it stops.
+    """
+    from hybridsim.engine import linear_tables
+
+    made = linear_tables.modals
+
+    def otherwise_rounded(*given: Any, **named: Any) -> Any:
+        flows, noise = made(*given, **named), np.random.default_rng(seed)
+        basis = flows.full_basis
+        entries = 2.0**-53 * np.abs(basis).max(axis=1, keepdims=True) * noise.integers(-2, 3, basis.shape)
+        return flows._replace(full_basis=basis + entries)
+
+    monkeypatch.setattr(linear_tables, "modals", otherwise_rounded)
+    # a value of its own, for which no tables are kept
+    sol = hs.simulate("pid-servo", (0, 40), params={"ki": 200 + seed / 1024}, integrator="exact")
+    assert sol.status == "finished" and sol.events[-1].target == "stick"
+    assert sol(40.0)[1] == 0.0

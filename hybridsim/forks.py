@@ -1,0 +1,58 @@
+"""What a child that is forked beside running threads needs: locks that are free, whoever held them before."""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cached_property
+from threading import Lock, RLock
+from types import TracebackType
+from typing import Any
+from weakref import WeakSet
+
+
+class SharedLock:
+    """A lock for short pieces of work that leave nothing half done; a forked child finds it free."""
+
+    __slots__ = ("__weakref__", "_lock")
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        _locks.add(self)
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._lock.release()
+
+    def renew(self) -> None:
+        """Be free, whoever holds it."""
+        self._lock = Lock()
+
+
+_locks: WeakSet[SharedLock] = WeakSet()
+
+
+def _renew_all() -> None:
+    """Free all locks in a child that has just been forked."""
+    for lock in list(_locks):
+        lock.renew()
+    if sys.version_info < (3, 12):  # until then a cached property of a class has a lock for all its instances
+        for name, module in list(sys.modules.items()):
+            if name.partition(".")[0] == "hybridsim":
+                _renew_properties(module)
+
+
+def _renew_properties(module: Any) -> None:
+    for kind in list(vars(module).values()):
+        if isinstance(kind, type):
+            for part in list(vars(kind).values()):
+                if isinstance(part, cached_property):
+                    part.lock = RLock()  # type: ignore[attr-defined]  # of Python 3.11
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew_all)
