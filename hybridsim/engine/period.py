@@ -46,7 +46,7 @@ def forcing_periods(system: System) -> list[float] | None:
     values = system.values
     periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
     for declared in system.model.inputs:
-        if declared.kind != "wave" or declared.period is None:
+        if declared.period is None:
             return None
         periods.append(evaluate(declared.period, values))
     return periods

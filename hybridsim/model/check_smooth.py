@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from typing import NamedTuple
 
 from hybridsim.expr import Expression
+from hybridsim.expr.grammar import TIME
 from hybridsim.model.declared import Declared
-from hybridsim.model.nonsmooth import has_word
+from hybridsim.model.nonsmooth import has_word, sides_of
+from hybridsim.model.one_sided import names_of
 from hybridsim.model.scope import Scope
 
 
@@ -27,7 +30,26 @@ def need_smooth(scope: Scope, part: Declared, what: str, expr: Expression, remed
     if switched:
         message = f"{what} depends on '{switched[0]}', which depends on a mode"
         scope.fail(part, message, remedies.switched)
-    elif any(map(has_word, [expr, *(e for n, e in scope.model.definitions if n in reached)])):
+    elif any(_is_rough(scope, e) for e in (expr, *(e for n, e in scope.model.definitions if n in reached))):
         scope.fail(part, f"{what} '{expr.text}' is not smooth", remedies.not_smooth)
     elif not any(scope.kinds.get(name) == "state" for name in reached):
         scope.fail(part, f"{what} '{expr.text}' contains no state", remedies.no_state)
+
+
+def _is_rough(scope: Scope, expr: Expression) -> bool:
+    """Whether an expression has a corner or a jump, but for conditions on time alone, which are signals."""
+    if not has_word(expr):
+        return False
+    known = scope.model.constant_names() | {TIME}
+    for part in ast.walk(expr.tree):
+        if isinstance(part, ast.IfExp):
+            decides: ast.expr = part.test
+        elif isinstance(part, ast.Call) and sides_of(part):
+            decides = ast.Tuple(part.args)
+        elif isinstance(part, ast.Call) and ast.unparse(part.func) in ("min", "max"):
+            return True
+        else:
+            continue
+        if not names_of(decides) <= known:
+            return True
+    return False

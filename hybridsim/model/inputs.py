@@ -90,6 +90,11 @@ class Input(Declared):
         self._numbers("times", "values")
 
     @property
+    def subject(self) -> str:
+        """What messages call it."""
+        return f"input {self.name}"
+
+    @property
     def expressions(self) -> dict[str, Expression]:
         """Its expressions of parameters by field name."""
         fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")

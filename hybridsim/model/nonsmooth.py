@@ -82,6 +82,8 @@ def _expressions(model: Model) -> Iterator[Expression]:
         yield from contact.arguments.values()
     for surface in model.surfaces:
         yield from (surface.expr, *surface.above.values(), *surface.below.values())
+    for impact in model.impacts:
+        yield from (impact.gap, impact.restitution)
     for component in model.components:
         for mode in component.modes:
             yield from (*mode.der.values(), *mode.set.values(), *(guard.expr for guard in mode.guards))

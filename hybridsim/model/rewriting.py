@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from hybridsim.errors import Place
+from hybridsim.errors import ModelError, Place
 from hybridsim.expr import parse
 from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 _EITHER = parse("p*a + (1 - p)*b").tree
+IN_VELOCITY = "it is part of a relative velocity"
 WATCHED = "a guard, a monitor or another corner hangs on it"
 VARIABLE = "__corner_"  # names of a model do not begin with two underscores
 
@@ -108,6 +109,7 @@ class Rewriting:
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}
         self.jumps: dict[Family, Jump] = {}
+        self.faults: list[ModelError] = []
         self.steps: dict[
             Family, tuple[TimeStep, int]
         ] = {}  # with the sign of what is above zero in its family
@@ -255,6 +257,8 @@ class Rewriting:
             return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
         if self._is_step(family, argument, here, agrees) and (step := self._step(family, argument)):
             return self._stepped(node, step, parts, family, sign, here)
+        if here.untouched == IN_VELOCITY and here.where and (not agrees or self.borders.is_timed(argument)):
+            self.faults.append(self._fault_in_velocity(node, argument, here))
         if here.untouched:
             return self._kept(node, here.untouched if agrees else f"{JUMPS}: {here.untouched}", here)
         if any(
@@ -295,6 +299,22 @@ class Rewriting:
             found = self.corners[family] = Found(self._title(node), self.walk(argument, here), sign)
         self.note(node, COMPONENT, found.name, here)
         return self._variable(found.values, pair if sign == found.sign else pair[::-1])
+
+    def _fault_in_velocity(self, node: ast.expr, argument: ast.expr, here: Here) -> ModelError:
+        """What jumps and cannot be part of what a contact, a gap or a surface holds at zero."""
+        border = write(argument)
+        if self.borders.is_timed(argument):
+            remedy = f"the zeros of {border} are not known beforehand: give it as an input, whose knots are"
+        else:
+            remedy = (
+                f"hold it in a discrete state that a monitor of '{border}' resets, or a transition where that "
+                "changes its sign"
+            )
+        return ModelError(
+            f"'{write(node)}' jumps in {here.where}, which a mode holds at zero",
+            place=here.place,
+            remedy=remedy,
+        )
 
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here

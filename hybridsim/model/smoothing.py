@@ -20,14 +20,13 @@ from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.jumps import not_linear
 from hybridsim.model.meanings import Family
 from hybridsim.model.nonsmooth import MODE, Primitive, sides_of, uses_primitives
-from hybridsim.model.rewriting import WATCHED, Found, Here, Rewriting
+from hybridsim.model.rewriting import IN_VELOCITY, WATCHED, Found, Here, Rewriting
 
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 # Each event judges all components again, and compiled loops keep tables of the combinations of modes that they meet.
 MOST = 8
-IN_VELOCITY = "it is part of a relative velocity"
 IN_MODE = "it stands in a mode of a component"
 
 
@@ -54,7 +53,13 @@ def _smoothed(model: Model) -> Model | None:
 
 
 def smoothing_of(model: Model) -> Smoothed:
-    """The same with an account of every primitive that is not smooth, fractional powers included."""
+    """The same with an account of every primitive that is not smooth, fractional powers included.
+
+    Raises
+    ------
+    ModelError
+        For what jumps in a velocity, a gap or a switching function and is no signal.
+    """
     if model.flow is not None:
         return Smoothed(model, ())
     refused: dict[Family, str] = {}
@@ -63,6 +68,8 @@ def smoothing_of(model: Model) -> Smoothed:
     while True:
         work = Rewriting(model, "", refused, shared, timed)
         result, crooked = _Smoothing(model, work).run()
+        if work.faults:
+            raise work.faults[0]
         both = (work.corners.keys() & work.jumps.keys()) - shared
         in_time = (work.steps.keys() & {*work.jumps, *work.corners}) - timed
         if len(work.corners) + len(work.jumps) > MOST:  # a signal does not count among them

@@ -10,7 +10,7 @@ import ast
 from collections.abc import Set
 from dataclasses import dataclass
 
-from hybridsim.expr import Expression, of_tree, parse
+from hybridsim.expr import Expression, of_tree, parse, substitute
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import difference
 from hybridsim.expr.rebuild import exchanged, with_names
@@ -27,8 +27,8 @@ class TimeStep(Input):
 
     Parameters
     ----------
-    shift, rate, amplitude, phase : Expression
-        Expressions of parameters; the last two for the sine only.
+    shift, rate, amplitude, phase, period : Expression
+        Expressions of parameters; the last three for the sine only.
     title : str
         What is above zero, as it was written.
     """
@@ -38,9 +38,14 @@ class TimeStep(Input):
     title: str = ""
 
     @property
+    def subject(self) -> str:
+        """What messages call it."""
+        return f"the condition on '{self.title}'"
+
+    @property
     def expressions(self) -> dict[str, Expression]:
         """Its expressions of parameters by field name."""
-        fields = ("shift", "rate", "amplitude", "phase")
+        fields = ("shift", "rate", "amplitude", "phase", "period")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 
 
@@ -63,8 +68,16 @@ def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> 
                     begin = ast.BinOp(begin, ast.Add(), parse("pi/2").tree)
                 shift, amplitude = map(of_tree, whole)
                 phase, rate = map(of_tree, (begin, turning[1]))
+                period = substitute(parse("2*pi/abs(rate)"), {"rate": rate})
                 return TimeStep(
-                    name, "step", shift=shift, amplitude=amplitude, phase=phase, rate=rate, title=title
+                    name,
+                    "step",
+                    shift=shift,
+                    amplitude=amplitude,
+                    phase=phase,
+                    rate=rate,
+                    title=title,
+                    period=period,
                 )
     return None
 

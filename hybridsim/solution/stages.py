@@ -236,10 +236,11 @@ def _said_of(system: System, names: list[str], instant: Instant, at: Situation, 
             system.address("quantities"), np.zeros(1), np.ascontiguousarray(at.x[None]), p, at.z, out
         )
         values.append(out[0])
+    shown = {i.name: i.subject.removeprefix("input ") for i in system.model.inputs}
     jumps = [
-        f"{name} jumps from {values[0][k]:.6g} to {values[1][k]:.6g}"
+        f"{shown[name]} jumps from {values[0][k]:.6g} to {values[1][k]:.6g}"
         for name in names
         if name in known and values[0][k := known.index(name)] != values[1][k]
     ]
-    said = f"an input has a knot here (of {', '.join(names)})"
+    said = f"an input has a knot here (of {', '.join(shown[name] for name in names)})"
     return said + (f", where {' and '.join(jumps)}" if jumps else "")

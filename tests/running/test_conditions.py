@@ -153,3 +153,59 @@ def test_a_condition_without_an_end_has_no_meaning() -> None:
     built = model(("v", 0.0, "-f"), contacts=[contact], parameters={"a": 0.0})
     with pytest.raises(hs.HybridsimError, match=r"'a\*t' is zero at all times"):
         hs.simulate(built, (0.0, 1.0))
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_floor_that_is_taken_away(integrator: str) -> None:
+    """From t = 1 on it is one lower: the ball falls for sqrt(2/10), and a third of its way at t = 1.25."""
+    gap = "h + (1 if t > at else 0)"
+    built = model(
+        ("h", 0.0, "w"),
+        ("w", 0.0, "-10 + N"),
+        impacts=[hs.Impact("N", gap, restitution=0)],
+        parameters={"at": 1.0},
+    )
+    sol = hs.simulate(built, (0.0, 3.0), integrator=integrator)
+    assert sol.success and not sol.warnings
+    assert [e.t for e in sol.events] == pytest.approx([1.0, 1 + math.sqrt(0.2)], abs=1e-9)
+    assert sol(1.25) == pytest.approx([-0.3125, -2.5], abs=1e-9)
+    assert sol(3.0) == pytest.approx([-1.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_switching_function_that_jumps(integrator: str) -> None:
+    """The relay leads to 0, and from t = 1 on to 1, which is reached at t = 2."""
+    surface = hs.SwitchingSurface("u", "x - (1 if t > 1 else 0)")
+    sol = hs.simulate(model(("x", 0.0, "-u"), surfaces=[surface]), (0.0, 3.0), integrator=integrator)
+    assert [sol(t)[0] for t in (0.9, 1.5, 3.0)] == pytest.approx([0.0, 0.5, 1.0], abs=1e-9)
+
+
+def test_what_jumps_with_a_state_in_a_velocity_is_refused_and_the_remedy_works() -> None:
+    """A block that is handed over from one belt to a slower one slips down to the speed of that."""
+    contact = hs.Contact("f", "v - (1 if x < 2 else 0.2)", 10, "coulomb", {"mu": 0.1})
+    states = (("x", 0.0, "v"), ("v", 1.0, "-f"))
+    with pytest.raises(hs.HybridsimError, match=r"'1 if x < 2 else 0\.2' jumps in guard velocity") as refused:
+        hs.simulate(model(*states, contacts=[contact]), (0.0, 4.0))
+    assert "a discrete state that a monitor of 'x - 2' resets" in refused.value.remedy
+    over = hs.Monitor("over", "x - 2", direction="up", action="reset", reset={"belt": 0.2})
+    held = hs.Contact("f", "v - belt", 10, "coulomb", {"mu": 0.1})
+    built = model(*states, contacts=[held], discrete=[hs.Discrete("belt", 1)], monitors=[over])
+    sol = hs.simulate(built, (0.0, 4.0))
+    assert sol(4.0) == pytest.approx([2 + 0.8 * 0.6 + 1.2 * 0.2, 0.2], abs=1e-9)
+
+
+def test_a_periodic_condition_has_a_period() -> None:
+    contact = hs.Contact("f", "v", "1 if sin(w*t) > 0 else 2", "coulomb", {"mu": 0.1})
+    built = model(
+        ("x", 0.0, "v"), ("v", 0.0, "-x - 0.2*v - f + sin(w*t)"), contacts=[contact], parameters={"w": 2.0}
+    )
+    assert hs.steady_state(built).period == pytest.approx(math.pi, rel=1e-12)
+
+
+def test_a_condition_is_told_of_by_what_it_says() -> None:
+    contact = hs.Contact("f", "v - (1 if t > at else 0)", 1, "coulomb", {"mu": 0.5})
+    built = model(("v", 0.0, "-f"), contacts=[contact], parameters={"at": 1})
+    sol = hs.simulate(built, (0.0, 5.0), integrator="taylor")
+    assert "the condition on 't - at' jumps from 0 to 1" in str(sol.explain(0))
+    with pytest.raises(UsageError, match="the condition on 't - at' depends on at"):
+        hs.sensitivities(sol, ["at"])

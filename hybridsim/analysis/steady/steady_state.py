@@ -395,9 +395,9 @@ def _refuse_what_ends(system: System, is_period_given: bool) -> None:
             remedy="write it with a guard and a reset, or run it until it has settled",
         )
     for declared in model.inputs:
-        if declared.kind != "wave":
+        if declared.period is None:
             raise UsageError(
-                f"model {model.name} is driven by {declared.name}, a {declared.kind}: there is no steady state",
+                f"model {model.name} is driven by {declared.subject}, a {declared.kind}: there is no steady state",
                 remedy="give a periodic input",
             )
     for clock in model.schedules:

@@ -163,8 +163,10 @@ class Carrier:
             used = sorted(moving & {n for e in declared.expressions.values() for n in e.names})
             if used:
                 raise UsageError(
-                    f"input {declared.name} depends on {used[0]}, and its derivative by that is not known",
-                    remedy=f"leave {used[0]} out, or write the input as an expression of t",
+                    f"{declared.subject} depends on {used[0]}, and its derivative by that is not known",
+                    remedy=f"leave {used[0]} out, or write the input as an expression of t"
+                    if declared.kind != "step"
+                    else f"leave {used[0]} out, or let a schedule at that time reset a discrete state",
                 )
 
     # -- between events -------------------------------------------------------------------------------------
