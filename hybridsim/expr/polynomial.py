@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 
@@ -17,6 +18,7 @@ Polynomial = Mapping[Monomial, Fraction]
 
 _MOST_TERMS = 200  # a longer sum counts as a thing of its own
 _HIGHEST = 8  # so does a higher power
+_DIVISOR = re.compile(r"1/\(1\*([A-Za-z_]\w*)\^1\)")
 _COMPARE = {
     ast.Lt: lambda d: d < 0,
     ast.LtE: lambda d: d <= 0,
@@ -74,6 +76,48 @@ def constant_of(p: Polynomial) -> Fraction | None:
 def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
     """A polynomial times a number."""
     return {m: c * factor for m, c in p.items()} if factor else {}
+
+
+def is_multiple(p: Polynomial, of: Polynomial) -> bool:
+    """Whether a polynomial is another one times a polynomial, by division; denominators that are names are cleared."""
+    rest, divisor = _cleared(p), _cleared(of)
+    if not divisor:
+        return False
+    names = sorted({factor for monomial in (*rest, *divisor) for factor, _ in monomial})
+
+    def powers(monomial: Monomial) -> tuple[int, ...]:
+        return tuple(dict(monomial).get(name, 0) for name in names)
+
+    lead = max(divisor, key=powers)
+    for _ in range(_MOST_TERMS):
+        if not rest:
+            return True
+        first = max(rest, key=powers)
+        left = [a - b for a, b in zip(powers(first), powers(lead), strict=True)]
+        if min(left, default=0) < 0:
+            return False
+        quotient = tuple((name, power) for name, power in zip(names, left, strict=True) if power)
+        factor = {quotient: rest[first] / divisor[lead]}
+        rest = _sum(rest, scaled(_product(factor, divisor, ast.Constant(0)), Fraction(-1)))
+    return False
+
+
+def _cleared(p: Polynomial) -> Polynomial:
+    """A polynomial times those names that it is divided by."""
+    divisors = {factor for monomial in p for factor, _ in monomial if _DIVISOR.fullmatch(factor)}
+    for divisor in divisors:
+        name = _DIVISOR.fullmatch(divisor)
+        assert name is not None  # as it was found by that
+        highest = max(dict(monomial).get(divisor, 0) for monomial in p)
+        made: dict[Monomial, Fraction] = {}
+        for monomial, coefficient in p.items():
+            powers = dict(monomial)
+            left = highest - powers.pop(divisor, 0)
+            powers[name[1]] = powers.get(name[1], 0) + left
+            key = tuple(sorted((factor, power) for factor, power in powers.items() if power))
+            made[key] = made.get(key, Fraction(0)) + coefficient
+        p = {monomial: coefficient for monomial, coefficient in made.items() if coefficient}
+    return p
 
 
 def direction(p: Polynomial) -> tuple[frozenset[tuple[Monomial, Fraction]], int]:

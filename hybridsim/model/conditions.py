@@ -74,6 +74,18 @@ class _Conditions:
     def _compared(self, apart: ast.expr, op: ast.cmpop, yes: ast.expr, no: ast.expr) -> ast.expr | None:
         """The choice by a comparison of an expression with zero that is not smooth; None where it is smooth."""
         tree = self.meanings.written_out(apart)
+        match tree:
+            case ast.BinOp(
+                left=ast.BinOp(left=first, op=ast.Mult() | ast.Div(), right=second),
+                right=ast.Constant(value=0 | 0.0),
+            ) if self.meanings.moves(first) and self.meanings.moves(
+                second
+            ):  # of one sign, or of different ones
+                zero = ast.Constant(0)
+                other = ast.Compare(zero, [op], [second])
+                one = ast.Compare(second, [op], [zero])
+                test = ast.Compare(first, [ast.Gt()], [zero])
+                return self.chosen(test, self.chosen(one, yes, no), self.chosen(other, yes, no))
         node, parts = self._rough(tree)
         if node is None:
             return None

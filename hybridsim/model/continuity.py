@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Set
 
-from hybridsim.expr.polynomial import Polynomial, difference, number_tree
+from hybridsim.expr.polynomial import Polynomial, difference, is_multiple, number_tree, polynomial
 from hybridsim.expr.rebuild import exchanged, with_names
-from hybridsim.model.meanings import Meanings
+from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.nonsmooth import Sides, is_whole
+
+_POWER_OF_ZERO = re.compile(r"\(0\)\*\*\((?!-)")
 
 
 def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: ast.expr) -> bool:
-    """Whether body = orelse wherever border = 0: they agree if their difference is the polynomial 0 there."""
-    branches = [meanings.written_out(node) for node in (body, orelse)]
-    for part in _solved(meanings.written_out(border)):
-        if not difference(*(with_names(branch, part) for branch in branches)):
+    """Whether body = orelse wherever border = 0, as far as polynomials show.
+
+    They agree if their difference is zero where one name of the border is expressed by the others, or a multiple of the
+    border. A power of zero whose exponent is a parameter counts as zero.
+    """
+    first, second = (meanings.written_out(node) for node in (body, orelse))
+    written = meanings.written_out(border)
+    for part in _solved(written):
+        apart = difference(*(with_names(branch, part) for branch in (first, second)))
+        if all(any(map(_POWER_OF_ZERO.match, dict(monomial))) for monomial in apart):
             return True
-    return False
+    return is_multiple(difference(first, second), polynomial(written))
 
 
 def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
@@ -34,15 +43,49 @@ def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
         yield {name: ast.BinOp(rest, ast.Div(), number_tree(-coefficient))}
 
 
-def sides_of_product(meanings: Meanings, node: ast.expr) -> Sides | None:
-    """The sides of a product with a sign in it that vanishes where the sign changes, as sign(v)*v**2 does."""
+def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = frozenset()) -> Sides | None:
+    """The sides of a product with a sign in it that vanishes where the sign changes, as sign(v)*v**2 does.
+
+    left: borders of signs that are not looked at.
+    """
+    for part, u in _signs_in(meanings, node):
+        if meanings.family(u)[0] not in left:
+            above, below = (exchanged(node, part, ast.Constant(value)) for value in (1, -1))
+            if is_continuous(meanings, u, above, below):
+                return u, above, below, above
+    return None
+
+
+def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
+    """Borders of signs in a product that is continuous there, with a root or power that is zero there as well.
+
+    Such as sign(d)*sqrt(abs(d)), which has no series at d = 0 on either side.
+    """
+    found = set()
+    bases = _bases_in(meanings, node)
+    for part, u in _signs_in(meanings, node) if bases else ():
+        above, below = (exchanged(node, part, ast.Constant(value)) for value in (1, -1))
+        if is_continuous(meanings, u, above, below) and any(
+            is_continuous(meanings, u, base, ast.Constant(0)) for base in bases
+        ):
+            found.add(meanings.family(u)[0])
+    return frozenset(found)
+
+
+def _signs_in(meanings: Meanings, node: ast.expr) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """The signs of what moves in a tree, each with what it is the sign of."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id="sign"), args=[u]) if meanings.moves(u):
-                above, below = (exchanged(node, part, ast.Constant(value)) for value in (1, -1))
-                if is_continuous(meanings, u, above, below):
-                    return u, above, below, above
-    return None
+                yield part, u
+
+
+def _bases_in(meanings: Meanings, node: ast.expr) -> list[ast.expr]:
+    """What the roots and the powers that are not whole are of."""
+    parts = list(ast.walk(meanings.written_out(node)))
+    bases = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sqrt"]
+    powers = [p for p in parts if isinstance(p, ast.BinOp) and isinstance(p.op, ast.Pow)]
+    return bases + [power.left for power in powers if not is_whole(power.right, meanings)]
 
 
 def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
@@ -51,9 +94,7 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
     borders = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sign"]
     if not borders:
         return False
-    bases = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sqrt"]
-    powers = [p for p in parts if isinstance(p, ast.BinOp) and isinstance(p.op, ast.Pow)]
-    bases += [power.left for power in powers if not is_whole(power.right, meanings)]
+    bases = _bases_in(meanings, node)
     return any(is_continuous(meanings, u, base, ast.Constant(0)) for u in borders for base in bases)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import Polynomial, constant_of, direction, polynomial
-from hybridsim.expr.rebuild import with_names
+from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.model.one_sided import names_of
 
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ class Meanings:
     """Reads one model."""
 
     def __init__(self, model: Model) -> None:
-        self.definitions = {name: expr.tree for name, expr in model.definitions}
+        trees = {name: expr.tree for name, expr in model.definitions}
         components = model.all_components()
         self.unknowns = {c.surface.unknown for c in components if c.surface}
-        behind = {name: [tree] for name, tree in self.definitions.items()}
+        behind = {name: [tree] for name, tree in trees.items()}
         for component in components:
             for mode in component.modes:
                 for name, expr in mode.set.items():
@@ -35,6 +35,21 @@ class Meanings:
         given = {TIME, *(state.name for state in model.states), *(signal.name for signal in model.inputs)}
         self.moving = _reaching(behind, given | self.unknowns)
         self.forced = _reaching(behind, self.unknowns)
+        self.definitions = {name: self.with_single_signs(tree) for name, tree in trees.items()}
+
+    def with_single_signs(self, node: ast.expr) -> ast.expr:
+        """A tree in which the sign of a product of what moves is the product of the signs; the same where none is."""
+        if not any(isinstance(part, ast.Name) and part.id == "sign" for part in ast.walk(node)):
+            return node
+        match rebuilt(node, self.with_single_signs):
+            case ast.Call(
+                func=ast.Name(id="sign") as sign,
+                args=[ast.BinOp(left=left, op=ast.Mult() | ast.Div(), right=right)],
+            ) if self.moves(left) and self.moves(right):
+                parts = [self.with_single_signs(ast.Call(sign, [part], [])) for part in (left, right)]
+                return ast.BinOp(parts[0], ast.Mult(), parts[1])
+            case made:
+                return made
 
     def lookup(self, name: str) -> ast.expr | None:
         """The tree of a definition."""

@@ -13,7 +13,7 @@ from hybridsim.expr import parse
 from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
 from hybridsim.model.conditions import TooManyConditions, single_comparisons
-from hybridsim.model.continuity import has_root_beside_sign, is_continuous, sides_of_product
+from hybridsim.model.continuity import has_root_beside_sign, is_continuous, rooted_in, sides_of_product
 from hybridsim.model.hoisting import jump_inside, resolved
 from hybridsim.model.jumps import SIGN, Borders, Jump, product_of_signs
 from hybridsim.model.meanings import Family, Meanings
@@ -63,6 +63,7 @@ class Here:
     jumps: str = WATCHED
     is_passing: bool = False
     times: str = WATCHED
+    rooted: frozenset[Family] = frozenset()
 
 
 @dataclass
@@ -110,6 +111,7 @@ class Rewriting:
         self.corners: dict[Family, Found] = {}
         self.jumps: dict[Family, Jump] = {}
         self.faults: list[ModelError] = []
+        self._single: dict[int, tuple[ast.expr, ast.expr]] = {}
         self.steps: dict[
             Family, tuple[TimeStep, int]
         ] = {}  # with the sign of what is above zero in its family
@@ -124,6 +126,14 @@ class Rewriting:
         found = self._accounts.items()
         return tuple(Primitive(*key[:1], tuple(where), *key[1:], place) for key, (where, place) in found)
 
+    def single_signs(self, tree: ast.expr) -> ast.expr:
+        """A tree with signs of products taken apart, the same one for the same tree."""
+        if not self._has_sign:
+            return tree
+        if id(tree) not in self._single:
+            self._single[id(tree)] = tree, self.meanings.with_single_signs(tree)
+        return self._single[id(tree)][1]
+
     def walk(self, node: ast.expr, here: Here) -> ast.expr:
         """The tree with what is not smooth replaced; the very same tree where nothing is.
 
@@ -131,7 +141,7 @@ class Rewriting:
         """
         if not self.meanings.moves(node):
             return node
-        key = (id(node), id(here.signs), here.where, here.untouched, here.jumps, here.times)
+        key = (id(node), id(here.signs), here.where, here.untouched, here.jumps, here.times, here.rooted)
         if key not in self._walked:
             self._walked[key] = node, here, self._walk(node, here)  # kept alive, as their numbers are the key
         return self._walked[key][-1]
@@ -161,9 +171,11 @@ class Rewriting:
                 if (of_sign := self._sign_taken_apart(argument, here)) is not None:
                     return of_sign
             case ast.BinOp(op=ast.Mult() | ast.Div()) if self._has_sign:
-                if has_root_beside_sign(self.meanings, node):
+                if rooted := rooted_in(self.meanings, node):
+                    here = replace(here, rooted=here.rooted | rooted)
+                elif has_root_beside_sign(self.meanings, node) and not here.rooted:
                     here = replace(here, jumps=here.jumps or "the root beside it is zero there")
-                elif product := sides_of_product(self.meanings, node):
+                if product := sides_of_product(self.meanings, node, here.rooted):
                     return self._side(node, product, here)
         parts = sides_of(node)
         if parts is not None and self.meanings.moves(parts[0]):
@@ -214,6 +226,7 @@ class Rewriting:
             family
             and not self.never_negative(argument)
             and self._owner(family) is None
+            and family not in here.rooted
             and not self.borders.is_timed(argument)
             and not self._left(family, argument, here)
         )
@@ -255,6 +268,8 @@ class Rewriting:
         agrees = self.agrees(node, parts)
         if family in here.signs and not agrees:
             return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
+        if family in here.rooted and not agrees:
+            return self._kept(node, "it is continuous with the root or the power beside it", here)
         if self._is_step(family, argument, here, agrees) and (step := self._step(family, argument)):
             return self._stepped(node, step, parts, family, sign, here)
         if here.untouched == IN_VELOCITY and here.where and (not agrees or self.borders.is_timed(argument)):

@@ -265,5 +265,5 @@ class _Smoothing:
         return Corner(found.name, tuple(modes), initial="+")
 
     def _rewritten(self, expr: Expression, here: Here) -> Expression:
-        tree = self.work.walk(expr.tree, here)
+        tree = self.work.walk(self.work.single_signs(expr.tree), here)
         return expr if tree is expr.tree else of_tree(tree, expr.place)

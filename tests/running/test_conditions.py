@@ -209,3 +209,65 @@ def test_a_condition_is_told_of_by_what_it_says() -> None:
     assert "the condition on 't - at' jumps from 0 to 1" in str(sol.explain(0))
     with pytest.raises(UsageError, match="the condition on 't - at' depends on at"):
         hs.sensitivities(sol, ["at"])
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853"])
+@pytest.mark.parametrize(
+    "force",
+    [
+        "(k*x if k*x > 0 else -k*x)",
+        "(k*x if not x/k <= 0 else -x*k)",
+        "(k*x - a if k*x > a else 0) + (a if k*x > a else k*x) + (0 if x > 0 else -2*k*x)",
+        "(k*(x - a/k) if x > a/k else 0) + min(k*x, a) - (2*k*x if x < 0 else 0)",
+    ],
+)
+def test_continuous_conditionals_are_corners(integrator: str, force: str) -> None:
+    """x'' = -k |x|: cos(w t) down to zero, then -sinh at the rate of that."""
+    built = model(("x", 1.0, "v"), ("v", 0.0, f"-({force})"), parameters={"k": 4.0, "a": 1.5})
+    sol = hs.simulate(built, (0.0, 1.5), integrator=integrator, rtol=1e-11)
+    assert sol.success and sol.warnings == () and sol.events == ()
+    s = 2 * (1.5 - math.pi / 4)
+    assert sol(1.5) == pytest.approx([-math.sinh(s), -2 * math.cosh(s)], rel=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853"])
+def test_a_corner_whose_border_is_a_function_of_time(integrator: str) -> None:
+    built = model(("x", 0.0, "sin(w*t) if sin(w*t) > 0 else 0"), parameters={"w": 2.0})
+    assert end_of(built, 2 * math.pi, integrator) == [pytest.approx(2.0, abs=1e-9)]
+
+
+@pytest.mark.parametrize("flow", ["sign(h - g)*sqrt(abs(h - g))", "sign(h - g)*abs(h - g)**0.5"])
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5", "rodas5p", "scipy-radau", "cvode-bdf"])
+def test_an_orifice(integrator: str, flow: str) -> None:
+    """d = h - g falls as (1 - 3 t/4)**2: continuous at zero, and no surface."""
+    built = model(("h", 1.0, f"-{flow}"), ("g", 0.0, f"0.5*{flow}"))
+    sol = hs.simulate(built, (0.0, 1.0), integrator=integrator)
+    assert sol.success and sol.warnings == () and sol.events == ()
+    assert sol(1.0)[0] - sol(1.0)[1] == pytest.approx(1 / 16, abs=1e-6)
+    assert jumps_of(built) == ()
+
+
+@pytest.mark.parametrize("n", ["2", "n"])
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-radau", "cvode-bdf"])
+def test_bouc_wen_from_rest(integrator: str, n: str) -> None:
+    """Against 28 digits of independent code; the sign of a product is the product of the signs."""
+    if integrator == "taylor" and n == "n":
+        pytest.skip("a power whose exponent is a parameter has no series at zero")
+    built = model(
+        ("u", 0.0, "v"),
+        ("v", 0.0, "3*sin(5*t) - 0.1*v - 2.5*u - 2.25*z"),
+        ("z", 0.0, f"10*v*(1 - abs(z)**{n}*(0.5 + 0.5*sign(v*z)))"),
+        parameters={"n": 2},
+    )
+    sol = hs.simulate(built, (0.0, 10.0), integrator=integrator, rtol=1e-9)
+    assert sol.success and sol.warnings == ()
+    assert sol(10.0)[2] == pytest.approx(-0.93532027, abs=2e-7)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "rodas5p"])
+def test_a_product_of_signs_beside_a_root_comes_to_rest_on_its_surface(integrator: str) -> None:
+    """From 1 down to 0.2, where both sides lead back: sqrt(x) falls by t/2."""
+    sol = hs.simulate(model(("x", 1.0, "-x**0.5*sign(x - 0.2)*sign(x)")), (0.0, 4.0), integrator=integrator)
+    (event,) = sol.events
+    assert event.t == pytest.approx(2 * (1 - math.sqrt(0.2)), abs=1e-6)
+    assert event.target == "sliding" and sol(4.0)[0] == 0.2

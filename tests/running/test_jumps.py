@@ -158,7 +158,7 @@ def test_a_body_between_two_belts(integrator: str) -> None:
 @pytest.mark.parametrize(
     ("rates", "text", "reason"),
     [
-        (("-sign(x)*sqrt(abs(x))", "0"), "sign(x)", "root beside it"),
+        (("-sign(x)*(1 + sqrt(abs(x)))", "0"), "sign(x)", "root beside it"),
         (("-x", "sign(q)"), "sign(q)", "neither time nor a state"),
         (("-sign(x - u)", "1"), "sign(x - u)", "u, which a mode sets"),
         (("-sign(x) + sign(x + y)/5", "-sign(y)"), "sign(y)", "crossed by others"),
