@@ -112,11 +112,14 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
             f"  {name:<12} {100.0 * share:.4g} % of the period in {found.held_mode(name)}, "
             f"{record['stops_per_period'][name]:g} stops a period{work}"
         )
-    sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
-    lines.append(f"  stable       {'yes' if found.stable else 'no'}")
-    lines.append(
-        f"  multipliers  |{sizes}|" if sizes else "  multipliers  none beside the one along the motion"
-    )
+    if record["multipliers"] is None:
+        lines.append(f"  stable       not known: {record['no_multipliers']}")
+    else:
+        sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
+        lines.append(f"  stable       {'yes' if found.stable else 'no'}")
+        lines.append(
+            f"  multipliers  |{sizes}|" if sizes else "  multipliers  none beside the one along the motion"
+        )
     if found.grazing is not None:
         near = found.grazing
         lines.append(f"  nearest      {near.guard} turns back at {near.relative:.3g} of its largest value")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,3 +22,31 @@ def test_what_varies_too_fast_is_named_beside_the_others(tmp_path: Path, hybrids
     assert "fast: varies too fast, or jumps too often, to be read" in out
     square = next(line.split() for line in out.splitlines() if line.split()[:1] == ["square"])
     assert float(square[3]) == pytest.approx(1.0 / 9.04, rel=1e-5)  # its maximum, in six digits
+
+
+TWINS = """schema = 1
+name = "twins"
+[states]
+x = { start = 0, der = "1 - x" }
+y = { start = 0, der = "1 - y" }
+[components.a]
+initial = "on"
+modes.on.guards.full = { expr = "0.5 - x", then = [{ to = "on", reset = { x = "0" } }] }
+[components.b]
+initial = "on"
+modes.on.guards.full = { expr = "0.5 - y", then = [{ to = "on", reset = { y = "0" } }] }
+"""
+
+
+def test_a_motion_without_multipliers_is_printed_all_the_same(tmp_path: Path, hybridsim: Callable) -> None:
+    """Two events at one instant that part when the start is changed: period log 2, and no derivative."""
+    (tmp_path / "twins.toml").write_text(TWINS)
+    code, out, err = hybridsim("steady", tmp_path / "twins.toml")
+    assert code == 0, err
+    period = next(line.split()[1] for line in out.splitlines() if line.split()[:1] == ["period"])
+    assert float(period) == pytest.approx(math.log(2.0), rel=1e-9)
+    assert "not known: several events" in out
+    code, out, err = hybridsim("steady", tmp_path / "twins.toml", "--json")
+    record = json.loads(out)
+    assert code == 0 and record["multipliers"] is None and record["stable"] is None
+    assert "move apart" in record["no_multipliers"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.analysis.steady.scales import coupled_sizes
+from hybridsim.analysis.steady.scales import coupled_sizes, stands_still
 from hybridsim.engine.recent import system_of
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import SimulationError
@@ -45,6 +45,24 @@ class Point:
         """The same with states and discrete states changed by (n + d,)."""
         n = len(self.x)
         return replace(self, x=self.x + change[:n], discrete=self.discrete + change[n:])
+
+
+class CostsMore(Exception):
+    """A run has cost what a first one may; `reached` is how long it was by then."""
+
+    def __init__(self, reached: float) -> None:
+        super().__init__(reached)
+        self.reached = reached
+
+
+class GrowsWithoutBound(SimulationError):
+    """A run ended because a state had grown beyond all sizes."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"the motion grows without bound: {name} has passed {_WITHOUT_BOUND:g}")
+
+
+_WITHOUT_BOUND = 1e100  # in any unit: squares of it, and of products of a few such, are no numbers
 
 
 class Motion:
@@ -87,6 +105,12 @@ class Motion:
         system = system_of(self.model)
         return coupled_sizes(system, point.x, system.vector(Instant(point.at), point.discrete), point.numbers)
 
+    def stands_still(self, point: Point) -> bool:
+        """Whether all rates at a point are rounding."""
+        system = system_of(self.model)
+        p = system.vector(Instant(point.at), point.discrete)
+        return stands_still(system, point.x, p, point.numbers, self.rtol)
+
     def _tolerances(self, start: Point) -> dict[str, Any]:
         """Absolute tolerances of a run: of a state that happens to be near zero that of the motion's size."""
         if "atol" in self.options or all(state.nominal for state in self.model.states):
@@ -109,14 +133,28 @@ class Motion:
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
         begin = 0.0 if start is None else start.at
-        solution = simulate(
-            self.model, (begin, begin + duration), progress=self.progress, **(given | self.options | options)
-        )
+        with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
+            solution = simulate(
+                self.model,
+                (begin, begin + duration),
+                progress=self.progress,
+                **(given | self.options | options),
+            )
+        if solution.status == "limit" and "limits" in options:
+            raise CostsMore(solution.t_end - begin)
         if solution.status != "finished":
+            self._refuse_growth(solution)
             raise SimulationError(
                 f"the run towards the steady state ended early ({solution.status}): {solution.message}"
             )
         return solution
+
+    def _refuse_growth(self, solution: Solution) -> None:
+        """Say of a run that failed because of its size that it is its size."""
+        last = np.abs(solution._segments[-1].x[-1]) if solution._segments else np.zeros(0)
+        last = np.where(np.isfinite(last), last, np.inf)
+        if last.max(initial=0.0) >= _WITHOUT_BOUND:
+            raise GrowsWithoutBound(self.names[int(np.argmax(last))])
 
 
 def point_at_end(solution: Solution) -> Point:

@@ -12,7 +12,7 @@ from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.shooting import multipliers
 from hybridsim.analysis.variations import sensitivities
-from hybridsim.errors import UsageError
+from hybridsim.errors import HybridsimError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit as Stretch
@@ -131,7 +131,10 @@ class SteadyState(Measures):
         return bool((np.abs(self.multipliers) <= 1.0 + _NEUTRAL).all())
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
-        """All that it says as plain values; harmonics up to that number, with their phases in radians."""
+        """All that it says as plain values; harmonics up to that number, with their phases in radians.
+
+        Where the motion has no multipliers ``multipliers`` and ``stable`` are None, and ``no_multipliers`` says why.
+        """
         record: dict[str, Any] = {
             "model": self.model.name,
             "parameters": self.model.parameter_values(),
@@ -158,8 +161,12 @@ class SteadyState(Measures):
         }
         record["too_fast"] = list(self.too_fast)
         record["word"] = list(self.word)
-        record["multipliers"] = [[float(m.real), float(m.imag)] for m in self.multipliers]
-        record["stable"] = self.stable
+        try:
+            record["multipliers"] = [[float(m.real), float(m.imag)] for m in self.multipliers]
+            record["stable"], record["no_multipliers"] = self.stable, ""
+        except HybridsimError as reason:  # the motion is known all the same
+            record["multipliers"] = record["stable"] = None
+            record["no_multipliers"] = reason.message
         record["grazing"] = None if self.grazing is None else self.grazing._asdict()
         return record
 

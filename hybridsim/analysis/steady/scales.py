@@ -26,10 +26,7 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
     sizes = np.abs(x)
     if not system.has_tape or not system.n:
         return sizes
-    n = system.n
-    tape = TangentTape(system, z)
-    seeds = np.eye(n + 1 + len(p), n)
-    A = np.abs(tape(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds).slopes[0, :n])
+    A = np.abs(_rates(system, x, p, z)[1])
     if not np.isfinite(A).all():
         return sizes
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -44,3 +41,19 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
 def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
     """What a run of this tolerance may move states (n,) of these sizes by while nothing moves."""
     return _ROUNDINGS * min(rtol, _LOOSEST) * sizes
+
+
+def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
+    """Whether all rates at x are zero but for what errors of the states, by the runs' tolerance, make of them."""
+    if not system.has_tape or not system.n:
+        return True
+    f, A = _rates(system, x, p, z)
+    return bool((np.abs(f) <= np.abs(A) @ rounding_of(coupled_sizes(system, x, p, z), rtol)).all())
+
+
+def _rates(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates (n,) and their derivatives by the states (n, n)."""
+    n = system.n
+    seeds = np.eye(n + 1 + len(p), n)
+    found = TangentTape(system, z)(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds)
+    return found.values[0, :n], found.slopes[0, :n]

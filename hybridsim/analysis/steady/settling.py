@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -158,14 +158,16 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
     return Passings(times, values, scale_of(solution, late), replace(point_at_end(solution), at=phase))
 
 
-def free_passings(motion: Motion, start: Point | None, duration: float, largest: np.ndarray) -> Passings:
+def free_passings(
+    motion: Motion, start: Point | None, duration: float, largest: np.ndarray, **limits: Any
+) -> Passings:
     """At every rise of the state that moves most through the middle of its range, in the later half of a run.
 
     A state that only adds up, such as the angle of a shaft, passes there once: it is taken where there is no other.
     largest (n,): the scale of each state when it moved most, brought up to date. A motion that has died out beside that
     rests: what is left of it may be rounding, which may repeat.
     """
-    solution = motion.run(start, duration)
+    solution = motion.run(start, duration, **limits)
     n, scale = len(motion.names), scale_of(solution, 0.0)
     np.maximum(largest, scale[:n], out=largest)
     middle = between_events(event_times(solution), 0.5 * duration, 0.25 * duration, 0.75 * duration)

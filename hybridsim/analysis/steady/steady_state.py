@@ -13,7 +13,7 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
-from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.analysis.steady.motion import CostsMore, GrowsWithoutBound, Motion, Point, point_at_end
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
@@ -35,6 +35,10 @@ _SETTLE = 32  # periods at first
 _MOST_AT_ONCE = 512
 _MAX_PERIODS = 4096
 _DURATION = 100.0  # of a first run without forcing, where the model has none of its own
+_FIRST_RUN = {
+    "events": 1000,
+    "steps": 20000,
+}  # what that may cost: else its own scale of time is a shorter one
 _FEWEST = 4  # passings that say something
 _WAIT = 256  # periods that are run in the time of a few Newton steps
 _MARGIN = 1.1  # on how many are expected to be needed
@@ -154,7 +158,12 @@ def steady_state(
     search = _Search(motion, period, tol, settle, max_periods)
     if told is not None:
         motion.progress = lambda _: told(search.share)
-    return search.run()
+    try:
+        return search.run()
+    except GrowsWithoutBound as fault:
+        return _found(
+            motion, UNSETTLED, None, periods=search.periods, message=f"{UNSETTLED}: {fault.message}"
+        )
 
 
 class _Search:
@@ -171,7 +180,9 @@ class _Search:
         self.motion, self.period, self.tol = motion, period, tol
         self.settle, self.max_periods = max(settle, _FEWEST), max_periods
         self.newton_steps, self.periods = 0, 0
-        self.duration = motion.model.duration_value() or _DURATION
+        declared = motion.model.duration_value()
+        self.duration = declared or _DURATION
+        self.least = 0.0 if declared else _DURATION  # of a stretch that may tell rest from what is slow
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
         self.seen = np.zeros(0)  # largest scale of each state so far
         self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
@@ -229,8 +240,12 @@ class _Search:
             phase = 0.0 if last is None else last.last.at
             return forced_passings(self.motion, start, self.period, count, phase)
         for _ in range(_LONGER):
-            passings = free_passings(self.motion, start, self.duration, self.largest)
-            if passings.rests or len(passings.times) >= _FEWEST:
+            passings = self._passed(start)
+            if passings.rests:
+                # a stretch that was cut short tells nothing of what is slow
+                if self.duration >= self.least or self.motion.stands_still(passings.last):
+                    break
+            elif len(passings.times) >= _FEWEST:
                 break
             self.duration *= 4.0
         self.periods += len(passings.times)
@@ -238,6 +253,16 @@ class _Search:
             return passings
         self.duration *= 2.0
         return passings
+
+    def _passed(self, start: Point | None) -> Passings:
+        """The motion over the duration; at first, where the model has none, over what a run of some cost reaches."""
+        is_free_to_choose = start is None and self.least > 0.0 and "limits" not in self.motion.options
+        if is_free_to_choose and self.duration == self.least:
+            try:
+                return free_passings(self.motion, start, self.duration, self.largest, limits=_FIRST_RUN)
+            except CostsMore as early:
+                self.duration = early.reached
+        return free_passings(self.motion, start, self.duration, self.largest)
 
     def _closed(self, passings: Passings) -> Orbit | None:
         """The periodic orbit that the motion is on, or comes to by Newton's method."""
