@@ -56,6 +56,29 @@ def as_real(value: Any) -> float | None:
         return None
 
 
+def finite_number(value: Any, what: str) -> float:
+    """A finite real number as a double."""
+    found = number(value, what, "give a finite number")
+    if not math.isfinite(found):
+        raise UsageError(f"{what} is {value!r}", remedy="give a finite number")
+    return found
+
+
+def whole_number(value: Any, what: str, least: int, most: int) -> int:
+    """A whole number within bounds; a truth value is none."""
+    found = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else least - 1
+    if not least <= found <= most:
+        raise UsageError(f"{what} is {value!r}", remedy=f"give a whole number from {least} to {most}")
+    return found
+
+
+def side_of_event(side: Any) -> str:
+    """Which of the two states at the time of an event is asked for."""
+    if not (isinstance(side, str) and side in ("+", "-")):
+        raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+    return side
+
+
 def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
     """Finite real numbers in an array of any shape."""
     try:

@@ -34,7 +34,7 @@ def whole_file(path: str | PathLike[str]) -> Iterator[str]:
     >>> with whole_file("table.csv") as partly, open(partly, "w") as file:  # doctest: +SKIP
     ...     file.write("t,x\\n")
     """
-    given = os.fspath(path)
+    given = path_text(path)
     try:
         before = _found(given)
         is_other = before is not None and not stat.S_ISREG(before.st_mode)
@@ -143,3 +143,20 @@ def cannot_write(path: str | PathLike[str], fault: OSError) -> UsageError:
     """What is raised for a file that cannot be written, with the reason of the system."""
     why = fault.strerror or str(fault)
     return UsageError(f"{os.fspath(path)} cannot be written: {why}", remedy="make room, or give another path")
+
+
+def path_text(path: object) -> str:
+    """A path as a text.
+
+    Raises
+    ------
+    UsageError
+        For what is neither a text nor a path.
+    """
+    try:
+        found = os.fspath(path)  # type: ignore[call-overload]  # it may be anything
+    except TypeError:
+        found = path
+    if not isinstance(found, str) or "\0" in found or not found:
+        raise UsageError(f"the path is {path!r}", remedy="give the path of a file as a text")
+    return found

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.arguments import chosen_model
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
-from hybridsim.model import Model, load
+from hybridsim.model import Model
 
 Function = Callable[[float, np.ndarray], Any]
 
@@ -78,11 +79,10 @@ def to_ivp(
     from hybridsim.engine.system import System
     from hybridsim.engine.timepair import Instant
 
-    model = model if isinstance(model, Model) else load(model)
-    model = model.with_(**(params or {})).validate()
+    model = chosen_model(model, params).validate()
     announce_compilation()
     system = System(model, as_written=True)
-    modes = _modes(system, z or {})
+    modes = _modes(system, z)
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
 
     tables = np.flatnonzero(system.is_corner).tolist()
@@ -133,13 +133,16 @@ def _state(x: Any) -> np.ndarray:
     return np.ascontiguousarray(x, dtype=float)
 
 
-def _modes(system: Any, z: Mapping[str, str]) -> np.ndarray:
+def _modes(system: Any, given: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
+    z: object = {} if given is None else given
+    if not isinstance(z, Mapping):
+        raise UsageError(f"z is {z!r}", remedy="give a mapping from names of components to names of modes")
     for name in z:
         if name not in names:
             raise UsageError(
                 f"z names {name!r}, which is no component of model {system.model.name}",
-                remedy=nearest(name, names, kind="components"),
+                remedy=nearest(str(name), names, kind="components"),
             )
     modes = []
     for automaton in system.automata:
@@ -152,7 +155,7 @@ def _modes(system: Any, z: Mapping[str, str]) -> np.ndarray:
         if mode is not None and mode not in automaton.modes:
             raise UsageError(
                 f"z of {automaton.name} is {mode!r}, which is no mode of it",
-                remedy=nearest(mode, automaton.modes, kind="modes"),
+                remedy=nearest(str(mode), automaton.modes, kind="modes"),
             )
         modes.append(automaton.initial if mode is None else automaton.modes.index(mode))
     return np.array(modes, dtype=np.int64)

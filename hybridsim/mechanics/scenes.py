@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.arguments import finite_number, numbers, whole_number
 from hybridsim.errors import UsageError
 from hybridsim.expr import parse
 from hybridsim.mechanics.impact import MechanicalImpact
 from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
 from hybridsim.model.library import load_law
+
+MOST_BLOCKS = 1_000_000  # of a chain
 
 
 def chain_on_belt(
@@ -71,6 +74,11 @@ def chain_on_belt(
     """
     from scipy import sparse
 
+    n, seed = whole_number(n, "n", 1, MOST_BLOCKS), whole_number(seed, "seed", 0, 2**63)
+    coupling, leaf = finite_number(coupling, "coupling"), finite_number(leaf, "leaf")
+    spread, gap = finite_number(spread, "spread"), None if gap is None else finite_number(gap, "gap")
+    if not spread >= 0.0:
+        raise UsageError(f"spread is {spread!r}", remedy="give a number >= 0")
     diagonal = np.full(n, leaf + 2.0 * coupling)
     diagonal[0] -= coupling
     diagonal[-1] -= coupling
@@ -133,6 +141,7 @@ def two_blocks_on_belt(
     >>> len(hs.two_blocks_on_belt().contacts)
     2
     """
+    coupling = finite_number(coupling, "coupling")
     law: Any = {"mu": 1.0, "delta": delta}
     loads = (1.0, second)
     contacts = [
@@ -180,9 +189,14 @@ def three_coupled_blocks(
     >>> [contact.normal for contact in hs.three_coupled_blocks().contacts]
     [30.0, 20.0, 10.0]
     """
+    coefficients = numbers(mu, "mu", "give three numbers")
+    if len(coefficients) != 3:
+        raise UsageError(f"mu is {mu!r}", remedy="give three numbers")
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [
-        MechanicalContact(f"f{i + 1}", directions[i], load, load_law("coulomb"), {"mu": parse(mu[i])})
+        MechanicalContact(
+            f"f{i + 1}", directions[i], load, load_law("coulomb"), {"mu": parse(float(coefficients[i]))}
+        )
         for i, load in enumerate((30.0, 20.0, 10.0))
     ]
     return MechanicalSystem(

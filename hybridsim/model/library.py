@@ -102,7 +102,6 @@ def list_laws() -> tuple[str, ...]:
     return tuple(path.stem for path in sorted((models_folder() / "laws").glob("*.toml")))
 
 
-@lru_cache(maxsize=64)
 @refusing
 def load_law(name: str) -> FrictionLaw:
     """Load a friction law of the package by name, ready for a `Contact`.
@@ -130,11 +129,16 @@ def load_law(name: str) -> FrictionLaw:
     >>> hs.load_law("coulomb").is_set_valued
     True
     """
+    if not isinstance(name, str):
+        raise UsageError(f"the law is {name!r}", remedy="give the name of a law")
+    return _packaged_law(name)
+
+
+@lru_cache(maxsize=64)
+def _packaged_law(name: str) -> FrictionLaw:
     from hybridsim.model.toml_laws import read_laws
     from hybridsim.model.toml_read import open_text
 
-    if not isinstance(name, str):
-        raise UsageError(f"the law is {name!r}", remedy="give the name of a law")
     if name not in list_laws():
         known = nearest(name, list_laws(), kind="laws")
         raise ModelError(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import zipfile
 from dataclasses import asdict
 from os import PathLike
@@ -19,7 +18,7 @@ import numpy as np
 
 from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
-from hybridsim.files import whole_file
+from hybridsim.files import path_text, whole_file
 
 if TYPE_CHECKING:
     from hybridsim.engine.checkpoint import Checkpoint
@@ -140,7 +139,7 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     >>> hs.load_solution("run.hsol").status  # doctest: +SKIP
     'finished'
     """
-    name = os.fspath(path)
+    name = path_text(path)
     try:
         with open(name, "rb") as file:
             return _read(file, name)

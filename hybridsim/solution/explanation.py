@@ -17,6 +17,7 @@ from hybridsim.expr import assignment
 from hybridsim.model.units import units_of
 from hybridsim.solution.blow import errors_beside, is_struck
 from hybridsim.solution.candidate import candidate, views
+from hybridsim.solution.event import Event
 from hybridsim.solution.grazing import grazed
 from hybridsim.solution.one_instant import BY_RESET, changes_in_words, fired_guards
 from hybridsim.solution.reason import reason
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from hybridsim.model.monitor import Monitor
     from hybridsim.model.schedule import Schedule
     from hybridsim.solution.candidate import Candidate, GuardView
-    from hybridsim.solution.event import Event
     from hybridsim.solution.solution import Solution
     from hybridsim.solution.stages import Place
     from hybridsim.solution.watched import Decision
@@ -103,7 +103,7 @@ class Explanation:
 def explain(solution: Solution, number: int | Event) -> Explanation:
     """The explanation of one of a solution's events; see `Solution.explain`."""
     events = solution.events
-    if number in events:
+    if isinstance(number, Event) and number in events:
         number = events.index(number)
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
         raise UsageError(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.arguments import as_times
+from hybridsim.arguments import as_times, side_of_event
 from hybridsim.calls import refusing
 from hybridsim.engine.places import Frame, find_places
 from hybridsim.errors import UsageError, nearest
@@ -146,10 +146,10 @@ class Solution(InTables):
         """
         known = (*self._system.names, *(q for q in self._system.quantities if " in " not in q))
         known = (*known, *(d.name for d in self.model.discrete))
-        if name not in (*known, *self._speeds):
-            remedy = nearest(name, (*known, *self._speeds), kind="quantities")
+        if not isinstance(name, str) or name not in (*known, *self._speeds):
+            remedy = nearest(str(name), (*known, *self._speeds), kind="quantities")
             for contact in self.model.contacts:
-                if name == _speed(contact.name):
+                if str(name) == _speed(contact.name):
                     remedy = f"declare it as an output: {contact.velocity.text}"
             raise UsageError(f"model {self.model.name} has no quantity {name!r}", remedy=remedy)
         if t is None and self._grid is None:
@@ -223,8 +223,7 @@ class Solution(InTables):
 
     def _places(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
         """Number of the segment that holds each time, and its local time there."""
-        if side not in ("+", "-"):
-            raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+        side = side_of_event(side)
         if not self._segments:
             raise UsageError(f"the run holds no trajectory ({self.status}: {self.message})")
         if self._save in ("events", "nothing"):
@@ -310,8 +309,7 @@ class Solution(InTables):
         side "+" is x+, just after each, "-" is x-; columns are in the order of ``sol.names``. The same as in
         ``sol.events``, without an object for each event.
         """
-        if side not in ("+", "-"):
-            raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+        side = side_of_event(side)
         found = [block.states_of(component, kind, "-+".index(side)) for block in self._blocks_with(component)]
         if len(found) == 1 and len(found[0]):
             return found[0]
@@ -320,11 +318,11 @@ class Solution(InTables):
     def _blocks_with(self, component: str) -> list[Any]:
         """All blocks of what happened, once it is known that the component is one that may be heard of."""
         self._require_events()
-        if component not in self._system.heard:
+        if not isinstance(component, str) or component not in self._system.heard:
             known = list(self._system.heard)
             raise UsageError(
                 f"the model has no component, monitor or schedule {component!r}",
-                remedy=nearest(component, known, kind="names"),
+                remedy=nearest(str(component), known, kind="names"),
             )
         return self._trajectory.occurrences.blocks
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.errors import UsageError
+from hybridsim.arguments import whole_number
 from hybridsim.model.units import time_unit, units_of
 from hybridsim.tables import Table
 
@@ -18,13 +18,7 @@ MOST_POINTS = 1 << 27  # of a column: a gigabyte
 
 def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
     """Times (points,) at equal steps, both ends included."""
-    if points < 2:
-        raise UsageError(f"points is {points!r}", remedy="give a whole number of at least 2")
-    if points > MOST_POINTS:
-        raise UsageError(
-            f"points is {points!r}", remedy=f"give at most {MOST_POINTS}, or tables of parts of the run"
-        )
-    return np.linspace(t0, t1, points)
+    return np.linspace(t0, t1, whole_number(points, "points", 2, MOST_POINTS))
 
 
 def tabulated(solution: Solution, points: int | None) -> Table:
