@@ -72,6 +72,20 @@ def whole_number(value: Any, what: str, least: int, most: int) -> int:
     return found
 
 
+def text(value: Any, what: str) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise UsageError(f"{what} is {value!r}", remedy="give a name")
+    return value
+
+
+def flag(value: Any, what: str) -> bool:
+    """A truth value."""
+    if not isinstance(value, bool | np.bool_):
+        raise UsageError(f"{what} is {value!r}", remedy="give True or False")
+    return bool(value)
+
+
 def side_of_event(side: Any) -> str:
     """Which of the two states at the time of an event is asked for."""
     if not (isinstance(side, str) and side in ("+", "-")):

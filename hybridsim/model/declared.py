@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field
 from inspect import Signature, signature
-from numbers import Real
+from numbers import Complex, Real
 from typing import Any
 
 from hybridsim.calls import refuse_unless_taken
@@ -140,7 +140,7 @@ class Declared(metaclass=_Refusing):
         for name in fields:
             given = getattr(self, name)
             try:
-                object.__setattr__(self, name, tuple(float(number) for number in as_tuple(given)))
+                object.__setattr__(self, name, tuple(_as_double(number) for number in as_tuple(given)))
             except (TypeError, ValueError, OverflowError):
                 raise self._fault(f"{name} is {given!r}", "give numbers") from None
 
@@ -169,3 +169,10 @@ def as_tuple(value: Any) -> tuple[Any, ...]:
         except TypeError:  # an array without dimensions calls itself iterable
             pass
     return (value,)
+
+
+def _as_double(number: Any) -> float:
+    """A number as a double; NumPy would drop the imaginary part of a complex one."""
+    if isinstance(number, Complex) and not isinstance(number, Real):
+        raise TypeError(number)
+    return float(number)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.arguments import as_times, side_of_event
+from hybridsim.arguments import as_times, side_of_event, text
 from hybridsim.calls import refusing
 from hybridsim.engine.places import Frame, find_places
 from hybridsim.errors import UsageError, nearest
@@ -299,7 +299,7 @@ class Solution(InTables):
     @refusing
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one component, monitor or schedule."""
-        found = [block.times_of(component, kind) for block in self._blocks_with(component)]
+        found = [block.times_of(component, kind) for block in self._blocks_with(component, kind)]
         return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
 
     @refusing
@@ -310,14 +310,18 @@ class Solution(InTables):
         ``sol.events``, without an object for each event.
         """
         side = side_of_event(side)
-        found = [block.states_of(component, kind, "-+".index(side)) for block in self._blocks_with(component)]
+        found = [
+            block.states_of(component, kind, "-+".index(side)) for block in self._blocks_with(component, kind)
+        ]
         if len(found) == 1 and len(found[0]):
             return found[0]
         return np.concatenate([np.empty((0, self._system.n)), *(states for states in found if len(states))])
 
-    def _blocks_with(self, component: str) -> list[Any]:
+    def _blocks_with(self, component: str, kind: str | None) -> list[Any]:
         """All blocks of what happened, once it is known that the component is one that may be heard of."""
         self._require_events()
+        if kind is not None:
+            text(kind, "kind")
         if not isinstance(component, str) or component not in self._system.heard:
             known = list(self._system.heard)
             raise UsageError(

@@ -20,6 +20,7 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.wanted import whole
 from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
 
@@ -106,6 +107,8 @@ def continuation(
     """
     model = arguments.chosen_model(model, params)
     names = [p.name for p in model.parameters]
+    parameter = arguments.text(parameter, "parameter")
+    most = whole(max_points, "max_points")
     if parameter not in names:
         raise UsageError(
             f"model {model.name} has no parameter {parameter!r}",
@@ -125,9 +128,7 @@ def continuation(
             f"model {model.name} settles on no periodic orbit at {parameter} = {value:g}: {start.message}",
             remedy="start from other parameters or another x0",
         )
-    follower = _Follower(
-        model, parameter, (low, high), method, start._closed, start._is_free, int(max_points)
-    )
+    follower = _Follower(model, parameter, (low, high), method, start._closed, start._is_free, most)
     first = follower.close(start._closed, value)
     if first is None:
         raise UsageError(

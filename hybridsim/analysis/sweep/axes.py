@@ -89,7 +89,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
     UsageError
         For names that the model does not have, values that are none, and lists of different lengths.
     """
-    if mode not in MODES:
+    if not isinstance(mode, str) or mode not in MODES:
         raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
     if not isinstance(values, Mapping) or not values:
         raise UsageError(

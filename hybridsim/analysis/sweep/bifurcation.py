@@ -18,7 +18,7 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.section import Section, with_section
 from hybridsim.analysis.sweep.work import work
 from hybridsim.analysis.wanted import positive, whole
-from hybridsim.arguments import callback, chosen_model
+from hybridsim.arguments import callback, chosen_model, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
@@ -108,7 +108,7 @@ def bifurcation(
 
     refuse_unknown([simulate], options)
     base = chosen_model(model, params).validate()
-    points = points_of(base, {parameter: values}, "list")
+    points = points_of(base, {text(parameter, "parameter"): values}, "list")
     if points.axes[0].is_start:
         raise UsageError(
             f"{parameter} is a state", remedy="vary a parameter; initial values are swept with hs.sweep"

@@ -9,7 +9,7 @@ from typing import Any
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
 from hybridsim.analysis.wanted import mapping
-from hybridsim.arguments import chosen_model
+from hybridsim.arguments import chosen_model, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
@@ -58,7 +58,7 @@ def frequency_response(
     (('N', 'omega'), ['amplitude.x', 'stick_fraction.f', 'stops_per_period.f'])
     """
     model = chosen_model(model, params)
-    others = mapping(levels, "levels")
+    others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
         raise UsageError(f"levels is {levels!r}", remedy="give one parameter other than the frequency")
     if not model.states:

@@ -23,7 +23,7 @@ import numpy as np
 from hybridsim.analysis.sweep.job import Outcome
 from hybridsim.analysis.sweep.readings import Reading
 from hybridsim.errors import UsageError
-from hybridsim.files import cannot_write, hold
+from hybridsim.files import cannot_write, hold, path_text
 
 _FORMAT = "hybridsim sweep"
 _MOST_BYTES = 1 << 28  # of a line: some 10 million numbers
@@ -53,7 +53,7 @@ class Journal:
     """
 
     def __init__(self, path: str | PathLike[str], sweep: str) -> None:
-        self.path = os.fspath(path)
+        self.path = path_text(path)
         self.known: list[tuple[list[int], list[Outcome]]] = []
         self._file = self._opened()
         try:

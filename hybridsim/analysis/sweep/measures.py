@@ -40,8 +40,9 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
         return Given(measure, options, chained)
     if isinstance(measure, str):
         return ready_measure(measure, model, options)
-    if is_row(measure) and len(measure) and all(isinstance(word, str) for word in measure):
-        return ready_measure(tuple(measure), model, options)
+    words = tuple(measure) if is_row(measure) else ()
+    if words and all(isinstance(word, str) for word in words):
+        return ready_measure(words, model, options)
     raise UsageError(
         f"measure is {measure!r}", remedy="give a function of the model, or the name of a ready measure"
     )

@@ -19,8 +19,8 @@ from hybridsim.analysis.sweep.measures import measure_of
 from hybridsim.analysis.sweep.ready import Final, Steady, units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.work import work
-from hybridsim.analysis.wanted import whole
-from hybridsim.arguments import callback, chosen_model
+from hybridsim.analysis.wanted import mapping, whole
+from hybridsim.arguments import callback, chosen_model, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
@@ -114,7 +114,11 @@ def sweep(
     """
     model = chosen_model(model, params).validate()
     points = points_of(model, values, mode)
-    tell = callback(progress)
+    tell, warm_start, names_of_units = (
+        callback(progress),
+        flag(warm_start, "warm_start"),
+        mapping(units, "units"),
+    )
     if after is not None:
         if warm_start:
             raise UsageError(
@@ -130,11 +134,11 @@ def sweep(
         tuple(axis.name for axis in points.axes),
         frozenset(axis.name for axis in points.axes if axis.is_start),
         measured,
-        bool(warm_start),
+        warm_start,
     )
     began = time.perf_counter()
     mark = fingerprint(
-        _text_of(model), points, _named(measure), bool(warm_start), sorted(options.items()), __version__
+        _text_of(model), points, _named(measure), warm_start, sorted(options.items()), __version__
     )
     with Journal(journal, mark) if journal is not None else nullcontext() as file:
         collected, finished, who = work(job, points, executor, count, tell, file)
@@ -149,7 +153,7 @@ def sweep(
         {axis.name: axis.values for axis in points.axes},
         found,
         collected.status.reshape(points.shape),
-        known | dict(units or {}),
+        known | dict(names_of_units),
         _named(measure),
         not finished,
         time.perf_counter() - began,

@@ -11,6 +11,8 @@ import numpy as np
 from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused_limits import refuse_limits
+from hybridsim.analysis.wanted import words
+from hybridsim.arguments import flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 
@@ -96,14 +98,15 @@ def sensitivities(
         raise UsageError(f"solution is {solution!r}", remedy="give what hs.simulate returns")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
-    for name in parameters or ():
+    starts_follow = flag(starts_follow, "starts_follow")
+    chosen = tuple(names) if parameters is None else words(parameters, "parameters")
+    for name in chosen:
         if name not in names:
             raise UsageError(
                 f"model {model.name} has no parameter {name!r}",
                 remedy=model.remedy_for_parameter(name),
             )
     _refuse(solution)
-    chosen = tuple(names if parameters is None else parameters)
     n, d, P = system.n, system.layout.discrete, len(chosen)
     by_parameter = value_slopes(model, chosen)
     starts = start_slopes([s.start for s in model.states], model, by_parameter)
