@@ -59,6 +59,7 @@ class ModeLoop:
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.notices = Notices(system, method, task, self.record, self._is_taken_over)
         self.leaper = leaper or plan.leaper()
+        self._led = set(system.led)
         self._told = progress
 
     @property
@@ -347,7 +348,11 @@ class ModeLoop:
                 return True
             found = located_backward(self.system, self.origin, arrival, segment)
         sides, x_minus, error = found.sides, arrival.x, segment.rounding()
-        if found.fired or found.stopping:
+        # corners decide nothing: where something is due at their instant they take their sides with it
+        has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
+        if has_only_corners:
+            error = np.maximum(error, found.at.x_error)
+        if found.stopping or (found.fired and not has_only_corners):
             outcome = self._settle_located(found)
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)

@@ -199,3 +199,17 @@ def test_a_corner_that_begins_at_zero_without_a_rate(
     )
     assert sol.status == "finished"
     assert [event.t for event in sol.events] == pytest.approx([end], abs=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "cvode-bdf", "moreau", "reference"])
+def test_a_step_in_time_and_a_schedule_at_one_instant(integrator: str) -> None:
+    """The pull of 2 that the step begins is taken back to 0.5 by the schedule: the body rests at all times."""
+    model = rubbing("(0.5 if t < 1 else 2) - 1.5*max(y, 0)", **moved(1.0))
+    if integrator == "reference":
+        assert not float(multiple_precision_trajectory(model, (0, 2)).states.state(2)[1])
+        return
+    sol = hs.simulate(
+        model, (0, 2), integrator=integrator, **({"step": 1e-3} if integrator == "moreau" else {})
+    )
+    assert [event.component for event in sol.events] == ["jump"]
+    assert sol.output("v", 2.0) == 0.0

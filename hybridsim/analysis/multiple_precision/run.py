@@ -93,20 +93,23 @@ class Run:
         if acting:
             self._crowd(point.t)
             self._act(acting, point)
-        elif fired:
+        elif fired and (self.rules.sides.others(fired) or not arrived):
             self._crowd(point.t)
             self._adopt(self.rules.settle(point, self.now.modes, fired))
         else:
-            self._go_on(point)
+            self._go_on(point, arrived)
         if arrived:
             self.appointments.keep(appointment)
             self._keep_schedules(appointment.schedules)
 
-    def _go_on(self, point: Point) -> None:
-        """Begin the next step where nothing was located; a guard may be zero at just this instant."""
+    def _go_on(self, point: Point, arrived: bool) -> None:
+        """Begin the next step where nothing was located; a guard may be zero at just this instant.
+
+        Corners alone decide nothing: where something is due, they take their sides with it.
+        """
         expansion = self.programs.program(self.now.modes).expand(point)
         leaving = self.programs.leaving(expansion)
-        if leaving:
+        if self.rules.sides.others(leaving) or (leaving and not arrived):
             self._crowd(point.t)
             self._adopt(self.rules.settle(point, self.now.modes, leaving))
         else:
