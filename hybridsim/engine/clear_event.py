@@ -66,8 +66,8 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
     fired, at = work.whole[FIRED], located(state, work)
     c = automata.owner[fired]
     hold, now = automata.hold[c], at.z[c]
-    if hold < 0 or automata.is_corner[c]:
-        return False
+    if hold < 0 or automata.is_corner[c] or (now != hold and automata.place[fired] > 0):
+        return False  # a guard on the load does not put the contact onto its surface
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
         few()
         d = automata.cluster[i]

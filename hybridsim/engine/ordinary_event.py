@@ -126,6 +126,8 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
         if automata.is_unilateral[automata.cluster[i]]:
             return False
     if automata.hold[c] >= 0:
+        if z[c] != automata.hold[c] and automata.place[fired] > 0:
+            return False  # a guard on the load does not put the contact onto its surface
         number = decide_surface(automata, tapes, inputs, lin, state, work, fired, k, is_known)
         if number < 0:
             return False

@@ -41,6 +41,7 @@ from hybridsim.engine.releases import Releases
 from hybridsim.engine.resets import merged_resets
 from hybridsim.engine.rest_at_stops import together, with_tied
 from hybridsim.engine.system import Series, System
+from hybridsim.engine.uniqueness import other_outcomes, with_cause
 
 # A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
 # mode of the model goes round in circles.
@@ -96,7 +97,7 @@ class Settling:
         failure = self._transitions(open_ - surfaces, list(resets)) or self._first_modes(surfaces)
         if failure:
             return self._stop(*failure)
-        open_ &= surfaces
+        open_ = self._at_surfaces(open_ & surfaces)
         if surfaces and (self.jumped or (self.at.z < 0).any()):
             open_ |= self.take_sides()
         limit = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in self.system.automata))
@@ -191,6 +192,14 @@ class Settling:
 
     def _surface_components(self) -> set[int]:
         return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
+
+    def _at_surfaces(self, components: set[int]) -> set[int]:
+        """Those that what fired puts onto their surfaces: a guard on the load of one that slips says nothing of it."""
+        fired = {(c, j) for c, j, _ in self._fired_guards()}
+        holds = [self.system.automata[c].hold for c in range(len(self.at.z))]
+        return {
+            c for c in components if self.at.z[c] == holds[c] or (c, 0) in fired
+        }  # the first is the surface's
 
     def _fired_guards(self) -> list[tuple[int, int, int]]:
         """(component, index in its mode, number) of the located guards."""
@@ -336,7 +345,12 @@ class Settling:
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
         holds = np.array([automata[c].hold for c in taking_part])
-        verdicts, is_whole = verdicts_on(self, taking_part, candidates, holds, cluster)
+        caused = candidates[with_cause(self, taking_part, candidates, open_)]
+        verdicts, is_whole = verdicts_on(self, taking_part, caused, holds, cluster)
+        if len(caused) < len(candidates) and (verdicts == LEAVES).all():
+            verdicts, is_whole = verdicts_on(self, taking_part, candidates, holds, cluster)
+        else:
+            candidates = caused
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
             return f"{'' if self.forward else 'backward-'}nonunique", self._say(taking_part, rival, _SEVERAL)
@@ -349,6 +363,9 @@ class Settling:
             number = int(left[on_its_side(self, taking_part, candidates[left])])
         if number == NONE:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
+        others = other_outcomes(self, taking_part, candidates, number, open_, cluster)
+        if len(others):
+            return "nonunique", self._say(taking_part, np.vstack([candidates[number], others]), _SEVERAL)
         source, x_minus = at.z.copy(), at.x.copy()
         if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
             return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)

@@ -127,8 +127,14 @@ def decide_surface(
         for number in range(total):
             if ranks[number] != rank:
                 continue
+            is_caused = (
+                True  # what holds below its limits has no cause to let go: `hybridsim.engine.uniqueness`
+            )
             for i in range(count):
                 trial[members[i]] = candidates[number, i]
+                is_caused = is_caused and (members[i] == c or candidates[number, i] == holds[i])
+            if not is_caused:
+                continue
             is_current = rank >= (count + 1) * count
             if is_current and goes_on(automata, lin, k, z, fired, is_known, x, x_error, work):
                 continue

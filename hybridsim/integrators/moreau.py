@@ -17,6 +17,7 @@ from hybridsim.integrators.fixed_step_length import fixed_step_length, refuse_lo
 from hybridsim.integrators.fixed_step_run import FixedStepRun, surface_table
 from hybridsim.integrators.moreau_impacts import UNILATERAL
 from hybridsim.integrators.moreau_kernels import moreau_step, moreau_steps, room_for
+from hybridsim.integrators.moreau_loads import refuse_loads_of_friction
 from hybridsim.model.impact import ROUNDING
 
 _HALVINGS = 16  # of a step in which a declared guard or monitor crosses zero
@@ -96,6 +97,7 @@ class Moreau(Integrator):
         """Run a task with fixed steps."""
         step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
         refuse_longer(step, task.tolerances.max_step, self.name)
+        refuse_loads_of_friction(system.model, self.name)
         march = MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0.copy())
         return FixedStepRun(system, task, march, progress).run()
 

@@ -121,7 +121,8 @@ def _exit_of(
 ) -> tuple[int, float]:
     """First time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
 
-    Where it is zero all along it does not. On a short stretch a touch is passed if it is positive after it.
+    Where it is zero all along, or within the rounding `slack` of what it is the difference of, it does not. On a short
+    stretch a touch is passed if it is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
     for k in range(terms):
@@ -129,7 +130,7 @@ def _exit_of(
         total += abs(room.poly[k])
         end += room.poly[k]
         power *= h
-    if total == 0.0:
+    if total <= slack:
         return NEVER, 1.0
     error = 2.0 * (abs(room.poly[terms - 1]) + abs(room.poly[terms - 2])) + 8.0 * _UNIT * total + slack
     form = BERNSTEIN + top - (terms - order)

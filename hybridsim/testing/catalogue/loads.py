@@ -1,0 +1,81 @@
+"""Scenes of loads: one that touches zero, one that a reaction gives, and contacts in series of which one lets go."""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+
+from hybridsim.testing.checks import no_transition, says
+from hybridsim.testing.scene import END, Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """All of them."""
+    return _floor(), _touching(), _series(), _painleve()
+
+
+def _floor() -> Scene:
+    """One bounce on a spring: the speed along the floor falls by mu times the impulse of the load."""
+    g, k, mu, end = 9.81, 1000.0, 0.3, 0.3
+    own, down, start = math.sqrt(k), math.sqrt(2 * g * 0.1), math.sqrt(2 * 0.1 / g)
+
+    def depth(t: float) -> float:
+        return -g / k + g / k * math.cos(own * t) - down / own * math.sin(own * t)
+
+    lasts = float(brentq(depth, 0.9 * math.pi / own, 1.3 * math.pi / own, xtol=1e-15))
+    left = end - start - lasts
+    state = (down * left - g * left**2 / 2, down - g * left, 3.0 - mu * (2 * down + g * lasts))
+    return Scene(
+        "elastic-floor",
+        "elastic-floor",
+        (0.0, end),
+        Truth(None, ((END, state),), checks=(("located", no_transition),)),
+        needs("contacts"),
+        unit=0.1,
+        speed=3.0,
+    )
+
+
+def _touching() -> Scene:
+    """The impulse of the load is the area under it."""
+    return Scene(
+        "touching-load",
+        "touching-load",
+        (0.0, 2.0),
+        Truth(None, ((END, (1.0, 3.0 - 0.3 * 2.0)),), checks=(("located", no_transition),)),
+        needs("contacts"),
+        speed=3.0,
+    )
+
+
+def _series() -> Scene:
+    """The lower contact lets go at t = 2, and both blocks move as one, x'' + x = (t - 1)/8, until t = 5."""
+    tau = 3.0
+    x = 0.125 * (tau + 1.0 - math.cos(tau) - math.sin(tau))
+    v = 0.125 * (1.0 + math.sin(tau) - math.cos(tau))
+    return Scene(
+        "blocks-in-series",
+        "series",
+        (0.0, 2.0 + tau),
+        Truth(((2.0, "f:slip+"),), ((END, (x, v, x, v)),)),
+        needs("contacts", "exact-stick"),
+        start_is_event=False,
+    )
+
+
+def _painleve() -> Scene:
+    """Two motions are admissible, and the run names both."""
+    return Scene(
+        "painleve-start",
+        "painleve",
+        (0.0, 1.0),
+        Truth(
+            (),
+            ((END, (0.0, 0.0, 0.0, -1.0)),),
+            status="nonunique",
+            end=0.0,
+            checks=(("", says("p: closed", "p: open")),),
+        ),
+        needs("impacts", "contacts", "located"),
+    )
