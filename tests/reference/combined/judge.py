@@ -171,7 +171,7 @@ class Judge(Configurations):
         for row in [c[k] for k in range(len(self.names))] + [row for _, row, _ in slots]:
             size = max(1.0, max(abs(float(v)) for v in row[:3]))
             for k in (n, n - 1):
-                if row[k]:
+                if float(row[k]):
                     h = min(h, (self.maths.last * size / abs(float(row[k]))) ** (1 / k))
         first, hit = h, False
         for _, row, sign in slots:
