@@ -300,7 +300,8 @@ class Rewriting:
             )
         if self.refusal:
             return self._kept(node, self.refusal, here)
-        if isinstance(node, ast.IfExp) and (border := jump_inside(self, node, here)):
+        inside = replace(here, signs=self._signs(here, family, sign))  # beyond the node's own border
+        if isinstance(node, ast.IfExp) and (border := jump_inside(self, node, inside)):
             return self._hoisted(node, border, here)
         here = replace(here, jumps=WATCHED, is_passing=False)
         pair = self._pair(above, below, family, sign, here)

@@ -260,3 +260,16 @@ def test_it_is_told_in_words(tmp_path: Path) -> None:
     sol.save(tmp_path / "run.hybridsim")
     on = hs.load_solution(tmp_path / "run.hybridsim").resume(t_end=20.0)
     assert on(20.0) == pytest.approx([-0.1, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("start", "fires"), [(0.9, 0.16), (-0.9, 0.04)])
+def test_a_size_written_with_a_sign_may_stand_inside_of_another_size(start: float, fires: float) -> None:
+    """sign(x)*x has a corner and no jump; taking it out of abs() must come to an end."""
+    leaves = hs.Guard("g", "0.1 - abs(sign(x)*x - 0.96)", hs.Choice("off"))
+    model = hs.Model(
+        "size-of-a-size",
+        states=[hs.State("x", start, 1)],
+        components=[hs.Component("a", [hs.Mode("on", leaves), hs.Mode("off")], initial="on")],
+    )
+    sol = hs.simulate(model, (0.0, 1.0), integrator="taylor")
+    assert [event.t for event in sol.events if event.component == "a"] == [pytest.approx(fires, abs=1e-12)]
