@@ -7,14 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.array_forms import (
+    Form,
+    check_ascending,
+    check_finite,
+    check_forms,
+    check_modes,
+    check_range,
+)
 from hybridsim.engine.blocks import SegmentList
 from hybridsim.engine.chebyshev_pieces import ChebyshevPieces, chebyshev_series
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.fixed_blocks import StepSegments
-from hybridsim.engine.linear_tables import LinearTables
+from hybridsim.engine.linear_tables import LinearTables, no_tables
 from hybridsim.engine.packs import packed
+from hybridsim.engine.panels import panels_of
 from hybridsim.engine.pieces import Segment, end_point
-from hybridsim.engine.rk_leaper import HermiteBlock
+from hybridsim.engine.rk_leaper import TERMS, HermiteBlock
 from hybridsim.engine.series_block import SeriesBlock
 from hybridsim.engine.timepair import Instant
 
@@ -26,6 +35,44 @@ Arrays = dict[str, np.ndarray]
 _SERIES = ("ends", "steps", "series", "origins", "modes", "vectors", "jumps")
 _CLOSED = ("rows", "ends", "coordinates", "origins", "modes", "vectors", "jumps")
 _CLASSES: dict[str, Any] = {"series": SeriesBlock, "hermite": HermiteBlock}
+_ROW_FORMS: dict[str, Form] = {
+    "origins": (float, ("N", 2)),
+    "modes": (np.int64, ("N", "C")),
+    "vectors": (float, ("N", "P")),
+}
+_SERIES_FORMS: dict[str, Form] = _ROW_FORMS | {
+    "ends": (np.int64, ("N+1",)),
+    "steps": (float, ("M", 2)),
+    "series": (float, ("M", "n", "K")),
+    "jumps": (float, ("N", 2, "n")),
+}
+_CLOSED_FORMS: dict[str, Form] = _ROW_FORMS | {
+    "rows": (np.int64, ("N",)),
+    "ends": (float, ("N",)),
+    "coordinates": (complex, ("N", "J")),
+    "jumps": (float, ("N", 3, "n")),
+}
+_TABLE_FORMS: dict[str, Form] = {
+    "counts": (np.int64, ("K",)),
+    "values": (complex, ("K", "J")),
+    "upper": (complex, ("K", "J", "J")),
+    "ends": (np.int64, ("K", "J")),
+}
+_STEP_FORMS: dict[str, Form] = {
+    "origin": (float, (2,)),
+    "p": (float, ("P",)),
+    "s": (float, ("M",)),
+    "x": (float, ("M", "n")),
+    "z": (np.int64, ("M", "C")),
+    "cuts": (np.int64, ("cuts",)),
+}
+_SEGMENT_FORMS: dict[str, Form] = _ROW_FORMS | {
+    "lengths": (np.int64, ("N",)),
+    "knots": (float, ("L",)),
+    "states": (float, ("L", "n")),
+    "terms": (np.int64, ("T",)),
+    "series": (float, ("S", "n")),
+}
 
 
 def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
@@ -53,26 +100,115 @@ def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
 
 
 def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[Any]:
-    """The blocks again."""
+    """The blocks again.
+
+    Raises
+    ------
+    ValueError
+        For arrays that no run of the system can have left: they do not come as far as a kernel.
+    """
+    sizes = {"n": system.n, "C": len(system.automata), "P": system.layout.size}
     tables: list[Any] = []
     blocks: list[Any] = []
     for kind, arrays in stored:
+        title = f"a block of kind '{kind}'"
         if kind == "tables":
-            tables.append(
-                packed(LinearTables(*(np.ascontiguousarray(arrays[n]) for n in LinearTables._fields)))
-            )
+            tables.append(_checked_tables(title, arrays, sizes))
         elif kind == "closed-form":
-            rows = (arrays[name] for name in _CLOSED)
-            blocks.append(ClosedFormBlock(system, tables[int(arrays["tables"])], *rows))
+            check_forms(title, arrays, {"tables": (np.int64, ())}, {})
+            check_range(f"{title}: its table", arrays["tables"], 0, len(tables) - 1)
+            its = tables[int(arrays["tables"])]
+            _check_closed(title, system, arrays, sizes, its)
+            blocks.append(ClosedFormBlock(system, its, *(arrays[name] for name in _CLOSED)))
         elif kind in _CLASSES:
+            _check_series(title, system, arrays, sizes, 2 * TERMS if kind == "hermite" else 0)
             blocks.append(_CLASSES[kind](system, *(arrays[name] for name in _SERIES)))
         elif kind == "steps":
+            _check_steps(title, system, arrays, sizes)
             blocks.append(StepSegments.of_arrays(system, arrays))
         elif kind == "segments":
+            _check_segments(title, system, arrays, sizes)
             blocks.append(SegmentList(system, _segments(arrays)))
         else:
             raise ValueError(f"a block of kind {kind!r}")
     return blocks
+
+
+def _check_rows(title: str, system: System, arrays: Arrays) -> None:
+    """What all blocks have for each segment."""
+    if not len(arrays["modes"]):
+        raise ValueError(f"{title} is empty")
+    check_finite(f"{title}: a time", arrays["origins"])
+    check_modes(title, arrays["modes"], [len(a.modes) for a in system.automata])
+
+
+def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, int], columns: int) -> None:
+    """Series of steps; columns: coefficients of each, where they are a certain number."""
+    known = check_forms(title, arrays, _SERIES_FORMS, sizes)
+    _check_rows(title, system, arrays)
+    ends, steps = arrays["ends"], arrays["steps"]
+    if ends[0] != 0 or ends[-1] != known["M"]:
+        raise ValueError(f"{title}: its steps are not those of its segments")
+    check_ascending(f"{title}: the steps of its segments", ends, strictly=True)
+    check_finite(f"{title}: a time", steps)
+    if known["K"] < 1 or (columns and known["K"] != columns):
+        raise ValueError(f"{title} has {known['K']} coefficients a step")
+
+
+def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> LinearTables:
+    """Tables of a motion in closed form with what states are made of; the rest is not needed any more, and empty."""
+    known = check_forms(title, arrays, _TABLE_FORMS, sizes)
+    count, widest = known["K"], known["J"]
+    panels = panels_of(np.zeros((1, sizes["n"], 2 * widest))).shape[1:]
+    check_forms(title, arrays, {"states": (float, (count, *panels))}, {})
+    counts, ends = arrays["counts"], arrays["ends"]
+    check_range(f"{title}: a number of coordinates", counts, 0, widest)
+    used = np.arange(widest) < counts[:, None]
+    if not ((ends > np.arange(widest)) & (ends <= counts[:, None]))[used].all():
+        raise ValueError(f"{title}: a block of coordinates ends where there is none")
+    needed = {name: arrays[name] for name in (*_TABLE_FORMS, "states")}
+    empty = {name: getattr(no_tables(), name) for name in LinearTables._fields}
+    tables: LinearTables = packed(LinearTables(**(empty | needed)))
+    return tables
+
+
+def _check_closed(title: str, system: System, arrays: Arrays, sizes: dict[str, int], tables: Any) -> None:
+    check_forms(title, arrays, _CLOSED_FORMS, sizes | {"J": tables.values.shape[1]})
+    _check_rows(title, system, arrays)
+    check_range(f"{title}: a row of its table", arrays["rows"], 0, len(tables.counts) - 1)
+    check_finite(f"{title}: a time", arrays["ends"])
+
+
+def _check_steps(title: str, system: System, arrays: Arrays, sizes: dict[str, int]) -> None:
+    check_forms(title, arrays, _STEP_FORMS, sizes)
+    s, cuts = arrays["s"], arrays["cuts"]
+    check_finite(f"{title}: a time", arrays["origin"], s)
+    check_modes(title, arrays["z"], [len(a.modes) for a in system.automata])
+    if len(s) < 2:
+        raise ValueError(f"{title} is empty")
+    check_ascending(f"{title}: its time", s)
+    check_range(f"{title}: a change of modes", cuts, 1, len(s) - 2)
+    check_ascending(f"{title}: its changes of modes", cuts, strictly=True)
+
+
+def _check_segments(title: str, system: System, arrays: Arrays, sizes: dict[str, int]) -> None:
+    known = check_forms(title, arrays, _SEGMENT_FORMS, sizes)
+    _check_rows(title, system, arrays)
+    lengths, terms, knots = arrays["lengths"], arrays["terms"], arrays["knots"]
+    check_finite(f"{title}: a time", knots)
+    check_range(f"{title}: a number of knots", lengths, 1, known["L"])
+    check_range(f"{title}: a number of terms", terms, 1, known["S"])
+    if (
+        int(lengths.sum()) != known["L"]
+        or int(terms.sum()) != known["S"]
+        or len(terms) != known["L"] - known["N"]
+    ):
+        raise ValueError(f"{title}: its knots or its terms are not those of its segments")
+    inside = np.ones(max(known["L"] - 1, 0), dtype=np.bool_)
+    inside[np.cumsum(lengths)[:-1] - 1] = False
+    signs = np.sign(np.diff(knots)[inside])
+    if not ((signs == 1.0).all() or (signs == -1.0).all()):
+        raise ValueError(f"{title}: its time turns")
 
 
 def _of_segments(segments: list[Segment]) -> Arrays:

@@ -9,6 +9,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 
 from hybridsim.engine.blocks import Block, SegmentList
+from hybridsim.engine.checkpoint import damaged
 from hybridsim.engine.pieces import Segment
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
@@ -99,8 +100,10 @@ class Chain(Sequence[Item]):
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
-        if blocks and count:
-            assert isinstance(blocks[-1], list), "a run goes on where a block in arrays ends"
+        if (
+            blocks and count and not isinstance(blocks[-1], list)
+        ):  # a run goes on where a block in arrays ends
+            raise damaged("how much of the run stays")
         if blocks and isinstance(blocks[-1], list):
             last = self._loose()
             last.extend(blocks[-1][: len(blocks[-1]) - count])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.timepair import Instant
+from hybridsim.errors import UsageError
 
 
 class Pace(NamedTuple):
@@ -49,3 +50,10 @@ class Checkpoint:
     paces: dict[int, Pace]
     segments: int = 0
     occurrences: int = 0
+
+
+def damaged(what: str) -> UsageError:
+    """What is raised where a run cannot go on from a place that came from a file."""
+    return UsageError(
+        f"the run cannot go on: its file is damaged, in {what}", remedy="start a new one, from sol.y[:, -1]"
+    )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from time import perf_counter
 
 import numpy as np
 
+from hybridsim.engine.array_forms import check_modes
+from hybridsim.engine.checkpoint import damaged
 from hybridsim.engine.closed_form_block import ClosedFormBlock
 from hybridsim.engine.desk import Desk, Laid, laid_out
 from hybridsim.engine.event_work import work_space
@@ -59,7 +62,19 @@ class ExactLeaper:
     @place.setter
     def place(self, place: np.ndarray) -> None:
         guards, components = self.system.guard_count, len(self.system.automata)
+        what = "the zeros of guards that were met last"
+        whole = len(place) >= 2 and 0.0 <= place[0] < math.inf and 0.0 <= place[1] <= len(place)
+        if not whole or len(place) != 2 + int(place[1]) * (components + guards):
+            raise damaged(what)
         self.horizon, count = float(place[0]), int(place[1])
+        try:
+            check_modes(
+                what,
+                place[2 : 2 + count * components].reshape(count, components),
+                [len(a.modes) for a in self.system.automata],
+            )
+        except ValueError:
+            raise damaged(what) from None
         vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
         hints = place[2 + count * components :].reshape(count, guards)
         is_known = (hints > 0.0).any(axis=1)

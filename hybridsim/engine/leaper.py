@@ -14,6 +14,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import MOST, leads_nowhere
 from hybridsim.engine.blocks import SegmentBlock
+from hybridsim.engine.checkpoint import damaged
 from hybridsim.engine.code_shelf import CodeShelf
 from hybridsim.engine.desk import Desk, Laid, laid_out
 from hybridsim.engine.event_work import functions_of, work_space
@@ -186,7 +187,11 @@ class Leaper(ABC):
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
+        if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_ROOM, self.steps))).all()):
+            raise damaged("how far the rows of the run are written")
         rows, segments, steps = (int(number) for number in place)
+        if not (1 <= steps <= self.steps and rows <= steps and segments <= _SEGMENTS + 1):
+            raise damaged("how far the rows of the run are written")
         if steps != self.steps:
             self.steps = steps
             self._renew()

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.backward import cross_backward, has_no_past, held, said_of_direction
-from hybridsim.engine.checkpoint import Checkpoint
+from hybridsim.engine.checkpoint import Checkpoint, damaged
 from hybridsim.engine.diagnosis import advice_on_sizes, in_the_way
 from hybridsim.engine.gathering import behind, closed_now, holds_several
 from hybridsim.engine.headway import Headway, NoHeadway, TakenOver
@@ -221,6 +221,8 @@ class ModeLoop:
     def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
         """Take a noted state up; the step size to begin with."""
         arrays = checkpoint.arrays
+        if "step_size" not in arrays:  # of a method with fixed steps
+            raise damaged("the place where it goes on")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation, accumulated
-from hybridsim.engine.checkpoint import Checkpoint
+from hybridsim.engine.checkpoint import Checkpoint, damaged
 from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.first_modes import as_given
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
@@ -154,6 +154,8 @@ class FixedStepRun:
                 self.gauge.check()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
+        if not checkpoint.arrays.keys() >= {*_STATE}:
+            raise damaged("the place where it goes on")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)

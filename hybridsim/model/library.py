@@ -167,6 +167,10 @@ def read_text(path: Path) -> str:
     try:
         if path.is_dir():
             raise ModelError("this is a folder", place=place, remedy="give the .toml file in it.")
+        if (
+            path.exists() and not path.is_file() and str(path) != "/dev/stdin"
+        ):  # it may have no end, or no beginning
+            raise ModelError("this is no regular file", place=place, remedy="give a .toml file.")
         size = path.stat().st_size
         if size > MAX_BYTES:
             remedy = "put tables into CSV files beside the model."

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 from dataclasses import asdict
 from os import PathLike
 from typing import IO, TYPE_CHECKING, Any
@@ -19,6 +18,8 @@ import numpy as np
 from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import path_text, whole_file
+from hybridsim.solution.archive_checks import check_checkpoint, check_events, check_header, check_task
+from hybridsim.solution.array_file import open_regular, read_arrays
 
 if TYPE_CHECKING:
     from hybridsim.engine.checkpoint import Checkpoint
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 FORMAT, VERSION = "hybridsim solution", 4
 _HEADER, _SEAL = "header", "digest"
 _REMEDY = "give a file that sol.save(...) has written"
+_FAULTS = (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError)
 
 
 def save(solution: Solution, path: str | PathLike[str]) -> None:
@@ -140,28 +142,24 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     'finished'
     """
     name = path_text(path)
-    try:
-        with open(name, "rb") as file:
+    with open_regular(name, _REMEDY) as file:
+        try:
             return _read(file, name)
-    except OSError as error:
-        raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=_REMEDY) from error
+        except OSError as error:
+            raise UsageError(f"{name} cannot be read: {error.strerror or error}", remedy=_REMEDY) from error
 
 
 def _read(file: IO[bytes], name: str) -> Solution:
     try:
-        if not zipfile.is_zipfile(file):
-            raise ValueError("it is no archive of arrays")
-        file.seek(0)
-        with np.load(file, allow_pickle=False) as stored:
-            if _HEADER not in stored.files:
-                raise ValueError("its arrays are others, and it has no header")
-            text = bytes(_array(stored, _HEADER)).decode()
-            header = json.loads(text)
-            if header["format"] != FORMAT:
-                raise ValueError(f"its format is {header['format']!r}")
-            arrays = {key: _array(stored, key) for key in header.get("arrays", ())}
-            seal = bytes(stored[_SEAL]).decode() if _SEAL in stored.files else ""
-    except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        arrays = read_arrays(file)
+        if _HEADER not in arrays:
+            raise ValueError("its arrays are others, and it has no header")
+        text = arrays.pop(_HEADER).tobytes().decode()
+        seal = arrays.pop(_SEAL, np.zeros(0)).tobytes().decode()
+        header = json.loads(text)
+        if not isinstance(header, dict) or header.get("format") != FORMAT:
+            raise ValueError("its header is another")
+    except (ValueError, RecursionError) as error:
         raise UsageError(f"{name} holds no solution: {error}", remedy=_REMEDY) from error
     if header.get("version") != VERSION:
         raise UsageError(
@@ -173,19 +171,10 @@ def _read(file: IO[bytes], name: str) -> Solution:
         raise UsageError(f"{name} is damaged: it was changed after it was written", remedy=_REMEDY)
     try:
         return _put_together(header, arrays)
-    except HybridsimError:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+    except HybridsimError as error:
+        raise UsageError(f"{name}: {error.message}", remedy=error.remedy or _REMEDY) from error
+    except _FAULTS as error:
         raise UsageError(f"{name} is damaged: {type(error).__name__}: {error}", remedy=_REMEDY) from error
-
-
-def _array(stored: Any, key: str) -> np.ndarray:
-    """One array of a file; one of Python objects is none of ours, and is not unpickled."""
-    try:
-        array: np.ndarray = stored[key]
-    except ValueError as error:
-        raise ValueError(f"its array '{key}' cannot be read as numbers") from error
-    return array
 
 
 def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solution:
@@ -197,11 +186,13 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
     from hybridsim.engine.trajectory import Trajectory
     from hybridsim.solution.solution import Solution
 
+    check_header(header)
     run = _run(header, arrays)
     trajectory = Trajectory(run.system, run.task.keep)
     stored = ((kind, _below(arrays, f"segments/{k}/")) for k, kind in enumerate(header["kinds"]))
     trajectory.segments.blocks = put_together(run.system, stored)
     events = _below(arrays, "events/")
+    check_events(events, header["hidden"], run.system)
     found = OccurrenceList()
     for k, (kind, component, guard, source, target) in enumerate(events["words"].tolist()):
         instant, direction = Instant(*events["instants"][k].tolist()), int(events["directions"][k])
@@ -216,7 +207,9 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
     trajectory.taken_over = taken_over and (str(taken_over[0]), float(taken_over[1]))
     trajectory.warnings, trajectory.warnings_there = header["warnings"], header["warnings_there"]
     if "checkpoint" in header:
-        trajectory.checkpoint = _checkpoint(header["checkpoint"], arrays)
+        noted, span = header["checkpoint"], (run.task.t0, run.task.t1)
+        check_checkpoint(noted, _below(arrays, "checkpoint/"), run.system, span)
+        trajectory.checkpoint = _checkpoint(noted, arrays)
     return Solution(run, trajectory, *header["cost"])
 
 
@@ -232,6 +225,7 @@ def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
 
     model = Model.from_toml(header["model"])
     system = system_of(model)
+    check_task(header, arrays, system)
     tolerances = Tolerances(atol=arrays["atol"], **header["tolerances"])
     (t0, t1), keep = header["span"], Keep(*header["keep"])
     successor = successor_of(header["method"]["name"], system) if header["reason"] else None

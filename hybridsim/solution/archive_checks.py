@@ -1,0 +1,218 @@
+"""What the header and the arrays of a saved solution may be, given its model: anything else is refused by name."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.engine.array_forms import (
+    Form,
+    check_count,
+    check_finite,
+    check_forms,
+    check_instant,
+    check_modes,
+    check_number,
+    check_range,
+)
+from hybridsim.engine.jets import ORDER
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system import System
+
+Header = dict[str, Any]
+Arrays = dict[str, np.ndarray]
+
+_TASK: dict[str, Form] = {
+    "x0": (float, ("n",)),
+    "z0": (np.int64, ("C",)),
+    "discrete": (float, ("D",)),
+    "atol": (float, ("n",)),
+}
+# of the places that the two loops note; see `hybridsim.engine.outcome` and `hybridsim.integrators.fixed_step_run`
+_AFTER_EVENT: dict[str, Form] = {
+    "x": (float, ("n",)),
+    "p": (float, ("P",)),
+    "z": (np.int64, ("C",)),
+    "sides": (np.int64, ("G",)),
+    "orders": (np.int64, ("G",)),
+    "monitor_sides": (np.int64, ("M",)),
+    "monitor_orders": (np.int64, ("M",)),
+    "x_error": (float, ("n",)),
+    "guard_floors": (float, ("G",)),
+    "monitor_floors": (float, ("M",)),
+    "continuous": (bool, ()),
+    "step_size": (float, ()),
+}
+_AFTER_STEPS: dict[str, Form] = {
+    "x": (float, ("n",)),
+    "z": (np.int64, ("C",)),
+    "discrete": (float, ("D",)),
+    "scale": (float, ("n",)),
+    "fresh": (bool, ("M",)),
+    "turned": (bool, ()),
+}
+_MOST_INTERVALS = 64  # more than are ever remembered of the pace of a component
+_NOBODY = -1  # as the component of a pace: resets of monitors
+_TEXTS = ("status", "message", "reason")
+
+
+def mode_counts(system: System) -> list[int]:
+    """How many modes each component has."""
+    return [len(a.modes) for a in system.automata]
+
+
+def sizes_of(system: System) -> dict[str, int]:
+    """The lengths of arrays that a system decides."""
+    return {
+        "n": system.n,
+        "C": len(system.automata),
+        "P": system.layout.size,
+        "D": system.layout.discrete,
+        "G": system.guard_count,
+        "M": len(system.monitor_names),
+    }
+
+
+def check_header(header: Header) -> None:
+    """Refuse a header whose entries are not of the kinds that they have."""
+    for name in _TEXTS:
+        if not isinstance(header[name], str):
+            raise ValueError(f"its {name} is {header[name]!r}")
+    for name in ("warnings", "warnings_there"):
+        entries = header[name]
+        if not isinstance(entries, dict):
+            raise ValueError(f"its {name} are {entries!r}")
+        for count in entries.values():
+            check_count(f"a count of its {name}", count)
+    for name in ("counters", "method", "tolerances"):
+        if not isinstance(header[name], dict):
+            raise ValueError(f"its {name} are no table")
+    for name, value in header["counters"].items():
+        check_number(f"its count '{name}'", value, 0.0)
+    if not (isinstance(header["cost"], list) and len(header["cost"]) == 2):
+        raise ValueError("its cost is no pair of numbers")
+    for value in header["cost"]:
+        check_number("a part of its cost", value, 0.0)
+    taken_over = header.get("taken_over")
+    if taken_over is not None:
+        if not (isinstance(taken_over, list) and len(taken_over) == 2 and isinstance(taken_over[0], str)):
+            raise ValueError(f"the integrator that took over is {taken_over!r}")
+        check_number("the time at which another integrator took over", taken_over[1])
+    kinds = header["kinds"]
+    if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
+        raise ValueError("its kinds of blocks are no texts")
+    if header["save"] not in ("all", "events", "last-period", "nothing"):
+        check_number("what it keeps", header["save"], 0.0)
+    keep = header["keep"]
+    if not (isinstance(keep, list) and len(keep) == 2):
+        raise ValueError("how much it keeps is no pair")
+    for value in keep:
+        if value is not None:
+            check_number("how much it keeps", value, 0.0, is_finite=False)
+
+
+def check_task(header: Header, arrays: Arrays, system: System) -> None:
+    """Refuse a span, tolerances or a start that `simulate` would refuse."""
+    arguments.time_span(header["span"])
+    tolerances = header["tolerances"]
+    arguments.relative_tolerance(check_number("rtol", tolerances["rtol"]))
+    arguments.step_bound(check_number("max_step", tolerances["max_step"], is_finite=False), "max_step")
+    if tolerances["first_step"] is not None:
+        arguments.step_bound(check_number("first_step", tolerances["first_step"]), "first_step")
+    check_forms("the start", arrays, _TASK, sizes_of(system))
+    check_finite("the start", arrays["x0"], arrays["discrete"], arrays["atol"])
+    check_range("atol", arrays["atol"], 0.0, math.inf)
+    check_modes("the start", arrays["z0"], mode_counts(system), lowest=-1)
+    if "grid" in arrays:
+        check_forms("the grid", arrays, {"grid": (float, ("grid",))}, {})
+        check_finite("a time of the grid", arrays["grid"])
+
+
+def check_events(events: Arrays, hidden: object, system: System) -> None:
+    """Refuse events of components and modes that the model does not have."""
+    lengths: dict[str, Form] = {
+        "instants": (float, ("E", 2)),
+        "directions": (np.int64, ("E",)),
+        "x_minus": (float, ("E", "n")),
+        "x_plus": (float, ("E", "n")),
+    }
+    known = check_forms("the events", events, lengths, sizes_of(system))
+    words = events.get("words")
+    if words is None or words.dtype.kind != "U" or words.shape != (known["E"], 5):
+        raise ValueError("the words of the events are not those of its events")
+    check_count("the number of events that are not shown", hidden, known["E"])
+    check_finite("the time of an event", events["instants"])
+    check_range("the direction of an event", events["directions"], -1, 1)
+    modes = {a.name: {*a.modes} for a in system.automata}
+    kinds = {a.name: {a.kind, "near-grazing"} for a in system.automata}
+    for monitor in system.monitor_names:
+        kinds.setdefault(monitor, set()).add("monitor")
+    for schedule in system.model.schedules:
+        kinds.setdefault(schedule.name, set()).add("scheduled")
+    for kind, component, _, source, target in {tuple(row) for row in words.tolist()}:
+        if kind not in kinds.get(component, ()):
+            raise ValueError(f"there is no {kind} of {component!r} in the model")
+        if component in modes and kind != "monitor" and not {source, target} <= modes[component]:
+            raise ValueError(f"{component} has no mode {source!r} or {target!r}")
+
+
+def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple[float, float]) -> None:
+    """Refuse a place to go on from that no run of the system can have noted."""
+    high, low = check_instant("the place where it goes on", header["instant"])
+    if not min(span) <= high + low <= max(span):
+        raise ValueError("the place where it goes on is not within its span")
+    if header["settled"] is not None:
+        check_instant("what is settled", header["settled"])
+    for name in ("segments", "occurrences"):
+        check_count(f"the number of {name} since", header[name])
+    if not isinstance(header["paces"], list):
+        raise ValueError("its paces are no rows")
+    for row in header["paces"]:
+        _check_pace(row, len(system.automata))
+    if not isinstance(header["names"], list) or sorted(map(str, header["names"])) != sorted(arrays):
+        raise ValueError("the names of the place where it goes on are not those of its arrays")
+    sizes = sizes_of(system)
+    if set(arrays) >= set(_AFTER_STEPS):
+        check_forms("the place where it goes on", arrays, _AFTER_STEPS, sizes)
+        check_finite("the place where it goes on", arrays["x"], arrays["discrete"], arrays["scale"])
+    else:
+        check_forms("the place where it goes on", arrays, _AFTER_EVENT, sizes)
+        check_finite("the place where it goes on", arrays["x"])
+        for name in ("x_error", "guard_floors", "monitor_floors"):
+            check_range(f"{name} of the place where it goes on", arrays[name], 0.0, math.inf)
+        for name in ("sides", "monitor_sides"):
+            check_range(f"{name} of the place where it goes on", arrays[name], -1, 1)
+        for name in ("orders", "monitor_orders"):
+            check_range(f"{name} of the place where it goes on", arrays[name], 0, ORDER + 1)
+        step = float(arrays["step_size"])
+        if not (math.isnan(step) or 0.0 < step < math.inf):
+            raise ValueError(f"the step to go on with is {step!r}")
+        if "place" in arrays:
+            check_forms("the place where it goes on", arrays, {"place": (float, ("numbers",))}, {})
+    check_modes("the place where it goes on", arrays["z"], mode_counts(system))
+
+
+def _check_pace(row: object, components: int) -> None:
+    what = "the pace of a component"
+    if not (isinstance(row, list) and len(row) == 2 and isinstance(row[1], list) and len(row[1]) == 5):
+        raise ValueError(f"{what} is {row!r}")
+    component, (last, intervals, longest, forecast, steadiest) = row
+    if type(component) is not int or not _NOBODY <= component < components:
+        raise ValueError(f"{what} is of {component!r}")
+    if last is not None:
+        check_instant(what, last)
+    if not isinstance(intervals, list) or len(intervals) > _MOST_INTERVALS:
+        raise ValueError(f"{what} has the intervals {intervals!r}")
+    for value in (*intervals, longest):
+        check_number(what, value, 0.0)
+    for values, count in ((forecast, 2), (steadiest, 3)):
+        if values is None:
+            continue
+        if not isinstance(values, list) or len(values) != count:
+            raise ValueError(f"{what} is {values!r}")
+        for value in values:
+            check_number(what, value, is_finite=False)

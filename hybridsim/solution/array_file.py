@@ -1,0 +1,101 @@
+"""Reads files of arrays that anybody may have made: with no more memory and time than the size of the file allows.
+
+The file is a zip of NumPy arrays that are not compressed (`numpy.savez`). A compressed member could grow without end as
+it is read, and an array may say that it has a shape of terabytes. Both are refused before memory is taken.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import stat
+import tokenize
+import zipfile
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from hybridsim.errors import UsageError
+
+_KINDS = "fiucbU"  # of numbers and texts; Python objects and records are none of ours
+_NAMES_IN_UTF8 = 0x800  # the one flag that a member may have
+_FAULTS = (
+    ValueError, TypeError, KeyError, SyntaxError, EOFError, OverflowError, RecursionError, NotImplementedError,
+    zipfile.BadZipFile, tokenize.TokenError,
+)  # fmt: skip
+
+
+def open_regular(name: str, remedy: str) -> IO[bytes]:
+    """Open a file to read; a device or a pipe, which may have no end, is refused.
+
+    Raises
+    ------
+    UsageError
+        Where it cannot be read, with the reason.
+    """
+    try:
+        if not stat.S_ISREG(os.stat(name).st_mode):
+            raise UsageError(f"{name} cannot be read: it is no regular file", remedy=remedy)
+        return open(name, "rb")
+    except (OSError, ValueError) as fault:
+        if isinstance(fault, UsageError):
+            raise
+        why = getattr(fault, "strerror", None) or fault
+        raise UsageError(f"{name} cannot be read: {why}", remedy=remedy) from fault
+
+
+def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:
+    """The arrays of a file by name.
+
+    Raises
+    ------
+    ValueError
+        For what is no such file.
+    """
+    try:
+        if not zipfile.is_zipfile(file):
+            raise ValueError("it is no archive of arrays")
+        size = file.seek(0, os.SEEK_END)
+        with zipfile.ZipFile(file) as archive:
+            members = archive.infolist()
+            _check_members(members, size)
+            named = ((member.filename.removesuffix(".npy"), member) for member in members)
+            return {name: _array(archive.read(member), name) for name, member in named}
+    except _FAULTS as fault:
+        raise ValueError(str(fault)) from fault
+
+
+def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
+    """Refuse members that are not what `numpy.savez` writes into a file of this size."""
+    names = {member.filename for member in members}
+    if len(names) != len(members) or len({name.removesuffix(".npy") for name in names}) != len(names):
+        raise ValueError("two of its arrays have one name")
+    for member in members:
+        is_plain = member.compress_type == zipfile.ZIP_STORED and member.file_size == member.compress_size
+        if not is_plain or member.flag_bits & ~_NAMES_IN_UTF8:
+            raise ValueError(f"its array '{member.filename}' is compressed, encrypted or of another kind")
+    if sum(member.file_size for member in members) > size:
+        raise ValueError("its arrays are larger than the file")
+
+
+def _array(content: bytes, name: str) -> np.ndarray:
+    """One array; its shape is that of the bytes that are there."""
+    from io import BytesIO
+
+    head = BytesIO(content)
+    version = npy.read_magic(head)
+    if version == (1, 0):
+        shape, is_fortran, dtype = npy.read_array_header_1_0(head)
+    elif version == (2, 0):
+        shape, is_fortran, dtype = npy.read_array_header_2_0(head)
+    else:
+        raise ValueError(f"its array '{name}' is of version {version}")
+    if dtype.hasobject or dtype.kind not in _KINDS or not dtype.isnative:
+        raise ValueError(f"its array '{name}' cannot be read as numbers")
+    start = head.tell()
+    is_shape = len(shape) <= 5 and all(type(n) is int and 0 <= n <= len(content) for n in shape)
+    if not is_shape or math.prod(shape) * dtype.itemsize != len(content) - start:
+        raise ValueError(f"its array '{name}' has a shape that is not that of its content")
+    found = np.ndarray(shape, dtype, bytearray(content[start:]), order="F" if is_fortran else "C")
+    return np.ascontiguousarray(found).reshape(shape)
