@@ -47,3 +47,23 @@ def test_a_slow_decay_beside_a_fast_one_is_no_rest_too_soon() -> None:
     states = [hs.State("x", 0.0, "1e3*(y - x)"), hs.State("y", 1.0, "w"), hs.State("w", 0.0, "-1e-2*y")]
     found = hs.steady_state(hs.Model("stiff", states=states), max_periods=64)
     assert found.kind != "equilibrium"
+
+
+def test_two_forcings_without_a_common_period_may_drive_a_motion_without_bound() -> None:
+    found = hs.steady_state(
+        hs.Model("growing", states=[hs.State("x", 1.0, "x + sin(t) + sin(sqrt(2)*t)")]), max_periods=4096
+    )
+    assert found.kind == "not settled" and "grows without bound" in found.message
+
+
+def test_an_interruption_ends_the_search_and_not_one_run_of_it() -> None:
+    calls = []
+
+    def interrupted(share: float) -> None:
+        calls.append(share)
+        raise KeyboardInterrupt
+
+    states = [hs.State("x", 0.5, "v"), hs.State("v", 0.0, "(1 - x**2)*v - x + 0.1*v**3*(1 - v**2)")]
+    with pytest.raises(KeyboardInterrupt):
+        hs.steady_state(hs.Model("cycle", states=states), progress=interrupted, integrator="taylor")
+    assert len(calls) == 1

@@ -140,6 +140,8 @@ class Motion:
                 progress=self.progress,
                 **(given | self.options | options),
             )
+        if solution.status == "interrupted":  # half of a search is no result
+            raise KeyboardInterrupt
         if solution.status == "limit" and "limits" in options:
             raise CostsMore(solution.t_end - begin)
         if solution.status != "finished":

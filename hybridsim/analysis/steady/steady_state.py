@@ -150,15 +150,15 @@ def steady_state(
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise UsageError(f"{name} is {count!r}", remedy="give a whole number of periods")
-    if period is None and (periods := all_periods(system)):
-        motion.progress = told
-        found = follow(motion, max(periods), max(settle, _FEWEST), max_periods)
-        kind = EQUILIBRIUM if found.rests else QUASI if found.dies_out else UNSETTLED
-        return _found(motion, kind, found.rests, periods=found.periods, message=found.message)
     search = _Search(motion, period, tol, settle, max_periods)
-    if told is not None:
-        motion.progress = lambda _: told(search.share)
     try:
+        if period is None and (periods := all_periods(system)):
+            motion.progress = told
+            found = follow(motion, max(periods), max(settle, _FEWEST), max_periods)
+            kind = EQUILIBRIUM if found.rests else QUASI if found.dies_out else UNSETTLED
+            return _found(motion, kind, found.rests, periods=found.periods, message=found.message)
+        if told is not None:
+            motion.progress = lambda _: told(search.share)
         return search.run()
     except GrowsWithoutBound as fault:
         return _found(
