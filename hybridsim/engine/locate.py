@@ -131,6 +131,7 @@ class Locator:
                         self._rounding(step, int(g), False),
                         self._before(step, int(g), False),
                         floor,
+                        step.s0 == 0.0,
                     )
                 except StepFailure as failure:
                     raise StepFailure(f"{flow.system.guard_title(int(g), flow.z)}: {failure}") from None

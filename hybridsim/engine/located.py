@@ -118,6 +118,11 @@ def located(
         at, series = (wide, known) if is_met else (at, series)
     fired = coincident(system, origin, at, arrival.fired, series)
     sides = _before_instant(series, arrival, segment)
+    segment.grazings = [
+        grazing
+        for grazing in segment.grazings
+        if grazing[0] not in fired or not _is_near(series, arrival, *grazing[:2])
+    ]
     stopping, monitors = set(arrival.stopping), system.model.monitors
     for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
         if monitors[k].action != "reset" or sides[k] == 0:
@@ -129,6 +134,11 @@ def located(
     if fired or resetting or is_met:  # what ends a run by itself is judged when all of this has been settled
         stopping = resetting
     return Located(at, fired, tuple(sorted(stopping)), sides, is_met)
+
+
+def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
+    """Whether what was taken for a touch of a guard is its zero at the event itself."""
+    return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
 
 
 def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:

@@ -258,6 +258,7 @@ def find_roots(
     rounding: Callable[[], float],
     before: Callable[[float], float],
     floor: float = 0.0,
+    begins: bool = False,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
     """All changes of side of one guard over a step, theta in (0, 1].
 
@@ -270,6 +271,7 @@ def find_roots(
     before : bound of what errors at the start of the step make of a value at theta; likewise
     floor : what the location of the last event leaves uncertain, where the function starts from zero; values below it
         are not looked into
+    begins : whether a segment begins here: what is within rounding of zero leaves it then and does not touch it
     stop_at_first : direction after whose first crossing the search may end (0: find all)
 
     Returns the crossings and grazings in order, the sign at the end of the step (0 where it is within the bound), and
@@ -282,6 +284,12 @@ def find_roots(
     low, pieces, undefined = math.inf, 0, math.inf
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
     touching = _TOUCHING * np.abs(first[np.isfinite(first)]).max(initial=0.0)
+
+    def has_left(theta: float) -> bool:
+        """Whether what starts from zero was beyond rounding before theta: else it is that very zero still."""
+        bound = max(floor, _ROUNDINGS_BEFORE * rounding(), before(theta))
+        return bool((side * sample(theta * POINTS) > bound).any())
+
     while waiting:
         a, b, samples, depth = waiting.pop()
         if samples is None:
@@ -331,7 +339,9 @@ def find_roots(
                 last = int(sign)
                 if stop_at_first == sign:
                     return crossings, grazings, last, undefined
-            elif open_from > 0.0 or (open_from == 0.0 and order == 0):
+            elif (open_from > 0.0 and (order == 0 or has_left(open_from))) or (
+                open_from == 0.0 and order == 0 and not begins
+            ):
                 grazings.append(Grazing(0.5 * (open_from + x), low))
             open_from, low = -1.0, math.inf
         if b == 1.0 and count and rows[count - 1, 2] == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 from fractions import Fraction
@@ -166,3 +167,70 @@ def test_the_error_of_an_expression_is_within_its_bound(
     expr, given = parse(text), dict(zip("ab", values, strict=True))
     off = abs(float(exact(*map(Fraction, values)) - Fraction(evaluate(expr, given))))
     assert off <= rounding_of(expr, given) <= off + 1e-7 * abs(evaluate(expr, given)) * 2.0**-20
+
+
+COPIED = """
+[states]
+x = {{ start = {start}, der = "v" }}
+v = {{ start = 0, der = "{push} - 3*x" }}
+y = {{ start = 0, der = "-1" }}
+[components.s.modes.before]
+initial = true
+guards.g = {{ expr = "{c} - x", then = {{ to = "after", reset = {{ {reset} }} }} }}
+[components.s.modes.after]
+guards.h = {{ expr = "{guard}", then = "end" }}
+[components.s.modes.end]
+"""
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853", "tsit5", "cvode-bdf", "scipy-dop853"])
+@pytest.mark.parametrize(
+    ("reset", "guard"),
+    [
+        ('y = "x"', "{c} - y"),
+        ('y = "x + 1"', "{c} - (y - 1)"),
+        ('y = "2*x"', "1 - y/(2*{c})"),
+        ('y = "x - {c}"', "-y"),
+        ('y = "x", x = "y"', "1 - y/{c}"),
+        ('y = "1000*(x - {c})"', "-y"),
+        ('y = "+= x - y"', "{c} - y"),
+    ],
+)
+def test_a_copy_of_what_was_located_carries_its_error(integrator: str, reset: str, guard: str) -> None:
+    # y becomes what x is at the event, on the zero of the guard of the next mode, and falls away from it
+    draw = random.Random(5)
+    for _ in range(8):
+        c = round(draw.uniform(0.2, 2), 3)
+        start, push = round(c - draw.uniform(0.1, 30), 2), round(draw.uniform(20, 100), 2)
+        put_in = {"c": repr(c)}
+        text = COPIED.format(
+            start=start, push=push, reset=reset.format(**put_in), guard=guard.format(**put_in), **put_in
+        )
+        sol = hs.simulate(model(text), (0, 3), integrator=integrator)
+        assert sol.status == "finished" and not sol.warnings, text
+        assert [(event.kind, event.guard) for event in sol.events] == [("transition", "g")], text
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853"])
+@pytest.mark.parametrize(
+    "held",
+    [
+        "[discrete]\nls = 0\nlc = 10\n",
+        'ls = { start = 0, der = "0" }\nlc = { start = 10, der = "0" }\n',
+    ],
+)
+def test_a_touch_beside_an_event_tells_its_time_by_its_curvature(integrator: str, held: str) -> None:
+    # c comes back to 10, three above its last sample, and turns: a touch at the instant of a sample of s
+    text = '[states]\ns = { start = 0, der = "20*pi*cos(2*pi*t)" }\nc = { start = 10, der = "-20*pi*sin(2*pi*t)" }\n'
+    text += held
+    for name, value, last in (("one", "s", "ls"), ("two", "c", "lc")):
+        text += f'[components.{name}.modes.on]\nguards.g = {{ expr = "3 - abs({value} - {last})", '
+        text += f'then = {{ to = "on", reset = {{ {last} = "{value}" }} }} }}\n'
+    sol = hs.simulate(model(text), (0, 6), integrator=integrator)
+    assert sol.status == "finished"
+    # s is sampled at 3, 6, 9, 6, 3, 0, -3, ... whatever the touches of c are taken for
+    a, b, c = (math.asin(0.1 * k) / math.tau for k in (3, 6, 9))
+    half = [a, b, c, 0.5 - b, 0.5 - a, 0.5]
+    expected = [0.5 * k + t for k in range(12) for t in half]
+    sampled = [event.t for event in sol.events if event.kind == "transition" and event.component == "one"]
+    assert sampled[:71] == pytest.approx(expected[:71], rel=1e-9)
