@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
 from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.scipy_native import NativeStepper
 from hybridsim.integrators.scipy_stepper import SolverStepper, series_step
 
@@ -39,6 +40,7 @@ class ScipyIntegrator(Integrator):
 
     solver: ClassVar[str]
     implicit: ClassVar[bool] = False
+    is_multistep: ClassVar[bool] = False  # it begins at order one
     starts_blind: ClassVar[bool] = False  # a first step that is far too long makes it give up
 
     @property
@@ -63,7 +65,29 @@ class ScipyIntegrator(Integrator):
             return NativeStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step, watch)
         if self.starts_blind:
             first_step = min(first_step or np.inf, series_step(flow, x0, s_bound, tolerances))
+        if self.is_multistep:
+            return with_first_steps(
+                flow,
+                x0,
+                s_bound,
+                tolerances,
+                watch,
+                lambda s, x: SolverStepper(
+                    solver,
+                    self.implicit,
+                    flow,
+                    x,
+                    s_bound,
+                    tolerances,
+                    self._first(first_step, s_bound - s),
+                    s,
+                ),
+            )
         return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
+
+    def _first(self, first_step: float | None, left: float) -> float | None:
+        """A first step that is no longer than what is left of the segment."""
+        return None if first_step is None else min(first_step, abs(left))
 
 
 @dataclass(frozen=True)
@@ -145,6 +169,7 @@ class ScipyBDF(ScipyIntegrator):
     lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "BDF"
+    is_multistep: ClassVar[bool] = True
     implicit: ClassVar[bool] = True
 
 
@@ -164,5 +189,6 @@ class ScipyLSODA(ScipyIntegrator):
     lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"
+    is_multistep: ClassVar[bool] = True
     implicit: ClassVar[bool] = True
     starts_blind: ClassVar[bool] = True

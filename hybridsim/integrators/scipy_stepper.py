@@ -29,11 +29,12 @@ class SolverStepper:
         bound: float,
         tolerances: Tolerances,
         first_step: float | None,
+        origin: float = 0.0,
     ) -> None:
         self.solver_class, self.implicit = solver_class, implicit
         self.flow, self.tolerances = flow, tolerances
-        self.bound, self.reached, self.last_step, self.met_no_number = bound, (0.0, x0), first_step, False
-        self.solver = self._solver(0.0, x0, bound, first_step)
+        self.bound, self.reached, self.last_step, self.met_no_number = bound, (origin, x0), first_step, False
+        self.solver = self._solver(origin, x0, bound, first_step)
 
     def _solver(self, s0: float, x0: np.ndarray, bound: float, first_step: float | None) -> Any:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):

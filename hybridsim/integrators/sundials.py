@@ -12,6 +12,7 @@ from hybridsim.engine.hermite import hermite
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.stepping import Dense, Flow, Root, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.past_steps import MOST, converges, through
 
 _MISSES = (
@@ -46,6 +47,7 @@ class CvodeStepper:
         tolerances: Tolerances,
         first_step: float | None,
         watch: Watch,
+        origin: tuple[float, np.ndarray] | None = None,
     ) -> None:
         from sksundae.cvode import CVODE
 
@@ -75,9 +77,10 @@ class CvodeStepper:
             max_num_steps=_MAX_STEPS,
             **options,
         )
-        self.solver.init_step(0.0, np.concatenate([x0, np.sin(self.phases)]))
-        self.s, self.x = 0.0, x0
-        self.past_times, self.past_states = [0.0], [x0]
+        self.s, self.x = (0.0, x0) if origin is None else origin
+        angles = np.sin(self.phases + self.rates * self.s)
+        self.solver.init_step(self.s, np.concatenate([self.x, angles]))
+        self.past_times, self.past_states = [self.s], [self.x]
 
     def _rhs(self) -> Callable[[float, np.ndarray, np.ndarray], None]:
         flow, n, rates, phases = self.flow, self.flow.n, self.rates, self.phases
@@ -210,7 +213,14 @@ class CvodeBDF(Integrator):
         watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
-        return CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, watch)
+        return with_first_steps(
+            flow,
+            x0,
+            s_bound,
+            tolerances,
+            watch,
+            lambda s, x: CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, watch, (s, x)),
+        )
 
 
 @dataclass(frozen=True)
@@ -243,4 +253,11 @@ class CvodeAdams(Integrator):
         watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
-        return CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, watch)
+        return with_first_steps(
+            flow,
+            x0,
+            s_bound,
+            tolerances,
+            watch,
+            lambda s, x: CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, watch, (s, x)),
+        )

@@ -12,7 +12,7 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """All of them."""
-    return _floor(), _touching(), _series(), _painleve()
+    return _floor(), _touching(), _series(), _painleve(), _stop_off_zero(), _moving_floor()
 
 
 def _floor() -> Scene:
@@ -78,4 +78,47 @@ def _painleve() -> Scene:
             checks=(("", says("p: closed", "p: open")),),
         ),
         needs("impacts", "contacts", "located"),
+    )
+
+
+def _stop_off_zero() -> Scene:
+    """The gap opens at t = pi/6, where the force is zero, and grows with the cube of time."""
+    began, end = math.pi / 6, 3.0
+    left = end - began
+    v = math.cos(began) - math.cos(end) - 0.5 * left
+    x = 0.5 + math.cos(began) * left - (math.sin(end) - math.sin(began)) - 0.25 * left**2
+    return Scene(
+        "stop-off-zero",
+        "stop-off-zero",
+        (0.0, end),
+        Truth(((began, "p:open"),), ((END, (x, v)),)),
+        needs("impacts", "located"),
+        start_is_event=False,
+    )
+
+
+def _moving_floor() -> Scene:
+    """The floor falls away where its acceleration is that of gravity; between, the body flies."""
+    g, size, turns, end = 9.81, 0.02, 30.0, 0.25
+    phase = math.asin(g / (size * turns**2))
+    first, again = phase / turns, (phase + 2 * math.pi) / turns
+    height, speed = size * math.sin(phase), size * turns * math.cos(phase)
+
+    def gap(t: float) -> float:
+        return height + speed * (t - first) - g * (t - first) ** 2 / 2 - size * math.sin(turns * t)
+
+    lands = float(brentq(gap, 0.1, again, xtol=1e-15))
+    left = end - again
+    return Scene(
+        "moving-floor",
+        "moving-floor",
+        (0.0, end),
+        Truth(
+            ((first, "p:open"), (lands, "p:closed"), (again, "p:open")),
+            ((END, (height + speed * left - g * left**2 / 2, speed - g * left)),),
+        ),
+        needs("impacts", "located"),
+        unit=2 * math.pi / turns,
+        start_is_event=False,
+        speed=speed,
     )
