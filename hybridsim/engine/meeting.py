@@ -152,7 +152,31 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
 
 def words_on_cascade(settling: Settling) -> str:
     """What to do about transitions that follow each other without end, where that can be told; else empty."""
-    return _words_on_opposed_modes(settling) or _words_on_negative_guard(settling)
+    for words in (_words_on_opposed_modes, _words_on_negative_guard, _words_on_drift):
+        if found := words(settling):
+            return found
+    return ""
+
+
+def _words_on_drift(settling: Settling) -> str:
+    """Of a guard that is a little below zero where a transition leads back to its mode."""
+    system, last = settling.system, settling.changes[-2:]
+    if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
+        return ""
+    automaton = system.automata[last[0].component]
+    for change in last:
+        if change.guard not in automaton.guard_names[change.source]:
+            continue
+        number = automaton.guards[change.source][automaton.guard_names[change.source].index(change.guard)]
+        z = settling.with_modes([change.component], np.array([change.source]))
+        value = float(settling.series_of(z).guards[number, 0])
+        if value < 0.0:
+            return (
+                f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}: "
+                "if it should be zero there, the states have drifted by the errors of the integrator; let that "
+                "transition set what the guard depends on, or take a smaller rtol"
+            )
+    return ""
 
 
 def _words_on_negative_guard(settling: Settling) -> str:
