@@ -128,6 +128,8 @@ def command() -> NoReturn:
     The interpreter would first take apart all that it holds, compiled code among it, which takes a second or more after
     the last line. What is to be done at the exit is done; the memory goes back to the system as it is.
     """
+    # what SUNDIALS warns of while it runs is in the messages of runs, as far as it matters
+    os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
     code = main()
     atexit._run_exitfuncs()
     with suppress(OSError, ValueError):  # whoever read it went away

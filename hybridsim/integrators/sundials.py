@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +32,17 @@ _CLEAR = 8.0  # times its rounding: a guard that has grown to this has the sign 
 _SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
 
 
+@cache
+def _leave_stdout_alone() -> None:
+    """Have SUNDIALS write its warnings to standard error, unless somebody has chosen a place for them.
+
+    It writes to the standard output of C otherwise, among the data of whoever runs it. It reads these variables when a
+    solver is made; to redirect the descriptor around its calls would take away what other threads write meanwhile.
+    """
+    for level in ("WARNING", "INFO", "DEBUG"):
+        os.environ.setdefault(f"SUNLOGGER_{level}_FILENAME", "stderr")
+
+
 class CvodeStepper:
     """Steps CVODE through one segment.
 
@@ -51,6 +64,7 @@ class CvodeStepper:
     ) -> None:
         from sksundae.cvode import CVODE
 
+        _leave_stdout_alone()
         self.flow, self.bound, self.watch = flow, bound, watch
         self.kinds = [(int(g), False) for g in watch.guards]
         self.kinds += [(k, True) for k in range(len(watch.monitor_sides))]
