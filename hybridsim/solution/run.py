@@ -71,4 +71,6 @@ class Run:
             self.system.code.report(trajectory)
         for caution in jumps_of(self.model):
             trajectory.warnings[caution.sentence] = 1
+        if self.task.t0 == self.task.t1:
+            trajectory.warn(f"t_span begins and ends at {self.task.t0!r}: nothing was integrated")
         trajectory.close(self.task.keep)

@@ -103,6 +103,12 @@ def test_an_event_is_not_called_as_something_else(name: str) -> None:
         hs.Model("m", states=states, contacts=[contact], monitors=[monitor]).validate()
 
 
+def test_a_span_of_no_length_is_pointed_out() -> None:
+    sol = hs.simulate(hs.Model("m", states=[hs.State("x", 1, "-x")]), (1, 1))
+    assert sol.success
+    assert sol.warnings == ("t_span begins and ends at 1.0: nothing was integrated",)
+
+
 def test_the_imaginary_part_of_a_start_is_not_dropped() -> None:
     model = hs.Model("m", states=[hs.State("x", 1, "-x")])
     for x0 in ([1 + 1j], np.array([1 + 1j]), {"x": np.complex128(1 + 1j)}):
