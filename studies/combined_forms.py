@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "combined-forms.md"
 BY_HAND = "## What it found"
 PATIENCE = 120.0  # seconds without a result after which a run counts as one that hangs
-SHOWN = ("agrees", "names refused")
+QUIET = ("agrees", "names refused", "unclear", "cannot")
 
 
 def work(tasks: Any, results: Any, draws: int) -> None:
@@ -79,7 +79,7 @@ def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[di
             done.append(record)
             out.write(json.dumps(record) + "\n")
             out.flush()
-            if "kind" in record and record["kind"] not in SHOWN:
+            if "kind" in record and record["kind"] not in QUIET:
                 print(
                     *(record.get(k, "") for k in ("seed", "draw", "kind", "integrator", "status", "detail")),
                     flush=True,
@@ -163,7 +163,7 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     """The page of the results."""
     from reference.combined.compare import ALLOWED, POINTS
 
-    runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model")]
+    runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model", "unclear")]
     seeds = sorted({r["seed"] for r in done})
     out = HEAD.format(allowed=ALLOWED, points=POINTS)
     instants = sum(r.get("instants", 0) for r in runs)

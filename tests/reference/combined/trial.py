@@ -132,6 +132,9 @@ def single_runs(model: Abstract, seed: int, draws: int, first: int = 0) -> Itera
     for draw in range(first, draws):
         numbers = number_set(model, seed, draw)
         truth = judged(model, numbers)
+        if truth[2] < 1e-3 and truth[0].status not in ("nonunique", "inconsistent"):  # nothing is certain
+            yield {"seed": seed, "draw": draw, "kind": "unclear", "integrator": "", "detail": truth[0].status}
+            continue
         rng = random.Random(seed * 31 + draw)
         way = "resumed" if rng.random() < 0.1 and model.duration else "plain"
         for integrator in chosen(rng):
