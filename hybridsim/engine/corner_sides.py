@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.decide import side_after, side_before
+from hybridsim.engine.input_jumps import gaps_jump
 from hybridsim.engine.outcome import Change
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def take_corners(settling: Settling) -> bool:
                 settling.fired[zero[c]] = True
         settling.jumped = settling.jumped or not automaton.is_corner or automaton.is_step
     if changed:
+        settling.jumped = settling.jumped or gaps_jump(system, at, before, z)
         at.z = at.z.copy()
         at.z[changed] = z[changed]
     return bool(changed)
