@@ -14,13 +14,13 @@ from hybridsim.engine.kept_rates import kept_rates, refuse_changed_rates
 from hybridsim.engine.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.nonlinear import refuse_powers
 from hybridsim.engine.products import Products
-from hybridsim.engine.program import Assign, Item, Switch, ordered
+from hybridsim.engine.program import Assign, Item, Switch, changed, ordered
 from hybridsim.engine.program_names import declared_name, user
 from hybridsim.engine.second_order import Partner, attraction, partners
 from hybridsim.engine.ties import Tie, help_of_ties, ties, without_share
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.simplify import is_short, simplified, written_out
-from hybridsim.expr.symbolic import to_sympy
+from hybridsim.expr.symbolic import to_sympy, without_distributions
 from hybridsim.model.switching import ATTRACTION
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ class Lowering:
         program = Program(
             model,
             self.components,
-            ordered(items),
+            [changed(item, without_distributions) for item in ordered(items)],
             derivatives,
             [(c, f"surface_{c}") for c in surfaces],
             held.by_component(held.pins),

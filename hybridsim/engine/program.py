@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,14 @@ class Switch:
 
 
 Item = Assign | Switch
+
+
+def changed(item: Item, change: Callable[[Any], Any]) -> Item:
+    """An item with each of its expressions changed."""
+    if isinstance(item, Assign):
+        return Assign(item.name, change(item.expression))
+    branches = (tuple(Assign(a.name, change(a.expression)) for a in branch) for branch in item.branches)
+    return Switch(item.component, tuple(branches))
 
 
 def assigned(item: Item) -> set[str]:

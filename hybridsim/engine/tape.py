@@ -127,6 +127,8 @@ class TapeBuilder:
         self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
         """Whole and half powers as products of the base or its root, so that they have a value at 0 and below."""
+        import sympy as sp
+
         if _grows_without_bound(base, exponent):
             return self._products(self._over(base, known, rows), -int(exponent), known, rows)
         source = self._emit(base, known, rows)
@@ -134,11 +136,17 @@ class TapeBuilder:
         if twice.is_integer() and abs(twice) <= 2 * _MAX_INTEGER_POWER:
             n, odd = divmod(int(twice), 2)
             if odd:
-                n, source = int(twice), self._op(rows, SQRT, source)
+                n, root = int(twice), self._op(rows, SQRT, source)
+                source = (
+                    self._unless_zero(rows, root, source, self._constant(1.0)) if base.has(sp.Abs) else root
+                )
             power = self._products(source, abs(n), known, rows)
             return power if n > 0 else self._op(rows, DIV, self._constant(1.0), power)
         logarithm = self._op(rows, INTEGRAL, source, source, LOG)
-        power = self._op(rows, EXP, self._op(rows, MUL, self._emit(exponent, known, rows), logarithm))
+        number = self._emit(exponent, known, rows)
+        power = self._op(rows, EXP, self._op(rows, MUL, number, logarithm))
+        if base.has(sp.Abs):
+            power = self._unless_zero(rows, power, source, number)
         if (
             exponent.is_number
             or not {s.name for s in exponent.free_symbols} <= self.fixed
@@ -146,6 +154,12 @@ class TapeBuilder:
         ):
             return power
         return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
+
+    def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
+        """A power of what is zero at its corner: nothing there for a positive exponent, and without a series."""
+        nothing = self._constant(0.0)
+        at_zero = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
+        return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, at_zero)
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         """1/(c + d e^u) and 1/cosh(u), which are nothing where the exponential is infinite, by q = e^-|u|."""

@@ -88,9 +88,15 @@ def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
 
 def derivative(e: Any, symbol: Any) -> Any:
     """de/d(symbol) where it exists; at the corner of an absolute value, minimum or step the side of zero's right."""
-    slope = sympy.diff(e, symbol)
-    slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
-    return slope.replace(sympy.Heaviside, lambda a, *_: sympy.Piecewise((1, a >= 0), (0, True)))
+    return without_distributions(sympy.diff(e, symbol))
+
+
+def without_distributions(e: Any) -> Any:
+    """An expression with what SymPy makes of the derivatives of corners and jumps as a step, or as zero."""
+    if not e.has(sympy.DiracDelta, sympy.Heaviside):
+        return e
+    plain = e.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    return plain.replace(sympy.Heaviside, lambda a, *_: sympy.Piecewise((1, a >= 0), (0, True)))
 
 
 def _convert(node: ast.expr, symbols: Mapping[str, Any]) -> Any:

@@ -271,3 +271,33 @@ def test_a_product_of_signs_beside_a_root_comes_to_rest_on_its_surface(integrato
     (event,) = sol.events
     assert event.t == pytest.approx(2 * (1 - math.sqrt(0.2)), abs=1e-6)
     assert event.target == "sliding" and sol(4.0)[0] == 0.2
+
+
+@pytest.mark.parametrize("n", ["n", "1.5"])
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5", "rodas5p", "scipy-radau", "cvode-bdf"])
+def test_bouc_wen_with_a_fractional_power_from_rest(integrator: str, n: str) -> None:
+    """Against 28 digits of independent code; abs(z)**(n - 1) is zero at the start, and has no slope there."""
+    built = model(
+        ("u", 0.0, "v"),
+        ("v", 0.0, "3*sin(5*t) - 0.1*v - 2.5*u - 2.25*z"),
+        ("z", 0.0, f"10*(v - 0.5*abs(v)*abs(z)**({n} - 1)*z - 0.5*v*abs(z)**{n})"),
+        parameters={"n": 1.5},
+    )
+    sol = hs.simulate(built, (0.0, 10.0), integrator=integrator, rtol=1e-9)
+    assert sol.success and sol.warnings == ()
+    assert sol(10.0)[2] == pytest.approx(-0.88821757, abs=2e-7)
+
+
+@pytest.mark.parametrize("expr", ["max(x, y, 0.2)", "max(min(x, 1), -1)", "abs(abs(x) - 1)", "sign(x - 9)"])
+@pytest.mark.parametrize("where", ["velocity", "load"])
+def test_corners_that_are_differentiated(where: str, expr: str) -> None:
+    """In a velocity, or a load whose rate a law asks for: the run goes on, or is refused by name."""
+    velocity, load = (f"v - 0.1*({expr})", 1) if where == "velocity" else ("v", f"3 + ({expr})")
+    law = ("coulomb", {"mu": 0.3}) if where == "velocity" else ("dahl", {"mu": 0.3, "sigma": 10})
+    built = model(
+        ("x", 0.3, "v"), ("y", 0.4, "1"), ("v", 1.0, "-f"), contacts=[hs.Contact("f", velocity, load, *law)]
+    )
+    try:
+        assert hs.simulate(built, (0.0, 0.2), integrator="dop853").success
+    except hs.HybridsimError as refused:
+        assert expr in str(refused)
