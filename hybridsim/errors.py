@@ -6,6 +6,7 @@ import difflib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 # a word of a file, or a path, without an end to it: of more than 400 characters the first and last are shown
 _ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
@@ -202,6 +203,25 @@ class SimulationError(HybridsimError):
     ...     print("no equilibrium" in error.message)
     True
     """
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C, or KeyboardInterrupt from a function that is told of progress, in the middle of a run.
+
+    It ends the loop or the script that the run is in, as everywhere else.
+
+    Parameters
+    ----------
+    solution : Solution
+        What was computed by then; its ``resume()`` goes on.
+    """
+
+    def __init__(self, solution: Any) -> None:
+        super().__init__(solution)
+        self.solution = solution
+
+    def __str__(self) -> str:
+        return str(self.solution.message)
 
 
 def plain(text: str) -> str:

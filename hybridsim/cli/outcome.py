@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Container
+from collections.abc import Callable, Container
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from hybridsim.cli import options, values
 from hybridsim.cli.options import PICTURES
 from hybridsim.cli.output import complain, print_json, require_apart, require_writable
 from hybridsim.cli.session import Session
-from hybridsim.errors import SimulationError, UsageError
+from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
@@ -97,6 +97,15 @@ def limits(args: argparse.Namespace) -> dict[str, Any]:
             raise UsageError(f"--limit {name} is given twice", remedy="give one value")
         found[name] = values.option_value(text)
     return found
+
+
+def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
+    """The solution of a run, also where Ctrl-C ends it: what was computed by then."""
+    try:
+        return run()
+    except RunInterrupted as stopped:
+        found: Solution = stopped.solution
+        return found
 
 
 def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:

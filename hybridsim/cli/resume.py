@@ -45,5 +45,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     solution = hybridsim.load_solution(args.solution)
     t_end = None if args.t_end is None else values.end_time(solution.model, args.t_end)
     with Progress(session) as progress, session.stopping_gently():
-        solution = solution.resume(t_end, limits=outcome.limits(args), progress=progress)
-    return outcome.deliver(solution, args, session)
+        further = outcome.as_far_as_it_came(
+            lambda: solution.resume(t_end, limits=outcome.limits(args), progress=progress)
+        )
+    return outcome.deliver(further, args, session)

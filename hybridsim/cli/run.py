@@ -75,13 +75,15 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     for caution in cautions:  # now, and not after a run that may crawl
         complain(f"warning: {caution}")
     with Progress(session) as progress, session.stopping_gently():
-        solution = hybridsim.simulate(
-            model,
-            (0.0, t_end),
-            integrator=args.integrator,
-            limits=outcome.limits(args),
-            progress=progress,
-            **settings,
+        solution = outcome.as_far_as_it_came(
+            lambda: hybridsim.simulate(
+                model,
+                (0.0, t_end),
+                integrator=args.integrator,
+                limits=outcome.limits(args),
+                progress=progress,
+                **settings,
+            )
         )
     return outcome.deliver(solution, args, session, told=cautions)
 

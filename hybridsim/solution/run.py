@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.engine.at_once import AtOnce
 from hybridsim.engine.jit import seconds_compiling
 from hybridsim.engine.python_code import PythonCode
+from hybridsim.errors import RunInterrupted
 from hybridsim.model.hygiene import jumps_of
 from hybridsim.solution.solution import Solution
 
@@ -63,7 +64,11 @@ class Run:
         # a solution holds on to what the run left, not to what it began with
         if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
-        return Solution(run, trajectory, before + wall_time, compile_time + within)
+        solution = Solution(run, trajectory, before + wall_time, compile_time + within)
+        # a run that its loop took from start to end was not interrupted, and is not looked at
+        if not isinstance(trajectory, AtOnce) and trajectory.status == "interrupted":
+            raise RunInterrupted(solution)
+        return solution
 
     def _close(self, trajectory: Trajectory) -> None:
         """Add what is to be said of the run, and let go of what is not to be kept."""

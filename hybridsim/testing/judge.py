@@ -83,14 +83,9 @@ def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> N
 def run(
     scene: Scene, integrator: str, form: str = "", processor_seconds: float = inf, **settings: Any
 ) -> Any:
-    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0.
-
-    Errors
-    ------
-    KeyboardInterrupt after Ctrl-C, where `simulate` returns what it has: half a run is no answer.
-    """
+    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0."""
     model = model_of(scene, form, settings)
-    solution = hs.simulate(
+    return hs.simulate(
         model,
         scene.span,
         params=dict(scene.params),
@@ -99,9 +94,6 @@ def run(
         progress=ProcessorTime(processor_seconds),
         **{**scene.options, **settings},
     )
-    if solution.status == "interrupted":
-        raise KeyboardInterrupt
-    return solution
 
 
 def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:

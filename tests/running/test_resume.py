@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import signal
 import zipfile
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -85,9 +86,33 @@ def test_an_interrupted_run_goes_on(name: str) -> None:
 
     scene = {"exact": "sampled-servo", "scipy-dop853": "belt", "rk4-dichotomy": "square-wave"}[name]
     span = (0.0, {"sampled-servo": 0.05, "belt": 10.0, "square-wave": 5.0}[scene])
-    part = hs.simulate(scene, span, integrator=name, progress=interrupt)
+    with pytest.raises(KeyboardInterrupt) as caught:  # it ends the script that the run is in
+        hs.simulate(scene, span, integrator=name, progress=interrupt)
+    part = caught.value.solution
     assert part.status == "interrupted" and "sol.resume()" in part.message
     assert not difference(hs.simulate(scene, span, integrator=name), part.resume())
+
+
+def test_ctrl_c_ends_a_loop_of_runs() -> None:
+    """An interruption from outside, as it comes to a notebook, ends the loop, and what was computed is kept."""
+    runs = 0
+
+    def stop(fraction: float) -> None:
+        if runs == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        for _ in range(5):
+            runs += 1
+            hs.simulate("belt", (0.0, 10.0), integrator="scipy-dop853", progress=stop)
+    assert runs == 2
+    part = pickle.loads(pickle.dumps(caught.value)).solution
+    assert part.status == "interrupted" and 0.0 <= part.t_end < 10.0
+    assert "stopped at t" in str(caught.value) or "interrupted" in str(caught.value)
+    with pytest.raises(KeyboardInterrupt) as again:
+        part.resume(progress=stop)
+    assert again.value.solution.status == "interrupted"
+    assert not difference(hs.simulate("belt", (0.0, 10.0), integrator="scipy-dop853"), part.resume())
 
 
 @pytest.mark.parametrize(
