@@ -223,7 +223,8 @@ def test_a_chirp_and_a_sine_have_their_angles() -> None:
     ("text", "reason"),
     [
         ('[states]\nx = { start = 0, der = "1 if x < 1 else 2" }\n', r"jumps in a rate \(sign\(x - 1\)\)"),
-        ('[states]\nx = { start = 0, der = "1 if x < 1 and t > 0 else 2" }\n', "t > 0"),
+        ('[states]\nx = { start = 0, der = "1 if x < 1 and t > 0 else 2" }\n', r"jumps in a rate"),
+        ('[states]\nx = { start = 0, der = "1 if x == 1 else 2" }\n', "is not smooth"),
         ('[states]\nx = { start = 0, der = "1 + x**0.5" }\n', r"power 0\.5"),
         (
             '[states]\nx = { start = 1, der = "r" }\n[modes.a]\ninitial = true\nset = { r = "-1" }\n'
