@@ -57,9 +57,10 @@ class ModeLoop:
         self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # by component
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
-        self.notices = Notices(system, method, task, self.record, self._is_taken_over)
         self.leaper = leaper or plan.leaper()
         self._led = set(system.led)
+        watched = self.headway if task.successor is not None and method is not task.successor else None
+        self.notices = Notices(system, method, task, self.record, watched, self.leaper is not None)
         self._told = progress
 
     @property
@@ -89,19 +90,11 @@ class ModeLoop:
         if self.task.successor is not None and self.notices.look_on_the_way(run):
             raise TakenOver
 
-    def _is_taken_over(self, h: float) -> bool:
-        """Whether a stiff method is to go on from here, as stability holds the present one to steps of length h."""
-        task, reached = self.task, self.record.segments
-        if task.successor is None or self.method is task.successor:
-            return False
-        now = reached[-1].end if reached else self.origin
-        return self.headway.is_sooner(now, h, self.leaper is not None)
-
     def _take_over(self) -> None:
         """Go on by the stiff method."""
         assert self.task.successor is not None
         self.method = self.notices.method = self.task.successor
-        self.leaper = None
+        self.leaper, self.notices.takes_over = None, False
         if self.record.taken_over is None:
             self.record.taken_over = (self.task.successor.name, float(self.origin))
 

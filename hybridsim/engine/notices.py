@@ -22,6 +22,7 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.trajectory import Task, Trajectory
 
 if TYPE_CHECKING:
+    from hybridsim.engine.headway import Headway
     from hybridsim.engine.segment import SegmentRun
 
 # Chattering: so many events in a row, between two of which no state moves by more than this share of its range so far.
@@ -70,11 +71,13 @@ class Notices:
         method: Method,
         task: Task,
         record: Trajectory,
-        is_taken_over: Callable[[float], bool],
+        headway: Headway | None,
+        is_compiled: bool,
     ) -> None:
         self.system, self.method, self.tolerances, self.record = system, method, task.tolerances, record
         self._events = self._steps = 0  # at the last look
-        self._is_taken_over, self.takes_over = is_taken_over, False
+        # known where a stiff method may take over
+        self._headway, self._is_compiled, self.takes_over = headway, is_compiled, False
         self._start = task.x0
         self._done: set[str] = set()
 
@@ -153,14 +156,14 @@ class Notices:
         longest = int(np.argmax(lengths))
         i, s, h, *_ = samples[longest]
         h = abs(h)
-        if self._is_taken_over(h):
+        now = origin_of(i).plus(s)
+        if self._headway is not None and self._headway.is_sooner(now, h, self._is_compiled):
             self.takes_over = True
             return
         self._done.add("stiff")
-        t = float(origin_of(i).plus(s))
         self.record.warn(
-            f"stiff: at t = {t:.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the steps at "
-            f"{h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
+            f"stiff: at t = {float(now):.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the "
+            f"steps at {h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
         )
 
     def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+
+from scipy.integrate import quad
 
 from hybridsim.testing.facts import CASES, recomputed
 from hybridsim.testing.scene import Scene, Truth, needs
@@ -36,6 +39,26 @@ def scenes() -> tuple[Scene, ...]:
             floor=1e-9,
         ),
         _decades(),
+        _neuron(),
+    )
+
+
+def _neuron() -> Scene:
+    """A rise takes the integral of dV/V' over the potential: each spike as long after the one before."""
+
+    def time_per_volt(V: float) -> float:
+        return 281.0 / (30.0 * 2.0 * math.exp((V + 50.4) / 2.0) + 1000.0 - 30.0 * (V + 70.6))
+
+    marks = (-70.6, -60.0, -52.0, -48.0, -44.0, -40.0, -30.0, -15.0, 0.0)
+    period = sum(quad(time_per_volt, a, b, epsrel=1e-13, epsabs=0.0)[0] for a, b in pairwise(marks))
+    spikes = tuple((k * period, "c:charging") for k in (1, 2, 3))
+    return Scene(
+        "exponential-neuron",
+        "neuron",
+        (0.0, 3.5 * period),
+        Truth(spikes, ()),
+        needs("transitions", "adaptive", "nonlinear"),  # no fixed step leads into a pole
+        tol_t=1e-6,
     )
 
 
