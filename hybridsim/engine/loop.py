@@ -87,7 +87,7 @@ class ModeLoop:
         """The same after a step in Python; raises NoHeadway and TakenOver."""
         self._progress(instant)
         self.headway.step(instant, run)
-        if self.task.successor is not None and self.notices.look_on_the_way(run):
+        if self.notices.look_on_the_way(run):
             raise TakenOver
 
     def _take_over(self) -> None:
@@ -110,7 +110,7 @@ class ModeLoop:
             self.record.status = "step-failure"
             why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
             if isinstance(failure, NoHeadway):
-                why = why or failure.advice
+                why = f"{failure.advice}; {why}" if why else failure.advice
             elif not why and isinstance(failure, Collapsed):
                 why = advice_on_sizes(self.system)
             reached = self.record.segments[-1].end if self.record.segments else self.origin
