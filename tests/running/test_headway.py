@@ -4,17 +4,29 @@ from __future__ import annotations
 
 import math
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 import hybridsim as hs
 
-CRAWLING = hs.Model("crawling", states=[hs.State("x", 1, der="-x**0.5*sign(x - 0.2)*sign(x)")])
+
+def falling(t: float, x: Any, p: Any) -> Any:
+    """Rates in Python, in which nobody sees the jump."""
+    return (-(abs(x[0]) ** 0.5) if x[0] > 0.2 else abs(x[0]) ** 0.5,)
+
+
+def rubbing(t: float, x: Any, p: Any) -> Any:
+    """A spring with a friction that jumps with the velocity, and is small."""
+    return (x[1], -x[0] - (0.001 if x[1] > 0.0 else -0.001))
+
+
+CRAWLING = hs.Model("crawling", states={"x": 1.0}, flow=falling)
 
 
 @pytest.mark.parametrize("rtol", [1e-9, 1e-7])
-@pytest.mark.parametrize("integrator", ["auto", "tsit5", "rodas5p"])
+@pytest.mark.parametrize("integrator", ["auto", "tsit5"])
 def test_a_motion_that_crawls_along_a_jump_ends(integrator: str, rtol: float) -> None:
     """Both sides drive it back into x = 0.2, which no field on the surface is declared for; limits do not matter."""
     limits = {"seconds": 1e6, "steps": 1e12}
@@ -24,10 +36,10 @@ def test_a_motion_that_crawls_along_a_jump_ends(integrator: str, rtol: float) ->
 
 
 def test_a_motion_through_jumps_goes_on() -> None:
-    """A product of signs that is not understood is crossed again and again; that is no crawling."""
-    states = [hs.State("x", 0.5, der="v"), hs.State("v", 0, der="-x - 0.1*abs(v)**0.5*sign(v)*sign(x)**2")]
-    sol = hs.simulate(hs.Model("jumps", states=states), (0, 300), integrator="dop853", rtol=1e-6)
-    assert sol.status == "finished" and sol.stats["steps"] > 500
+    """They are crossed again and again; that is no crawling."""
+    model = hs.Model("jumps", states={"x": 0.5, "v": 0.0}, flow=rubbing)
+    sol = hs.simulate(model, (0, 100), integrator="dop853", rtol=1e-6)
+    assert sol.status == "finished" and sol.stats["steps"] > 300
 
 
 def test_events_that_come_ever_more_closely_end_the_run() -> None:
