@@ -99,7 +99,7 @@ class HybridsimError(Exception):
             lines.append(self.remedy)
         for endless in (_ENDLESS, _LONG_LINE):
             lines = [re.sub(endless, r"\1...\2", line) for line in lines]
-        return _printable("\n".join(lines))
+        return printable("\n".join(lines))
 
 
 class ModelError(HybridsimError):
@@ -257,9 +257,9 @@ def _line(error: HybridsimError) -> int:
     return (error.place.line if error.place else None) or 0
 
 
-def _printable(text: str) -> str:
-    """What a file holds must not steer the terminal that shows it; a tab is one column wide, like a caret."""
-    return "".join(c if c.isprintable() or c == "\n" else " " if c == "\t" else "?" for c in text)
+def printable(text: str) -> str:
+    """A text without what would steer the terminal that shows it; any blank is one column wide, like a caret."""
+    return "".join(c if c.isprintable() or c == "\n" else " " if c.isspace() else "?" for c in text)
 
 
 def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int | None]:

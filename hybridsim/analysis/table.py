@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.analysis.regularised import exponent_text, exponents
 from hybridsim.analysis.rows import QUANTITIES, Row
 from hybridsim.analysis.timing import ENOUGH
+from hybridsim.errors import printable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.comparison import Comparison
@@ -36,7 +37,7 @@ def table(comparison: Comparison) -> str:
                 text.append(f"  {', '.join(setting(row) for row, _ in same)}: {failure}")
             else:
                 text += [_aligned(line, widths) for _, line in same]
-    return "\n".join([*_heading(comparison), "", *text, "", *_notes(comparison)])
+    return printable("\n".join([*_heading(comparison), "", *text, "", *_notes(comparison)]))
 
 
 def setting(row: Row) -> str:

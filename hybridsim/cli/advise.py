@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
 from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import complain, require_writable
+from hybridsim.cli.output import complain, require_writable, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.cli.sweep import values_by_name
@@ -110,7 +110,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             save(advice(found), args.plot)
             session.wrote(args.plot)
     finally:
-        print(found.to_json() if args.json else found.table())
+        say(found.to_json() if args.json else found.table())
     if found.region is not None:
         for text, count in found.region.problems():
             complain(f"{count} of {found.region.status.size} points: {text}")

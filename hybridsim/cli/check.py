@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.automaton import lines_of
-from hybridsim.cli.output import complain, print_json
+from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if args.json:
         print_json(_record(model, report, cautions, primitives))
     else:
-        print("\n".join(lines_of(model, report, primitives)))
+        say("\n".join(lines_of(model, report, primitives)))
     for caution in cautions:
         complain(f"warning: {caution}")
     return 0

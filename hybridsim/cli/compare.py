@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.output import require_folder
+from hybridsim.cli.output import require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
@@ -164,4 +164,4 @@ def _write(
         save(draw(result), folder / picture)
         session.wrote(folder / picture)
     finally:
-        print(result.to_json() if as_json else result.table())
+        say(result.to_json() if as_json else result.table())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
 from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import complain, print_json, require_apart, require_writable
+from hybridsim.cli.output import complain, print_json, require_apart, require_writable, say
 from hybridsim.cli.session import Session
 from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 
@@ -122,7 +122,7 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
             more = {"explanations": [asdict(e) for e in explanations]} if explanations else {}
             print_json(_record(solution) | more)
         else:
-            print("\n".join([*_summary(solution), *map(str, explanations)]))
+            say("\n".join([*_summary(solution), *map(str, explanations)]))
     for warning in (one for one in solution.warnings if one not in told):
         complain(f"warning: {warning}")
     if solution.success:

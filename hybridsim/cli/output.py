@@ -11,14 +11,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hybridsim.errors import UsageError
+from hybridsim.errors import UsageError, printable
 
 TRIAL = ".hybridsim-"  # how the name of a folder begins that is made, and removed, to see whether it can be
 
 
 def complain(message: str) -> None:
     """Print a message for the person at the terminal."""
-    print(f"hybridsim: {message}", file=sys.stderr, flush=True)
+    print(printable(f"hybridsim: {message}"), file=sys.stderr, flush=True)
+
+
+def say(text: str = "") -> None:
+    """Print data for people: what a model's titles, units and names hold does not steer the terminal."""
+    print(printable(text))
 
 
 def print_json(value: Any) -> None:
@@ -45,7 +50,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     lines = [tuple(header), *(tuple(row) for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
     for line in lines:
-        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+        say("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
 
 
 def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:

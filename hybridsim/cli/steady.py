@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
 from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import print_json, require_writable
+from hybridsim.cli.output import complain, print_json, require_writable, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError
@@ -88,9 +87,9 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         if args.json:
             print_json(record)
         else:
-            print("\n".join(_summary(found, record)))
+            say("\n".join(_summary(found, record)))
     if not found.success:
-        print(f"hybridsim: {found.message}", file=sys.stderr)
+        complain(found.message)
         return SimulationError.exit_code
     return 0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.output import complain, require_folder
+from hybridsim.cli.output import complain, require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import Place, SimulationError, UsageError
@@ -149,7 +149,7 @@ def _fill(
         if not result.interrupted:
             journal.unlink(missing_ok=True)
     finally:
-        print(result.to_json() if args.json else result.table())
+        say(result.to_json() if args.json else result.table())
     for text, count in result.problems():
         complain(f"{count} of {result.status.size} points: {text}")
     if result.interrupted:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from hybridsim.errors import printable
 from hybridsim.notebook import run_html
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def in_words(solution: Solution) -> str:
         f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
         *(f"  warning: {w}" for w in solution.warnings),
     ]
-    return "\n".join(lines)
+    return printable("\n".join(lines))
 
 
 def in_html(solution: Solution) -> str:

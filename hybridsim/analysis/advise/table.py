@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, duration
+from hybridsim.errors import printable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice
@@ -23,7 +24,7 @@ def table(advice: Advice) -> str:
         lines += ["", _spread(advice)]
     if advice.remarks:
         lines += ["", *advice.remarks]
-    return "\n".join(lines)
+    return printable("\n".join(lines))
 
 
 def _conclusion(advice: Advice) -> str:

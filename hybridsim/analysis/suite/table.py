@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.analysis.suite.verdict import COMMON, USELESS
 from hybridsim.analysis.table import differences, milliseconds, setting, turns, versions
+from hybridsim.errors import printable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.suite.result import SuiteComparison
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 def table(suite: SuiteComparison) -> str:
     """All blocks."""
     blocks = [_who_is_right(suite), _cheapest(suite), _references(suite), _notes(suite)]
-    return "\n\n".join("\n".join(block) for block in blocks)
+    return printable("\n\n".join("\n".join(block) for block in blocks))
 
 
 def _who_is_right(suite: SuiteComparison) -> list[str]:

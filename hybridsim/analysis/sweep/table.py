@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.errors import printable
+
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep.result import Sweep
 
@@ -46,9 +48,8 @@ def table(sweep: Sweep) -> str:
     lines = [
         "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in [header, *rows]
     ]
-    return "\n".join(
-        [heading(sweep), *statuses(sweep), "", *lines] if rows else [heading(sweep), *statuses(sweep)]
-    )
+    head = [heading(sweep), *statuses(sweep)]
+    return printable("\n".join([*head, "", *lines] if rows else head))
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
