@@ -60,7 +60,7 @@ BAD = {
     "picture of an unknown kind": (["run", "dfcs", "--plot", "out.doc"], ["out.doc", ".png"]),
     "what is kept in place of a file": (
         ["run", "dfcs", "--save", "last-period"],
-        ["--save", "last-period", "run.hsol", "save='last-period'"],
+        ["--save", "last-period", "run.hsol", "--keep last-period"],
     ),
     "picture without an ending": (["run", "dfcs", "--plot", "out"], ["out", ".png"]),
     "picture in no folder": (["run", "dfcs", "--plot", "nowhere/out.png"], ["nowhere"]),
