@@ -14,6 +14,7 @@ from hybridsim.engine.jit import seconds_compiling
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.errors import RunInterrupted
 from hybridsim.model.hygiene import jumps_of
+from hybridsim.solution.poles import poles_passed
 from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
@@ -76,6 +77,8 @@ class Run:
             self.system.code.report(trajectory)
         for caution in jumps_of(self.model):
             trajectory.warnings[caution.sentence] = 1
+        for sentence in poles_passed(self.model, trajectory):
+            trajectory.warn(sentence)
         if self.task.t0 == self.task.t1:
             trajectory.warn(f"t_span begins and ends at {self.task.t0!r}: nothing was integrated")
         trajectory.close(self.task.keep)
