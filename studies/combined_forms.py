@@ -154,7 +154,7 @@ open.
 
 A run *agrees* if all states and discrete states are within {allowed:g} of the motion's size at {points} times, and its
 monitors fire as often as they should. A run that stops with a named status before the judge's motion ends is counted
-separately.
+separately, and so is a wrong run whose warnings say that a jump inside a mode was integrated as it stands.
 
 """
 

@@ -75,8 +75,7 @@ def hold(
     truth: Truth,
     way: str = "plain",
 ) -> Verdict:
-    """Run the rendered model and hold it against the judge's motion."""
-    motion, times, certain = truth
+    """Run the rendered model and compare it with the judge's motion."""
     shift = float(renderer.style.shift)
     try:
         end = shift + model.duration * (0.5 if way == "resumed" else 1)
@@ -97,6 +96,16 @@ def hold(
         return Verdict("refused", integrator, type(error).__name__, str(error)[:300])
     except Exception as error:
         return Verdict("crash", integrator, type(error).__name__, repr(error)[:300])
+    v = compared(model, renderer, sol, truth, integrator)
+    if v.kind == "differs" and any("jumps inside a mode" in text for text in sol.warnings):
+        v.kind = "warned of"  # the run says that it is not to be trusted
+    return v
+
+
+def compared(model: Abstract, renderer: Renderer, sol: Any, truth: Truth, integrator: str) -> Verdict:
+    """What a solution is worth beside the judge's motion."""
+    motion, times, certain = truth
+    shift = float(renderer.style.shift)
     reached = sol.t_end - shift
     seen = [t for t in times if t < reached - 1e-3]
     worst: tuple[float, str] = (0.0, "")
