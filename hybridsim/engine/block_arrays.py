@@ -57,6 +57,15 @@ _TABLE_FORMS: dict[str, Form] = {
     "values": (complex, ("K", "J")),
     "upper": (complex, ("K", "J", "J")),
     "ends": (np.int64, ("K", "J")),
+    "kinds": (np.int64, ("A",)),
+    "rates": (float, ("A",)),
+    "offsets": (float, ("A",)),
+    "term_start": (np.int64, ("A+1",)),
+    "sources": (np.int64, ("T",)),
+    "weights": (float, ("T",)),
+    "factors": (np.int64, ("M", "D")),
+    "phases": (np.int64, (2,)),
+    "near": (float, ("K",)),
 }
 _STEP_FORMS: dict[str, Form] = {
     "origin": (float, (2,)),
@@ -155,10 +164,22 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
         raise ValueError(f"{title} has {known['K']} coefficients a step")
 
 
+def _not_near_a_start(count: int, unknowns: int) -> Arrays:
+    """What files of earlier versions do not have: their states are summed from modal coordinates from the start on."""
+    return {"flows": np.zeros((count, unknowns, unknowns)), "near": np.zeros(count)}
+
+
 def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> LinearTables:
     """Tables of a motion in closed form with what states are made of; the rest is not needed any more, and empty."""
+    if "near" not in arrays and "counts" in arrays and "factors" in arrays:
+        arrays = arrays | _not_near_a_start(len(arrays["counts"]), sizes["n"] + len(arrays["factors"]))
     known = check_forms(title, arrays, _TABLE_FORMS, sizes)
-    count, widest = known["K"], known["J"]
+    count, widest, unknowns = known["K"], known["J"], sizes["n"] + known["M"]
+    check_forms(title, arrays, {"flows": (float, (count, unknowns, unknowns))}, {})
+    check_range(f"{title}: a place of its terms", arrays["term_start"], 0, known["T"])
+    check_ascending(f"{title}: the places of its terms", arrays["term_start"])
+    check_range(f"{title}: a source", arrays["sources"], 0, sizes["P"] - 1)
+    check_range(f"{title}: a factor", arrays["factors"], 0, 2 * known["A"])
     panels = panels_of(np.zeros((1, sizes["n"], 2 * widest))).shape[1:]
     check_forms(title, arrays, {"states": (float, (count, *panels))}, {})
     counts, ends = arrays["counts"], arrays["ends"]
@@ -166,7 +187,7 @@ def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> Linear
     used = np.arange(widest) < counts[:, None]
     if not ((ends > np.arange(widest)) & (ends <= counts[:, None]))[used].all():
         raise ValueError(f"{title}: a block of coordinates ends where there is none")
-    needed = {name: arrays[name] for name in (*_TABLE_FORMS, "states")}
+    needed = {name: arrays[name] for name in (*_TABLE_FORMS, "states", "flows")}
     empty = {name: getattr(no_tables(), name) for name in LinearTables._fields}
     tables: LinearTables = packed(LinearTables(**(empty | needed)))
     return tables

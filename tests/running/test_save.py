@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hybridsim as hs
 from hybridsim import UsageError
+from hybridsim.engine.block_arrays import put_together, taken_apart
 from hybridsim.engine.lent_memory import Lender
 
 DFCS = hs.load("dfcs")
@@ -193,3 +195,28 @@ def test_memory_does_not_grow_with_the_run(
     peak(periods, save)  # what the first run of all leaves in caches
     assert peak(8 * periods, save) < 1.5 * peak(periods, save)
     assert peak(8 * periods, "all") > 2 * peak(8 * periods, save)
+
+
+def test_a_state_that_grows_from_zero_is_the_same_in_the_file(tmp_path: Path) -> None:
+    """Near the start of a segment such a state is summed from its series, and not from modal coordinates."""
+    states = [hs.State("x", 1, "-x"), hs.State("y", 0, "x + 0.1*sin(3*t)")]
+    sol = hs.simulate(hs.Model("growth", states=states), (0, 2), integrator="exact")
+    sol.save(tmp_path / "growth.hsol")
+    loaded = hs.load_solution(tmp_path / "growth.hsol")
+    times = np.array([1e-17, 1e-9, 1e-3, 0.3, 1.9])
+    assert (loaded(times) == sol(times)).all()
+    assert loaded(1e-17)[1] == pytest.approx(1e-17, rel=1e-12)
+
+
+def test_closed_forms_of_earlier_versions_are_read(tmp_path: Path) -> None:
+    """They have no tables for what is near a start."""
+    sol = hs.simulate("dfcs", (0, 0.2), integrator="exact")
+    blocks = [
+        (kind, {name: array for name, array in arrays.items() if name not in ("flows", "near")})
+        for kind, arrays in taken_apart(sol._segments.blocks)
+    ]
+    assert {kind for kind, _ in blocks} == {"tables", "closed-form"}
+    found = put_together(sol._system, blocks)
+    times = np.linspace(0.0, 0.2, 50)
+    index, s = sol._places(times, "+")
+    assert np.allclose(found[0].states(index, s).T, sol(times), rtol=0.0, atol=1e-15)
