@@ -86,6 +86,7 @@ def names_of(model: Abstract, seed: int) -> dict[str, str]:
     chosen = rng.sample(every, min(len(every), rng.randint(1, 6)))
     names = dict(zip(chosen, rng.sample(AWKWARD, len(chosen))))
     if any(c.opens for c in model.contacts.values()) and rng.random() < 0.7:
+        names = {key: name for key, name in names.items() if name != "f1_N"}
         names[rng.choice(every)] = "f1_N"
     return names
 
