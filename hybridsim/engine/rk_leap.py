@@ -319,6 +319,7 @@ def rk_leap(
             gather(states, W, room.first)
             gather(watched, W, room.guards_left)
         h = first_length(leading, y, tolerances, room.first, min(bound, max_step))
+        tried = math.inf  # the length that was rejected last from here
         if first[0] > 0.0:
             h, first[0] = first[0], 0.0
         for i in range(n):
@@ -335,8 +336,9 @@ def rk_leap(
             # what would be left is too short for a step of its own
             is_last = h >= bound - s - SMALLEST * 2.0**-52 * bound
             d = bound - s if is_last else on_the_grid(s, h)
-            if s > longest or not d > 0.0:
+            if s > longest or not 0.0 < d < tried:
                 return STOPPED, first_step, n_segments
+            tried = d
             for i in range(n):
                 room.dx[i] = left[i, 1]
             error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
@@ -415,6 +417,7 @@ def rk_leap(
                 for j in range(terms):
                     room.guards_left[i, j] = room.guards_right[i, j]
             n_steps += 1
+            tried = math.inf
             s = bound if is_last else s + d
         if ends_code == 0:
             codes.lacked[k] += n_steps - first_step + 1
