@@ -13,6 +13,8 @@ from reference.combined.shrink import shrunk
 from reference.combined.trial import single_runs
 from reference.combined.values import Digits
 
+import hybridsim as hs
+
 PARTS = (
     "thermostat",
     "twins",
@@ -33,6 +35,17 @@ def test_a_part_alone_moves_as_the_judge_says(part: str) -> None:
     found = [record for seed in (1, 2) for record in single_runs(alone(part, seed).m, seed, 2)]
     assert Counter(record["kind"] for record in found)["agrees"] >= 6
     assert [record for record in found if record["kind"] not in ("agrees", "names refused", "cannot")] == []
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "dop853"])
+def test_a_corner_over_a_contacts_own_speed_stays_in_its_load(method: str) -> None:
+    """v' = 0.48 min(-v, 0.85) - 2 from v = -0.2: the load grows with the speed until that is 0.85."""
+    law = {"law": "coulomb", "arguments": {"mu": 0.48}}
+    contact = hs.Contact("f", velocity="v", normal="min(abs(v), 0.85)", **law)
+    model = hs.Model("own-speed", states=[hs.State("v", -0.2, "-f - 2")], contacts=[contact])
+    reached = math.log((2 / 0.48 - 0.2) / (2 / 0.48 - 0.85)) / 0.48
+    speed = 0.85 + (2 - 0.48 * 0.85) * (0.6 - reached)
+    assert hs.simulate(model, (0.0, 1.0), integrator=method)(0.6)[0] == pytest.approx(-speed, rel=1e-9)
 
 
 # -- the judge -----------------------------------------------------------------------------------------------------
