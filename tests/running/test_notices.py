@@ -151,25 +151,35 @@ def test_a_guard_that_touches_zero_and_is_never_negative_ends_no_mode(integrator
         assert not [event for event in sol.events if event.kind == "transition"], (a, w, phi)
 
 
-CRAWL = 'schema = 1\nname = "crawl"\n[states]\nx = { start = 1, der = "-sign(x)*exp(sign(x))" }\n'
+SWITCHED = """
+schema = 1
+[inputs.u]
+kind = "table"
+times = [0, 1]
+values = [0, 1]
+[states]
+x = { start = 1, der = "-x if u > 0.5 else -2*x" }
+"""
 
 
 @pytest.mark.parametrize("integrator", ["auto", "rk4-sign"])
 def test_a_jump_in_a_rate_is_told_by_the_run_as_by_check(integrator: str) -> None:
     """What `check` says of jumps, and nothing else, is a warning of every run of the model."""
-    model = hs.Model.from_toml(CRAWL, path="crawl.toml")
+    model = hs.Model.from_toml(SWITCHED, path="switched.toml")
     (caution,) = warnings_of(model)
     options = {"step": 0.01} if integrator == "rk4-sign" else {}
     sol = hs.simulate(model, (0, 2), integrator=integrator, limits={"steps": 300}, **options)
     assert sol.warnings == (caution.sentence,)
-    assert caution.sentence.startswith("crawl.toml:4: 'sign(x)' in state x jumps inside a mode")
+    assert caution.sentence.startswith(
+        "switched.toml:8: '-x if u > 0.5 else -2*x' in state x jumps inside a mode"
+    )
     assert "[contacts.NAME]" in caution.sentence and "\n" not in caution.sentence
     if sol.status == "limit":
         assert sol.resume(limits={"steps": 400}).warnings == sol.warnings
 
 
 def test_a_corner_is_told_of_by_neither() -> None:
-    model = hs.Model.from_toml(CRAWL.replace("-sign(x)*exp(sign(x))", "-1 - abs(x)"))
+    model = hs.Model.from_toml(SWITCHED.replace("-x if u > 0.5 else -2*x", "-u - abs(x)"))
     assert warnings_of(model) == () and hs.simulate(model, (0, 2)).warnings == ()
 
 
