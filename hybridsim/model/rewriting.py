@@ -119,6 +119,7 @@ class Rewriting:
         self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
         self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
         self.count = 0
+        self._met: dict[int, tuple[ast.expr, frozenset[Family | None]]] = {}
         self._walked: dict[tuple[object, ...], tuple[ast.expr, Here, ast.expr]] = {}
 
     def primitives(self) -> tuple[Primitive, ...]:
@@ -335,10 +336,39 @@ class Rewriting:
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
     ) -> tuple[ast.expr, ast.expr]:
-        """Both sides rewritten, each where the sign of the border is known."""
-        sides = ((above, sign), (below, -sign))
-        first, second = (self.walk(t, replace(here, signs=self._signs(here, family, s))) for t, s in sides)
+        """Both sides rewritten, each where the sign of the border is known, as far as that says anything.
+
+        A sign that says nothing is not carried along: nested corners, twenty deep, would be met a million times.
+        """
+        first, second = (
+            self.walk(
+                side,
+                replace(here, signs=self._signs(here, family, s)) if self._is_met(family, side) else here,
+            )
+            for side, s in ((above, sign), (below, -sign))
+        )
         return first, second
+
+    def _is_met(self, family: Family, node: ast.expr) -> bool:
+        """Whether a tree holds a corner at a border, or a jump at any."""
+        return None in (met := self._borders_in(node)) or family in met
+
+    def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
+        """The borders of the corners in a tree; None among them stands for those of jumps, which are not told apart."""
+        if id(node) not in self._met:
+            found: set[Family | None] = set()
+            is_jump = isinstance(node, ast.IfExp | ast.Compare | ast.BoolOp)
+            if is_jump or (isinstance(node, ast.Call) and ast.unparse(node.func) == "sign"):
+                found.add(None)
+            elif (parts := sides_of(node)) is not None:
+                found.add(self.meanings.family(parts[0])[0])
+            if isinstance(node, ast.Name) and (behind := self.meanings.lookup(node.id)) is not None:
+                found |= self._borders_in(behind)
+            for part in ast.iter_child_nodes(node):
+                if isinstance(part, ast.expr):
+                    found |= self._borders_in(part)
+            self._met[id(node)] = node, frozenset(found)
+        return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
         """Whether a side may have no value beyond the border: a root of something that the border depends on, too."""
