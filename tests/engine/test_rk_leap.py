@@ -199,12 +199,12 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
     integrator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The loop commits it in pieces, each in a block of its own, and goes on with the length of step it had."""
-    model = hs.Model(
-        "spring", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")], parameters={}
-    )
-    whole = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
-    monkeypatch.setattr(leaper, "_ROOM", 0)
-    cramped = hs.simulate(model, (0, 200), integrator=integrator, rtol=1e-12)
+    states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")]
+    whole = hs.simulate(hs.Model("whole", states=states), (0, 200), integrator=integrator, rtol=1e-12)
+    monkeypatch.setattr(
+        leaper, "_ROOM", 0
+    )  # for loops that are made from now on: a known model keeps its own
+    cramped = hs.simulate(hs.Model("cramped", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     assert cramped.stats["steps"] == pytest.approx(whole.stats["steps"], rel=0.02)
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)
     kinds = {type(b).__name__ for b in cramped._trajectory.segments.blocks}
