@@ -41,6 +41,11 @@ _STEPS = (
     "pass a larger atol or rtol if the tolerance asks for too much, or a shorter t_span"
 )
 
+HEADWAY_SIZE, HEADWAY_PACE = (
+    13,
+    7,
+)  # numbers to go on with, and which of them is infinite until a window is over
+
 
 class NoHeadway(StepFailure):
     """At this pace the run would not come to its end; advice: what to declare or to set where nothing else is known."""

@@ -193,7 +193,7 @@ def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
 def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, np.ndarray]:
     """The fields of `of_matrices` with no numbers for the motion in modes that are left out: a leap stops there, and
     nothing is taken to rest there."""
-    for name in ("inverse", "slopes"):
+    for name in ("inverse", "slopes", "flows"):
         fields[name][~is_finite] = np.nan
     return fields
 

@@ -63,7 +63,7 @@ def _made_labels(scope: Scope) -> None:
 def _events(scope: Scope, seen: Mapping[str, str]) -> None:
     """Report a monitor or schedule that has the name of something else: `Solution.event_times` goes by names."""
     model = scope.model
-    taken = dict(seen)
+    taken = {name: kind for name, kind in seen.items() if kind not in ("parameter", "definition")}
     parts: tuple[Any, ...] = (*model.contacts, *model.surfaces, *model.impacts, *model.components)
     taken |= {part.name: "component" for part in parts if part.name not in taken}
     for kind, events in (("monitor", model.monitors), ("schedule", model.schedules)):

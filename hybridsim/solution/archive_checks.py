@@ -18,6 +18,7 @@ from hybridsim.engine.array_forms import (
     check_number,
     check_range,
 )
+from hybridsim.engine.headway import HEADWAY_PACE, HEADWAY_SIZE
 from hybridsim.engine.jets import ORDER
 
 if TYPE_CHECKING:
@@ -191,6 +192,16 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
         step = float(arrays["step_size"])
         if not (math.isnan(step) or 0.0 < step < math.inf):
             raise ValueError(f"the step to go on with is {step!r}")
+        if "headway" in arrays:
+            check_forms("the place where it goes on", arrays, {"headway": (float, (HEADWAY_SIZE,))}, {})
+            if (
+                np.isnan(arrays["headway"]).any()
+                or np.isinf(np.delete(arrays["headway"], HEADWAY_PACE)).any()
+            ):
+                raise ValueError("the headway of the place where it goes on is not finite")
+        if "taken_over" in arrays:
+            check_forms("the place where it goes on", arrays, {"taken_over": (float, ())}, {})
+            check_finite("the time of a change of method", arrays["taken_over"])
         if "place" in arrays:
             check_forms("the place where it goes on", arrays, {"place": (float, ("numbers",))}, {})
     check_modes("the place where it goes on", arrays["z"], mode_counts(system))

@@ -20,7 +20,7 @@ from hybridsim.testing import SCENES, TROUBLES
         (("FREE-1", "--class", "stick"), "leave out one"),
         (("FREE-1", "--integrators", "rk4-sing"), "rk4-sign"),
         (("FREE-1", "--workers", "0"), "--workers"),
-        (("FREE-1", "--workers", "1" + 21 * "0"), "more than 1024"),
+        (("FREE-1", "--workers", "1" + 12 * "0"), "more than 1024"),
     ],
 )
 def test_bad_usage_names_what_is_near(

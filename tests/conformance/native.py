@@ -50,6 +50,7 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "stop-off-zero": ("", {"scipy-bdf": CLOSED, "scipy-lsoda": CLOSED}),
     "moving-floor": ("", {"scipy-bdf": CLOSED, "scipy-lsoda": CLOSED}),
     "stepped-guard": (CLOSED, {}),
+    "elastic-floor": (CLOSED, {}),
     "twisting": ("", {"scipy-radau": TWO_VALUES}),
     "long-swing": ("", {"scipy-rk23": LONG, "scipy-radau": LONG, "scipy-bdf": LONG}),
     "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),

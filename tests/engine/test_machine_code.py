@@ -36,7 +36,8 @@ def module(text: str, folder: Path, name: str) -> object:
     """A module as the engine generates them."""
     path = folder / f"{name}.py"
     path.write_text(f"from math import *\n\n{text}\n", encoding="utf-8")
-    made = type("Module", (), {"__file__": str(path)})()
+    source = type("Loader", (), {"get_source": staticmethod(lambda _: path.read_text(encoding="utf-8"))})
+    made = type("Module", (), {"__file__": str(path), "__name__": name, "__loader__": source})()
     scope: dict[str, object] = {}
     exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)  # noqa: S102  # what the text says
     made.f = scope["f"]

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import tempfile
@@ -92,6 +93,12 @@ def simulated(model: hs.Model, integrator: str, finding: Finding) -> str:
     return sol.status
 
 
+def _is_part_of(place: Path, places: list[Path]) -> bool:
+    """Whether a file is what is written beside a place, under a name of its own, and then put there."""
+    found = re.fullmatch(r"\.(.+)-[0-9a-f]{16}\.part", place.name)
+    return found is not None and place.with_name(found[1]) in places
+
+
 def line_case(seed: int, number: int, folder: Path) -> Finding:
     """A mutated command line, with a model file and a kept run in the folder."""
     pick = random.Random(f"line {seed} {number}")
@@ -108,6 +115,7 @@ def line_case(seed: int, number: int, folder: Path) -> Finding:
             inside[0].startswith(defaults)
             or (place.name.startswith(TRIAL) and not place.exists())
             or any(place.is_relative_to(named_place) for named_place in places)
+            or (_is_part_of(place, places) and not place.exists())
             or any(
                 named_place.is_relative_to(place) and place.is_relative_to(folder) for named_place in places
             )

@@ -22,7 +22,7 @@ def test_a_step_that_would_leave_a_few_ulps_goes_all_the_way(rtol: float) -> Non
     assert [event.target for event in solution.events] == [event.target for event in other.events]
 
 
-@pytest.mark.parametrize("rate", ["-exp(sign(x))", "1 if x < 0 and v < 0 else -x", "-sqrt(abs(x))"])
+@pytest.mark.parametrize("rate", ["1 if x == 0 else -x", "-sqrt(abs(x))"])
 def test_what_jumps_inside_a_mode_is_refused(rate: str) -> None:
     """A series would follow one side past the jump, and say nothing."""
     model = hs.Model("jump", states=[hs.State("x", 1, der="v"), hs.State("v", 0, der=rate)])
