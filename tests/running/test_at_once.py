@@ -101,10 +101,12 @@ def test_events_and_states_alone_make_no_record(engine: str) -> None:
 @pytest.mark.parametrize("save", ["events", "nothing"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_waits_takes_no_more_memory_than_what_is_made(engine: str, save: str) -> None:
-    model, sizes = pair(), []
+    model = pair()
     for _ in range(100):  # machine code is made, or read, once modes have taken many steps
         hs.simulate(model, (0, 60), integrator=engine, save=save)
-    for options in ({"limits": ENOUGH}, {}):
+
+    def held(**options: Any) -> int:
+        """Bytes that forty solutions hold."""
         # leaves free as many blocks of memory as are ever kept to be handed on
         before = [hs.simulate(model, (0, 60), integrator=engine, save=save, **options) for _ in range(8)]
         del before
@@ -112,10 +114,14 @@ def test_what_waits_takes_no_more_memory_than_what_is_made(engine: str, save: st
         tracemalloc.start()
         kept = [hs.simulate(model, (0, 60), integrator=engine, save=save, **options) for _ in range(40)]
         gc.collect()
-        sizes.append(tracemalloc.get_traced_memory()[0])
+        size = tracemalloc.get_traced_memory()[0]
         tracemalloc.stop()
         del kept
-    assert sizes[1] <= 1.1 * sizes[0]
+        return size
+
+    # the least of three: what is made once meanwhile, such as machine code of another thread, is not held by solutions
+    made, waiting = (min(held(**options) for _ in range(3)) for options in ({"limits": ENOUGH}, {}))
+    assert waiting <= 1.1 * made
 
 
 def test_who_breaks_off_while_it_is_made_asks_again(monkeypatch: pytest.MonkeyPatch) -> None:
