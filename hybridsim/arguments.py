@@ -37,7 +37,7 @@ def without_a_name(value: Any) -> UsageError:
 
 
 def number(value: Any, what: str, remedy: str = "give a number") -> float:
-    """A real number as a double; a text, a truth value, a complex number or a sequence is none."""
+    """A real number as a double; texts, truth values, complex numbers and sequences are refused."""
     found = as_real(value)
     if found is None:
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
@@ -65,7 +65,7 @@ def finite_number(value: Any, what: str) -> float:
 
 
 def whole_number(value: Any, what: str, least: int, most: int) -> int:
-    """A whole number within bounds; a truth value is none."""
+    """A whole number within bounds; truth values are refused."""
     found = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else least - 1
     if not least <= found <= most:
         raise UsageError(f"{what} is {value!r}", remedy=f"give a whole number from {least} to {most}")

@@ -1,4 +1,4 @@
-"""Arrays that come from a file, held against the sizes of a model and of each other before a kernel sees them.
+"""Checks of arrays that were read from a file: their types, their shapes and the indices that they hold.
 
 A kernel goes by the indices that it is given. In a file that somebody made they may be anything.
 """

@@ -46,7 +46,7 @@ def chosen_root() -> Path | None:
 
 
 def cache_root() -> Path | None:
-    """Folder of everything hybridsim keeps between runs; None where there is none that is this user's own."""
+    """Folder of everything hybridsim keeps between runs; None where no folder belongs to this user."""
     root = chosen_root()
     if root is None:
         note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a folder of your own")

@@ -177,7 +177,7 @@ if ENABLED:
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Compile one function of a generated module; return its address and the object that keeps it alive."""
-        path = getattr(module, "__file__", None)  # of a module that is in memory alone there is none
+        path = getattr(module, "__file__", None)  # None for a module that is in memory alone
         kept = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
         return compile_text(module.__loader__.get_source(module.__name__), name, kept)
 

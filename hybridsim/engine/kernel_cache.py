@@ -27,7 +27,7 @@ def keep_on_disk(dispatcher: Any, function: Any) -> None:
 
 
 class _Place:
-    """Where the code of one function is, and of which source it is; numba asks for it by these names."""
+    """The place and the source of one function's code, under the names by which numba asks for them."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         code = function.__code__
@@ -79,7 +79,7 @@ class _Versions:
         store_whole(self._path(key), dumps((self._stamp, key, data)))
 
     def load(self, key: Any) -> Any:
-        """The version for a key; None where there is none of this source."""
+        """The version for a key; None if this source has no such version."""
         content = load_whole(self._path(key))
         if content is None:
             return None

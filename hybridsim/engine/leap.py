@@ -403,7 +403,7 @@ def leap(
 
 @inlined
 def move_on(s: float, clock: Any, sides: Any, orders: Any, floors: Any) -> None:
-    """Begin anew at local time s inside a segment, where all guards that are looked at are positive."""
+    """Make local time s the start of a new segment in the same modes; every active guard is positive there."""
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0

@@ -113,7 +113,7 @@ def _path(name: str) -> Path | None:
 def _load(model: Model, name: str) -> Compiled:
     path = _path(name)
     if path is not None and path.exists():
-        # a damaged file may raise anything; written anew, it tells whose fault it is
+        # A damaged file may raise any exception. If a new copy of it raises as well, the model is at fault.
         with suppress(Exception):
             return Compiled(_import(_FromDisk(name, str(path))), 0.0)
     from hybridsim.engine.emit import emit

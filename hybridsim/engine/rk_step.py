@@ -136,7 +136,7 @@ def attempt(
 
 @kernel
 def on_the_grid(s: float, h: float) -> float:
-    """The length, no longer than h, of a step from s that ends at a double of time; 0 where there is none before h.
+    """The length, no longer than h, of a step from s that ends at a double of time; 0 if no double lies before h.
 
     A step that is tried with one length and taken with another, an ulp of time apart, is another step where a state
     moves far in an ulp; and one that is rejected is to be followed by a shorter one.

@@ -404,7 +404,7 @@ class Settling:
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """The modes as they are, but for those of some components, and of corners on their sides along that motion."""
+        """Replace the modes of some components; corners take the sides that hold along that motion."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)

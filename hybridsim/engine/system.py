@@ -49,7 +49,7 @@ class Automaton:
     is_unilateral: bool = False  # its surface is a gap: there is no mode below
     is_unique: bool = False  # its surface takes a motion only where no other is admissible
     is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
-    is_step: bool = False  # but for those of a step in time
+    is_step: bool = False  # except those of a step in time
     is_load: bool = False  # the load of a contact that opens
     limit: int = -1  # the mode that is entered where its transitions accumulate
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def refuse_loads_of_friction(model: Model, integrator: str) -> None:
     """Refuse a contact whose load, or law, uses the friction force of another one.
 
-    The sweeps take each limit as given, but for normal forces. A limit that follows another friction force would be
+    The sweeps take each limit as given, except for normal forces. A limit that follows another friction force would be
     taken as where that one slips.
     """
     components = model.all_components()

@@ -37,7 +37,7 @@ def need_smooth(scope: Scope, part: Declared, what: str, expr: Expression, remed
 
 
 def _is_rough(scope: Scope, expr: Expression) -> bool:
-    """Whether an expression has a corner or a jump, but for conditions on time alone, which are signals."""
+    """Whether an expression has a corner or a jump; conditions on time alone are signals and do not count."""
     if not has_word(expr):
         return False
     known = scope.model.constant_names() | {TIME}

@@ -85,7 +85,7 @@ def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | 
 
 
 def _size(scope: Scope, part: Declared, what: str, size: float | None) -> None:
-    """Report a typical size that is none."""
+    """Report a typical size that is not above zero and finite."""
     if size is not None and not 0 < size < math.inf:
         scope.fail(part, f"{what} is {size!r}", "give a size above zero.")
 

@@ -91,8 +91,8 @@ def is_driven(system: System) -> bool:
 def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.ndarray, tuple[int, ...]]:
     """Mode numbers from names by component, and the components whose modes are left to the state.
 
-    A text is the mode of the only component. Left to the state are corners, tables and the jumps of a rate (components
-    that the model's author did not declare), but for those whose mode is given.
+    A text is the mode of the only component. The state decides the modes of corners, tables and jumps of a rate, which
+    the author of the model did not declare, unless their mode is given.
     """
     written = {component.name for component in system.written.all_components()}
     declared = tuple(a for a in system.declared if a.name in written) or system.declared

@@ -11,7 +11,7 @@ from hybridsim.engine.tangents import TangentTape
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
-_ROUNDINGS = 10.0  # times the runs' relative tolerance: what a run leaves of a motion that is none
+_ROUNDINGS = 10.0  # times the relative tolerance of a run: motion below this share of a size is rounding
 _LOOSEST = 1e-10  # for which the runs' tolerance stands; a looser one hides motions that are some
 
 
@@ -44,7 +44,7 @@ def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
 
 
 def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
-    """Whether all rates at x are zero but for what errors of the states, by the runs' tolerance, make of them."""
+    """Whether errors of the states within the tolerance of a run explain all rates at x."""
     if not system.has_tape or not system.n:
         return True
     f, A = _rates(system, x, p, z)

@@ -1,4 +1,4 @@
-"""Scenes of loads: one that touches zero, one that a reaction gives, and contacts in series of which one lets go."""
+"""Scenes of loads: one that touches zero, one that a reaction gives, and contacts in series, one of which lets go."""
 
 from __future__ import annotations
 
