@@ -18,7 +18,7 @@ from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.leap import AT_TARGET, FULL, LEAST, STOPPED, holding, landing, load, move_on, set_origin
 from hybridsim.engine.modes_index import find_modes
-from hybridsim.engine.rk_step import SAFETY, SMALLEST, attempt, forget, next_length, on_the_grid
+from hybridsim.engine.rk_step import SAFETY, SMALLEST, STRETCH, attempt, forget, next_length, on_the_grid
 from hybridsim.engine.segment_end import (
     is_crowded,
     is_hidden,
@@ -334,7 +334,7 @@ def rk_leap(
                 first[0] = h  # the leap that follows goes on with it
                 break
             # what would be left is too short for a step of its own
-            is_last = h >= bound - s - SMALLEST * 2.0**-52 * bound
+            is_last = h * STRETCH >= bound - s - SMALLEST * 2.0**-52 * bound
             d = bound - s if is_last else on_the_grid(s, h)
             if s > longest or not 0.0 < d < tried:
                 return STOPPED, first_step, n_segments

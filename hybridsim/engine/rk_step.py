@@ -17,6 +17,12 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 _LEAST = 1e-2  # an error below this share of the tolerance says nothing of how errors grow
 _NOTHING = 1e-9  # a coefficient that order conditions make zero, but for rounding
 SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
+# Nor is a rest of less than this share of the step: some thousand steps of one length add up to their span but for
+# roundings of that size, and a step that is longer by it has the same error but for a part in 10**8.
+STRETCH = 1.0 + 2.0**-30
+_COARSE = (
+    2.0**-42
+)  # a length of fewer ulps of time than 2**10 changes by more than 2**-11 of itself when it is rounded
 
 
 class Coefficients(NamedTuple):
@@ -136,15 +142,15 @@ def attempt(
 
 @kernel
 def on_the_grid(s: float, h: float) -> float:
-    """The length, no longer than h, of a step from s that ends at a double of time; 0 if no double lies before h.
+    """The length of a step from s that ends at a double of time: the one next to s + h, or 0 if there is none.
 
     A step that is tried with one length and taken with another, an ulp of time apart, is another step where a state
-    moves far in an ulp; and one that is rejected is to be followed by a shorter one.
+    moves far in an ulp. A length of few ulps is never rounded up: a step that is rejected is to be followed by a
+    shorter one.
     """
     end = s + h
-    if abs(end - s) > abs(
-        h
-    ):  # it was rounded away from s: three quarters of an ulp less lead to the double before
+    if abs(h) < _COARSE * abs(end) and abs(end - s) > abs(h):
+        # it was rounded away from s: three quarters of an ulp less lead to the double before
         end = s + (h - math.copysign(0.75 * 2.0**-52 * abs(end), h))
     moved = end - s
     return moved if moved * h > 0.0 else 0.0

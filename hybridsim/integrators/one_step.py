@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.rk_step import SMALLEST, next_length, on_the_grid
+from hybridsim.engine.rk_step import SMALLEST, STRETCH, next_length, on_the_grid
 from hybridsim.engine.stepping import Collapsed, Dense, Flow, Step, StepFailure, Tolerances
 from hybridsim.engine.trajectory import Pieces
 
@@ -97,7 +97,7 @@ class OneStepStepper(ABC):
         while True:
             h = min(self.h, self.tolerances.max_step)
             # what would be left is too short for a step of its own
-            last = h >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
+            last = h * STRETCH >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
             if not h > 0.0:
                 raise Collapsed(f"the step fell to {h:.3g}")

@@ -48,15 +48,29 @@ def test_a_neuron_runs_to_its_peak(integrator: str, peak: float) -> None:
     assert spikes == pytest.approx([period, 2 * period, 3 * period], abs=1e-6)
 
 
-def test_a_step_is_no_longer_than_was_asked_for() -> None:
-    """It ends at a double, however many ulps of time it is."""
+def test_a_step_ends_at_a_double() -> None:
+    """At the one next to where it was to end; one of a few ulps of time is no longer than was asked for."""
     from hybridsim.engine.rk_step import on_the_grid
 
     for s in (0.0, 1.0, 11.75, 1e300, 3.3e-5):
-        for share in (0.3, 0.6, 1.0, 1.4, 1.6, 2.5, 1e3 + 0.7, 1e16):
+        for share in (0.3, 0.6, 1.0, 1.4, 1.6, 2.5, 1e3 + 0.7, 5e3 + 0.7, 1e16):
             for sign in (1.0, -1.0):
                 h = sign * share * (math.ulp(s) if s else 1e-9)
                 moved = on_the_grid(s, h)
-                assert abs(moved) <= abs(h) and moved * h >= 0.0
-                assert (s + moved) - s == moved
-                assert abs(h) < 3.0 * math.ulp(s) or abs(moved) >= abs(h) - 2.0 * math.ulp(s + h)
+                assert (s + moved) - s == moved and moved * h >= 0.0
+                if share > 4e3:
+                    assert s + moved == s + h
+                else:
+                    assert abs(moved) <= abs(h)
+                    assert share < 3.0 or abs(moved) >= abs(h) - 2.0 * math.ulp(s + h)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "tsit5"])
+@pytest.mark.parametrize("count", [10, 40, 97, 500, 1000])
+@pytest.mark.parametrize("span", [4.0, 0.3])
+def test_steps_of_one_length_fill_the_span(integrator: str, count: int, span: float) -> None:
+    """No further step of some ulps follows the last."""
+    model = hs.Model("decay", states=[hs.State("x", 1.0, der="-x")])
+    h = span / count
+    sol = hs.simulate(model, (0, span), integrator=integrator, rtol=0.9, atol=1e9, max_step=h, first_step=h)
+    assert sol.stats["steps"] == count
