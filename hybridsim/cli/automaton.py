@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from hybridsim.model.nonsmooth import Primitive
 
 
-def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> Iterator[str]:
+def lines_of(
+    model: Model, report: Report, primitives: Iterable[Primitive], facts: Iterable[str]
+) -> Iterator[str]:
     """The whole description, line by line."""
     yield f"{model.name}: {model.title}" if model.title else model.name
     for label in ("source", "look"):
@@ -36,6 +38,7 @@ def lines_of(model: Model, report: Report, primitives: Iterable[Primitive]) -> I
         kind = f"contact, law {laws[component.name]}" if component.name in laws else kind
         yield from _section(f"{component.name}: {kind}", _component(component, report))
     yield from _section("corners and jumps", map(_primitive, primitives))
+    yield from _section("notes", facts)
     yield from _section("monitors", map(_monitor, model.monitors))
     yield from _section("schedules", map(_schedule, model.schedules))
     yield from _section("outputs", (f"{output.name} = {_flat(output.expr)}" for output in model.outputs))

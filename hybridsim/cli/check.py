@@ -38,22 +38,28 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     from hybridsim.engine.report import describe
     from hybridsim.model.hygiene import warnings_of
     from hybridsim.model.smoothing import smoothing_of
+    from hybridsim.model.starting_facts import starting_facts
 
     model = values.changed_model(args)
     report = describe(model)
     cautions = warnings_of(model)
     primitives = smoothing_of(model).primitives
+    facts = starting_facts(model)
     if args.json:
-        print_json(_record(model, report, cautions, primitives))
+        print_json(_record(model, report, cautions, primitives, facts))
     else:
-        say("\n".join(lines_of(model, report, primitives)))
+        say("\n".join(lines_of(model, report, primitives, facts)))
     for caution in cautions:
         complain(f"warning: {caution}")
     return 0
 
 
 def _record(
-    model: Model, report: Report, cautions: Iterable[Caution], primitives: Iterable[Primitive]
+    model: Model,
+    report: Report,
+    cautions: Iterable[Caution],
+    primitives: Iterable[Primitive],
+    facts: Iterable[str],
 ) -> dict[str, Any]:
     return {
         "name": model.name,
@@ -70,6 +76,7 @@ def _record(
         },
         "engine": asdict(report),
         "primitives": [_primitive_record(primitive) for primitive in primitives],
+        "notes": list(facts),
         "warnings": [_caution_record(caution) for caution in cautions],
     }
 

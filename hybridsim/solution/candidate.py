@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.decide import FINE, LEAVES, side_after
-from hybridsim.expr.parse import substitute
+from hybridsim.expr import of_tree
+from hybridsim.expr.rebuild import with_names
 from hybridsim.model.jumps import SIGN
+from hybridsim.model.one_sided import names_of
 from hybridsim.model.rewriting import VARIABLE
 from hybridsim.model.switching import ATTRACTION
 from hybridsim.model.units import rate_of, time_unit, unit_of
@@ -107,7 +109,7 @@ def views(
         j = automaton.guards[mode].index(g)
         values, bounds = series.guards[g], series.guard_bounds[g]
         side, order = side_after(values, bounds, int(decreed[g]))
-        declared = _as_in(system, z, system.model.all_components()[c].modes[mode].guards[j].expr)
+        declared = as_in(system, z, system.model.all_components()[c].modes[mode].guards[j].expr)
         unit = "" if declared.text.startswith(ATTRACTION) else unit_of(system.model, declared)
         factorials = [math.factorial(k) for k in range(len(values))]
         yield GuardView(
@@ -123,13 +125,14 @@ def views(
         )
 
 
-def _as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
+def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
     """An expression with what stands for its corners on the sides of the modes z."""
     modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
-    values = {n: e for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
-    while expression.names & values.keys():
-        expression = substitute(expression, values)
-    return expression
+    values = {n: e.tree for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
+    tree = expression.tree
+    while names_of(tree) & values.keys():
+        tree = with_names(tree, values)
+    return expression if tree is expression.tree else of_tree(tree, expression.place)
 
 
 def _in_words(text: str, component: str) -> str:

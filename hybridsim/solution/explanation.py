@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.engine.accumulation import SAME_FACTOR, turn_of
 from hybridsim.engine.decide import side_after
 from hybridsim.engine.gathering import LIMIT
+from hybridsim.engine.system import CORNER
 from hybridsim.errors import UsageError
 from hybridsim.expr import assignment
 from hybridsim.model.units import units_of
@@ -21,6 +22,7 @@ from hybridsim.solution.event import Event
 from hybridsim.solution.grazing import grazed
 from hybridsim.solution.one_instant import BY_RESET, changes_in_words, fired_guards
 from hybridsim.solution.reason import reason
+from hybridsim.solution.remarks import change_of_side, remarks
 from hybridsim.solution.stages import place_of, situation
 
 if TYPE_CHECKING:
@@ -61,6 +63,9 @@ class Explanation:
         States just before, and what a condition or a contact reads, as text with units.
     choices : tuple of str, optional
         Of a guard with an ordered choice, in words: each condition with its values, and what came of it.
+    remarks : tuple of str, optional
+        Sentences about corners whose sides the guards depend on, loads that reach or leave zero, and other events at
+        the same instant.
 
     Examples
     --------
@@ -75,6 +80,7 @@ class Explanation:
     reason: str
     state: str = ""
     choices: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         lines = [repr(self.event)[1:-1]]
@@ -94,6 +100,7 @@ class Explanation:
         if self.choices:
             lines.append(f"  choices of guard {self.event.guard}, the first that holds is taken:")
             lines += [f"    {choice}" for choice in self.choices]
+        lines += [f"  note: {remark}" for remark in self.remarks]
         lines.append(f"  so: {self.reason}")
         if (self.fired or self.candidates) and not is_near:
             lines.append(_LEGEND)
@@ -102,7 +109,11 @@ class Explanation:
 
 def explain(solution: Solution, number: int | Event) -> Explanation:
     """The explanation of one of a solution's events; see `Solution.explain`."""
-    events = solution.events
+    events, occurrences = solution.events, solution._trajectory.occurrences
+    if isinstance(number, Event) and number in solution.corners:
+        corner = [o for o in occurrences if o.kind == CORNER][solution.corners.index(number)]
+        found = Explanation(number, (), (), change_of_side(solution, corner), _state(solution, number))
+        return replace(found, remarks=remarks(solution, corner, occurrences))
     if isinstance(number, Event) and number in events:
         number = events.index(number)
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
@@ -110,8 +121,13 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
             f"the run has {len(events)} events, and event {number!r} is asked for",
             remedy=f"give the place of one, 0 to {len(events) - 1}, or -1 for the last" if events else None,
         )
-    event = events[number]
-    happened = [o for o in solution._trajectory.occurrences if o.kind != "corner"]
+    happened = [o for o in occurrences if o.kind != CORNER]
+    found = _explained(solution, events[number], happened, number)
+    return replace(found, remarks=remarks(solution, happened[number], occurrences))
+
+
+def _explained(solution: Solution, event: Event, happened: list[Occurrence], number: int) -> Explanation:
+    """The explanation without the remarks; `happened`: what the events stand for, in their order."""
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
         return Explanation(event, near, (), _of_another_kind(solution, event), _state(solution, event))

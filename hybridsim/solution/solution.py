@@ -278,7 +278,7 @@ class Solution(InTables):
 
         Parameters
         ----------
-        number : its place in `events`, or the event.
+        number : its place in `events`, or an event of `events` or `corners`.
 
         Raises
         ------

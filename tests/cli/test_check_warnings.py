@@ -72,3 +72,57 @@ def test_a_run_warns_of_a_jump_before_it_begins_and_once(hybridsim: Callable, tm
     _, _, err = hybridsim("run", "c.toml", "--t-end", "1e6", "--limit", "steps=300")
     assert err.index("jumps inside a mode") < err.index("300 steps")
     assert err.count("jumps inside a mode") == 1
+
+
+NOTED = """schema = 1
+name = "noted"
+[parameters]
+a = 0.1
+b = 0.2
+k = 1000
+[states]
+x = { start = "a + b", der = "w" }
+y = { start = -1, der = "-y" }
+u = { start = 1, der = "-f" }
+w = { start = 0, der = "q - g" }
+[contacts.f]
+velocity = "u - 1"
+normal = "k*max(-y, 0)"
+law = { name = "coulomb", mu = 0.3 }
+[contacts.g]
+velocity = "w + 1"
+normal = "y"
+opens = true
+law = { name = "coulomb", mu = 0.3 }
+[impacts.q]
+gap = "x - a - b"
+restitution = 0
+[modes.one]
+initial = true
+guards.even = { expr = "x - (a + b)", then = "two" }
+guards.bent = { expr = "abs(x) - 0.2", then = "two" }
+[modes.two]
+"""
+
+
+def test_starts_on_a_guard_and_loads_that_can_vanish_are_noted(hybridsim: Callable, tmp_path: Path) -> None:
+    """In doubles 0.1 + 0.2 less 0.1 less 0.2 is not zero, but within the rounding of the start."""
+    (tmp_path / "noted.toml").write_text(NOTED)
+    code, out, _ = hybridsim("check", "noted.toml", "--json")
+    assert code == 0
+    assert json.loads(out)["notes"] == [
+        "the relative velocity of contact f (u - 1) is zero at the start: the forces decide whether it sticks",
+        "the gap of impact q (x - a - b) is zero at the start: its rates decide whether it is closed",
+        "guard even of mode one, component mode (x - (a + b)) is zero at the start: "
+        "the first of its rates that is not zero decides whether it fires at once",
+        "the normal load of contact f (k*max(-y, 0)) can reach zero: friction ends there until it is positive again",
+        "the normal load of contact g (y) may become negative: the contact opens where it reaches zero",
+    ]
+    text = hybridsim("check", "noted.toml")[1]
+    assert "\nnotes\n  the relative velocity of contact f (u - 1) is zero at the start" in text
+    assert "abs(x) in guard bent of mode one of mode: two modes that agree where they change" in text
+
+
+def test_a_start_off_its_guards_has_no_notes(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "off.toml").write_text(ODD)
+    assert json.loads(hybridsim("check", "off.toml", "--json")[1])["notes"] == []
