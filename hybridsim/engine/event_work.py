@@ -13,7 +13,7 @@ from hybridsim.engine.panels import vector_of
 
 MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
 FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # of `Work.whole`
-AT, AT_ERROR = range(2)  # of `Work.real`
+AT, AT_ERROR, SPREAD = range(3)  # of `Work.real`
 SETTLE, LEAP, SERIES = range(3)  # of `Work.reached`
 NOBODY = -1  # in place of the guard that fired
 
@@ -44,7 +44,8 @@ class Work(NamedTuple):
     what holds after it, candidates.
 
     functions (5,): those of `Functions`. reached (3,): addresses of kernels: the one that settles it, that of a leap,
-    and the interpreter of the series of guards. whole, real: what the places named FIRED, AT and so on say. y, y_error
+    and the interpreter of the series of guards. whole, real: what the places named FIRED, AT and so on say; SPREAD: how
+    many of their bounds guards that are zero at one instant may be from zero, by the rounding of steps. y, y_error
     (n,): the state at the event, slopes (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of
     x_after take the place of the slopes. factors, w, w_error: functions of time of linear modes, which are to hold at
     the event when it is settled; sizes, w_sizes: of states and of these. sides, orders, floors (G,): of the guards just
@@ -121,7 +122,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
             reached=numbers(3),
             whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64),
-            real=np.zeros(2),
+            real=np.zeros(3),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             z_after=numbers(count),
             p_after=np.empty(system.layout.size),

@@ -261,7 +261,7 @@ def exact_leap(
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
         work.whole[ROW] = k
-        if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, clock, state, work):
+        if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, 1, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
             return stopped(hints, k, former)

@@ -395,7 +395,9 @@ def leap(
             automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
-        if not settle_and_move_on(automata, tapes, inputs, lin, s, s_error, fired, clock, state, work):
+        if not settle_and_move_on(
+            automata, tapes, inputs, lin, s, s_error, fired, n_steps - first_step, clock, state, work
+        ):
             return STOPPED, first_step, n_segments
         put(work.x_after, jumps[n_segments, 1])
         n_segments += 1

@@ -12,6 +12,7 @@ from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.segment import Arrival, SegmentRun
+from hybridsim.engine.segment_end import ROUNDED
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -108,14 +109,14 @@ def located(
     at, is_met = situation(system, arrival, segment), False
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     if is_due:  # at a known time it counts how well the motion is known there
-        wide = replace(at)
-        add_steps(system, wide, segment.scale + np.abs(arrival.x - segment.states[0]), len(segment.knots))
-        known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+        wide, known = as_stepped(system, at, arrival, segment)
         zeros = [(known.guards[g], known.guard_bounds[g]) for g in arrival.fired]
         zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
         late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
         is_met = abs(target - arrival.s) <= at.s_error + late
         at, series = (wide, known) if is_met else (at, series)
+    if not is_met and others_near(system, at, series, arrival, len(segment.knots)):
+        at, series = together(system, origin, at, series, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired, series)
     sides = _before_instant(series, arrival, segment)
     segment.grazings = [
@@ -134,6 +135,40 @@ def located(
     if fired or resetting or is_met:  # what ends a run by itself is judged when all of this has been settled
         stopping = resetting
     return Located(at, fired, tuple(sorted(stopping)), sides, is_met)
+
+
+def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
+    """The state at an event with bounds that count what the steps to it have rounded away, and the series there."""
+    wide = replace(at)
+    add_steps(system, wide, segment.scale + np.abs(arrival.x - segment.states[0]), len(segment.knots))
+    return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+
+
+def others_near(system: System, at: Situation, series: Any, arrival: Arrival, steps: int) -> bool:
+    """Whether something that has not fired is beyond its bound, and so little that steps may have rounded it away."""
+    share = 1.0 + ROUNDED * steps
+    active = set(map(int, np.flatnonzero(system.active(at.z)))) - set(arrival.fired)
+    monitors = set(range(len(series.monitors))) - set(arrival.stopping)
+    values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active]
+    values += [(series.monitors[k][0], series.monitor_bounds[k][0]) for k in monitors]
+    return any(bound < abs(value) <= share * bound for value, bound in values)
+
+
+def together(
+    system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, segment: SegmentRun
+) -> tuple[Situation, Any]:
+    """The state at an event with the bounds of the steps to it, if more is zero within them; else as it is."""
+    wide, known = as_stepped(system, at, arrival, segment)
+    fewer = _number_at_zero(system, origin, at, arrival, series)
+    more = _number_at_zero(system, origin, wide, arrival, known)
+    return (wide, known) if more > fewer else (at, series)
+
+
+def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
+    """How many guards leave at an event, and how many monitors with a reset are zero there."""
+    monitors = zip(system.model.monitors, series.monitors, series.monitor_bounds, strict=True)
+    resetting = sum(m.action == "reset" and abs(value[0]) <= bound[0] for m, value, bound in monitors)
+    return len(coincident(system, origin, at, arrival.fired, series)) + resetting
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:

@@ -25,6 +25,7 @@ from hybridsim.engine.event_work import (
     DISCRETE_AT,
     FIRED,
     NOBODY,
+    SPREAD,
     Before,
     called_by,
     located,
@@ -39,13 +40,15 @@ from hybridsim.engine.surface_event import decide_surface
 
 @inlined
 def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, work: Any) -> bool:
-    """Whether no other guard is zero within its bound and leaves together with the one that fired."""
+    """Whether no other guard may leave together with the one that fired, but for the rounding of the steps."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if g == fired:
             continue
         value, bound = size_at(lin, k, g, x, x_error, work)
-        if not abs(value) > bound and call_apart(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
+        if abs(value) > work.real[SPREAD] * bound:
+            continue
+        if abs(value) > bound or call_apart(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
             return False
     return True
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import CLOSING_IN
 from hybridsim.engine.event_verdicts import interpreted_series
-from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, NOBODY, SERIES, SETTLE
+from hybridsim.engine.event_work import AT, AT_ERROR, FIRED, NOBODY, SERIES, SETTLE, SPREAD
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.ordinary_event import settle_event
@@ -17,6 +17,7 @@ from hybridsim.engine.timepair import two_sum
 _STEADY = 1e-3  # of the ratio of intervals between events: what it may change by in a series that accumulates
 _SHALLOW = 2.0**-18  # of a guard's values on the last step: how far below zero it goes, times four, at least
 _HIDDEN = 16.0  # four times its rounding, at least
+ROUNDED = 12.0  # what a step rounds away, at most, over the bound of a segment: `hybridsim.engine.located.add_steps`
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
@@ -123,16 +124,18 @@ def settle_and_move_on(
     s: float,
     s_error: float,
     fired: int,
+    steps: int,
     clock: Any,
     state: Any,
     work: Any,
 ) -> bool:
     """Settle an ordinary event and make what follows it the start of the next segment; False leaves all as it was.
 
-    y, y_error of the work space are the state at the event. lin: tables of linear modes, empty for others. state:
-    `State`, moved on with the clock.
+    y, y_error of the work space are the state at the event, to which so many steps led. lin: tables of linear modes,
+    empty for others. state: `State`, moved on with the clock.
     """
     work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
+    work.real[SPREAD] = 1.0 + ROUNDED * steps
     if call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work)) == 0:
         return False
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)

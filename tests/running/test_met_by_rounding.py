@@ -1,0 +1,43 @@
+"""What happens at one instant in exact arithmetic is settled together, however the steps to it were rounded."""
+
+import random
+
+import pytest
+
+import hybridsim as hs
+
+MODEL = """schema = 1
+name = "three-bodies"
+[states]
+q1 = {{ start = {q1}, der = "v1" }}
+q2 = {{ start = 0, der = "v2" }}
+q3 = {{ start = {q3}, der = "v3" }}
+v1 = {{ start = {v1}, der = "-p/{m1}" }}
+v2 = {{ start = 0, der = "(p - r)/{m2}" }}
+v3 = {{ start = {v3}, der = "r/{m3}" }}
+[impacts.p]
+gap = "q2 - q1"
+restitution = {e1}
+[impacts.r]
+gap = "q3 - q2"
+restitution = {e3}
+"""
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p"])
+def test_two_bodies_that_reach_a_third_at_one_time_strike_it_at_once(integrator):
+    """By each law of restitution, and the momentum: v2 - v1 = e1 v1, v3 - v2 = -e3 v3."""
+    draw = random.Random(3)
+    for _ in range(12):
+        at, v1, v3 = draw.choice([0.3, 1, 1.7]), draw.uniform(0.3, 4), -draw.uniform(0.3, 4)
+        m1, m2, m3 = (draw.choice([0.5, 1, 3]) for _ in range(3))
+        e1, e3 = draw.uniform(0.2, 1), draw.uniform(0.2, 1)
+        model = hs.Model.from_toml(
+            MODEL.format(q1=-v1 * at, q3=-v3 * at, v1=v1, v3=v3, m1=m1, m2=m2, m3=m3, e1=e1, e3=e3)
+        )
+        for end in (1.05 * at, 1.2 * at, 7.0 * at):
+            sol = hs.simulate(model, (0.0, end), integrator=integrator)
+            middle = (m1 * v1 + m3 * v3 + m1 * e1 * v1 + m3 * e3 * v3) / (m1 + m2 + m3)
+            expected = [middle - e1 * v1, middle, middle - e3 * v3]
+            assert sol(end)[3:] == pytest.approx(expected, abs=1e-9)
+            assert len({event.t for event in sol.events}) == 1
