@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import errno
+import json
+import math
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from os import PathLike
+from typing import Any
 
 from hybridsim.errors import UsageError
 
@@ -160,3 +163,22 @@ def path_text(path: object) -> str:
     if not isinstance(found, str) or "\0" in found or not found:
         raise UsageError(f"the path is {path!r}", remedy="give the path of a file as a text")
     return found
+
+
+def json_text(value: Any) -> str:
+    """One JSON document; numbers that JSON does not have (nan, inf) become null."""
+    return json.dumps(_plain(value), indent=2, ensure_ascii=True, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # numpy arrays and numbers
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Iterable):
+        return [_plain(item) for item in value]
+    return str(value)

@@ -12,7 +12,7 @@ from typing import Any
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.rows import QUANTITIES, Reading, Row
 from hybridsim.analysis.table import table
-from hybridsim.files import whole_file, write_text
+from hybridsim.files import json_text, whole_file, write_text
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Comparison:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
-        text = json.dumps(self.to_dict(), indent=2, default=str)
+        text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
         return text

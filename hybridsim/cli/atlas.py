@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.output import complain, print_json, require_folder
+from hybridsim.cli.output import complain, print_json, require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
@@ -64,7 +64,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         if args.json:
             print_json([told(scene) for scene in scenes])
         else:
-            print(listing(scenes))
+            say(listing(scenes))
         return 0
     folder: Path = args.out or _FOLDER
     require_folder(folder, "--out")
@@ -88,7 +88,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if args.json:
         print_json(result.to_plain())
     else:
-        print(result.table())
+        say(result.table())
     if fault is not None:
         raise fault
     if result.interrupted:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from hybridsim.cli.output import complain
+from hybridsim.cli.output import complain, say
 from hybridsim.cli.session import Session
 
 
@@ -33,7 +33,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if root is None or (args.action == "warm" and kernel_folder() is None):
         return 1  # the reason is told already
     if args.action == "path":
-        print(root)
+        say(str(root))
     elif args.action == "clear":
         freed, others = clear()
         complain(f"freed {freed / 1e6:.1f} MB in {root}")

@@ -32,7 +32,7 @@ from hybridsim.cli import (
     study,
     sweep,
 )
-from hybridsim.cli.output import complain
+from hybridsim.cli.output import complain, only_data_on_stdout
 from hybridsim.cli.parser import Parser
 from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError, UsageError
@@ -90,8 +90,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             args = build_parser().parse_args(argv)
             lighter = getattr(args, "lighter", "")
-            code: int = args.execute(args, session)
-            sys.stdout.flush()
+            with only_data_on_stdout():
+                code: int = args.execute(args, session)
         except SystemExit as done:  # argparse after --help and --version
             return done.code if isinstance(done.code, int) else 0
         except KeyboardInterrupt:
@@ -132,7 +132,7 @@ def command() -> NoReturn:
     os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
     code = main()
     atexit._run_exitfuncs()
-    with suppress(OSError, ValueError):  # whoever read it went away
+    with suppress(OSError, ValueError, AttributeError):  # whoever read it went away, or there was none
         sys.stdout.flush()
         sys.stderr.flush()
     os._exit(code)

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli.output import print_json, print_table
+from hybridsim.cli.output import print_json, print_table, say
 from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         )
         return 0
     _paragraph(f"What a model may need: {', '.join(CAPABILITIES)}.", indent="")
-    print()
+    say()
     lacking = [[c for c in CAPABILITIES if c in each.lacks] for each in found]
     print_table(
         ("INTEGRATOR", "LACKS"),
@@ -58,8 +58,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     )
     for each in found:
         options = options_of(each)
-        print()
-        print(f"{each.name}: {each.title} (order {each.order})")
+        say()
+        say(f"{each.name}: {each.title} (order {each.order})")
         _paragraph(f"choose it: {each.when}")
         for capability, reason in each.lacks.items():
             _paragraph(f"lacks {capability}: {reason}")
@@ -73,7 +73,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _options(options: tuple[Option, ...]) -> None:
     if not options:
-        print("\nIt has no options of its own.")
+        say("\nIt has no options of its own.")
     for option in options:
         default = option.default
         shown = (
@@ -83,9 +83,9 @@ def _options(options: tuple[Option, ...]) -> None:
             if isinstance(default, float)
             else f"; default {default}"
         )
-        print(f"\n--option {option.name}=... ({option.kind}{shown})")
+        say(f"\n--option {option.name}=... ({option.kind}{shown})")
         _paragraph(option.text)
 
 
 def _paragraph(text: str, indent: str = "    ") -> None:
-    print(textwrap.fill(text, width=100, initial_indent=indent, subsequent_indent=2 * indent))
+    say(textwrap.fill(text, width=100, initial_indent=indent, subsequent_indent=2 * indent))

@@ -2,18 +2,60 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from hybridsim.errors import UsageError, printable
+from hybridsim.files import json_text
 
 TRIAL = ".hybridsim-"  # how the name of a folder begins that is made, and removed, to see whether it can be
+
+
+class _Data:
+    """Where data go while everything else that is printed goes to standard error; None: to `sys.stdout` as it is."""
+
+    stream: TextIO | None = None
+
+
+@contextmanager
+def only_data_on_stdout() -> Iterator[None]:
+    """Send what libraries print to standard error, be it by Python or by C: standard output holds data alone."""
+    real = sys.stdout
+    if real is None:  # the process was started without one
+        yield
+        return
+    real.flush()
+    saved, stream = -1, real
+    with suppress(
+        OSError, ValueError
+    ):  # a stream or a process without descriptors: what C prints is not seen there
+        number, errors = real.fileno(), sys.stderr.fileno()
+        saved = os.dup(1)
+        if number == 1:
+            lines = 1 if real.isatty() else -1
+            stream = os.fdopen(os.dup(saved), "w", lines, encoding=real.encoding, errors=real.errors)
+        os.dup2(errors, 1)
+    _Data.stream = stream
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+        stream.flush()
+    except BrokenPipeError:
+        with suppress(OSError, ValueError):  # Python flushes it once more at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        raise
+    finally:
+        _Data.stream = None
+        if saved >= 0:
+            os.dup2(saved, 1)
+            os.close(saved)
+        if stream is not real:
+            stream.close()
 
 
 def complain(message: str) -> None:
@@ -23,26 +65,12 @@ def complain(message: str) -> None:
 
 def say(text: str = "") -> None:
     """Print data for people: what a model's titles, units and names hold does not steer the terminal."""
-    print(printable(text))
+    print(printable(text), file=_Data.stream)
 
 
 def print_json(value: Any) -> None:
     """Print one JSON document; numbers that JSON does not have (nan, inf) become null."""
-    print(json.dumps(_plain(value), indent=2, ensure_ascii=True, allow_nan=False))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # numpy arrays and numbers
-        return _plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, Iterable):
-        return [_plain(item) for item in value]
-    return str(value)
+    print(json_text(value), file=_Data.stream)
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options
-from hybridsim.cli.output import print_json, require_folder
+from hybridsim.cli.output import print_json, require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.files import write_text
@@ -61,8 +61,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _print(study: Study) -> None:
     for name, verdict, why in study.rows():
-        print(f"{name}: {verdict}")
-        print(textwrap.fill(why, _WIDTH, initial_indent="  ", subsequent_indent="  "))
+        say(f"{name}: {verdict}")
+        say(textwrap.fill(why, _WIDTH, initial_indent="  ", subsequent_indent="  "))
 
 
 def _write(study: Study, name: str, folder: Path, images: Path, session: Session) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
 from hybridsim.analysis.provenance import provenance
 from hybridsim.errors import UsageError, nearest
-from hybridsim.files import write_text
+from hybridsim.files import json_text, write_text
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
@@ -148,7 +147,7 @@ class Advice:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
         return text

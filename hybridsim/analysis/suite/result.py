@@ -14,7 +14,7 @@ from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import Verdict, verdict
 from hybridsim.analysis.table import setting
-from hybridsim.files import whole_file, write_text
+from hybridsim.files import json_text, whole_file, write_text
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
@@ -174,7 +174,7 @@ class SuiteComparison:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Everything, with versions and machine, as text; written where a path is given."""
-        text = json.dumps(self.to_dict(), indent=2, default=str)
+        text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
         return text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -19,7 +18,7 @@ from hybridsim.analysis.sweep.axes import POINT
 from hybridsim.analysis.sweep.job import DONE, NOT_RUN
 from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.errors import UsageError, nearest
-from hybridsim.files import whole_file, write_text
+from hybridsim.files import json_text, whole_file, write_text
 from hybridsim.model import Model
 from hybridsim.tables import library
 
@@ -140,7 +139,7 @@ class Sweep:
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
-        text = json.dumps(self.to_dict(), indent=2, default=str, allow_nan=False)
+        text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
         return text
