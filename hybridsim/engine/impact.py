@@ -250,10 +250,9 @@ class _Collision:
         """
         at, system = self.at, self.system
         z = np.maximum(at.z, 0)
-        for c, automaton in enumerate(
-            system.automata
-        ):  # what slides or sticks would go by velocities as they were
-            if automaton.has_surface and not automaton.is_unilateral and z[c] == automaton.hold:
+        # what slides, sticks or lies elsewhere would go by velocities as they were, or by those of a floor that set out
+        for c, automaton in enumerate(system.automata):
+            if automaton.has_surface and z[c] == automaton.hold:
                 z[c] = automaton.above
         z[normal] = [system.automata[c].hold for c in normal]
         x = system.project(at.s, at.x, at.p, z)

@@ -59,3 +59,24 @@ def test_a_floor_that_only_bends_is_followed(method: str) -> None:
     sol = hs.simulate(model, (0.0, 1.5), integrator=method)
     assert sol.success and not sol.events
     assert sol(1.5) == pytest.approx([0.5, 2.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("speeds", [(0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (-0.5, -0.5)])
+@pytest.mark.parametrize("method", METHODS)
+def test_floors_that_set_out_at_once_do_so_each_for_itself(method: str, speeds: tuple[float, float]) -> None:
+    """The blow of one floor does not carry the ball on the other along."""
+    model = hs.Model(
+        "two-floors",
+        states=[
+            s for k in (0, 1) for s in (hs.State(f"h{k}", 0, f"w{k}"), hs.State(f"w{k}", 0, f"p{k} - 10"))
+        ],
+        impacts=[
+            hs.Impact(f"p{k}", gap=f"h{k} - {speed}*max(t - 1, 0)", restitution=0.5)
+            for k, speed in enumerate(speeds)
+        ],
+    )
+    sol = hs.simulate(model, (0.0, 1.04), integrator=method)
+    started = [0.75 if speed > 0.0 else 0.0 for speed in speeds]
+    expected = [part for w in started for part in (0.02 * w - 5 * 0.02**2, w - 10 * 0.02)]
+    assert sol(AT) == pytest.approx(expected, abs=1e-9)
+    assert [event.component for event in sol.events] == ["p0", "p1"]
