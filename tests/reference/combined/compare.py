@@ -15,6 +15,7 @@ from .render import Renderer
 from .values import Motion
 
 POINTS = 23
+LIMITS = {"seconds": 20.0, "events": 5000}
 ALLOWED = 1e-5  # error of a run at rtol 1e-9, relative to the motion, beyond which it is called different
 
 
@@ -84,7 +85,7 @@ def hold(
             (shift, end),
             params=renderer.values(numbers),
             integrator=integrator,
-            limits={"seconds": 20, "events": 5000},
+            limits=LIMITS,
         )
         if way == "resumed" and sol.status == "finished":
             sol = sol.resume(shift + model.duration)
@@ -145,6 +146,13 @@ def compared(model: Abstract, renderer: Renderer, sol: Any, truth: Truth, integr
         return Verdict("chose", integrator, sol.status, f"at {motion.end:.6g}: {motion.message}", certain)
     if motion.status == "inconsistent" and certain == motion.end and sol.status == "finished":
         return Verdict("went on", integrator, sol.status, f"at {motion.end:.6g}: {motion.message}", certain)
+    for event in sol.events:
+        near = event.t - shift
+        if event.kind != "near-grazing" or near > certain - 1e-3:
+            continue
+        if not any(abs(t - near) < 1e-3 for t, _ in motion.touches):
+            what = f"near-grazing of {event.component} at {near:.6g}, where nothing touches zero"
+            return Verdict("differs", integrator, sol.status, what, certain)
     return Verdict("agrees", integrator, sol.status, f"{worst[0]:.1e}", certain, worst[0])
 
 

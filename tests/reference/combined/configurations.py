@@ -35,9 +35,8 @@ class Configurations(Values):
         for r in m.relays:
             names[r] = {"above": node(1), "below": node(-1), "sliding": var(r)}[config[r]]
         loads = {}
-        for f, c in m.contacts.items():
+        for f, c in m.contacts.items():  # a load may contain the friction forces of contacts before it
             loads[f] = replaced(lowered(c.normal), names)
-        for f, c in m.contacts.items():
             force = replaced(lowered(c.mu_k or c.mu_s), names) * loads[f]
             names[f] = {"slip+": force, "slip-": -force, "stick": var(f), "open": ZERO}[config[f]]
         rates = {k: replaced(e, names) for k, e in rates.items()}

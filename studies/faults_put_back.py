@@ -1,0 +1,174 @@
+"""Whether random trials find the faults that were mended, if each of them is put back by itself.
+
+    python studies/faults_put_back.py [journal] [fault ...]      (without a name: all)
+
+The table of faults is tests/reference/put_back/faults.toml, and the trials are in tests/reference/combined. Each fault
+is put back into a copy of the package in a temporary folder. Structures are drawn until one run is not as it should be
+that is as it should be with the package as it stands. The page is written if all faults have been tried.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import multiprocessing as mp
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from reference.put_back.copies import Fault, copied, faults  # noqa: E402
+
+PAGE = ROOT / "docs" / "studies" / "faults-put-back.md"
+RESULTS = "## Results"
+MOST = 300  # structures of a trial
+PATIENCE = 90.0  # seconds without a sign after which a run counts as one that hangs
+HEAVY = (
+    "numpy",
+    "scipy.integrate",
+    "scipy.linalg",
+    "scipy.sparse.linalg",
+    "sympy",
+    "mpmath",
+)  # forks share them
+
+
+def work(package: Path, trial: str, numbers: list[int], out: Any) -> None:
+    """Make the trials of these numbers with the package of a folder; what is not quiet is sent."""
+    sys.path.insert(0, str(package))
+    from reference.combined.further import COMPILED, TRIALS
+
+    os.environ["HYBRIDSIM_JIT"] = "1" if trial in COMPILED else "0"
+    import hybridsim
+
+    assert Path(hybridsim.__file__).is_relative_to(package)
+    for number in numbers:
+        out.send((number, None))
+        for record in TRIALS[trial](number):
+            out.send((number, record))
+    out.send((-1, None))
+
+
+def found(package: Path, trial: str, numbers: list[int]) -> Any:
+    """Findings of a package one after the other: number of the structure, and what was seen."""
+    ours, theirs = mp.get_context("fork").Pipe(duplex=False)
+    process = mp.get_context("fork").Process(target=work, args=(package, trial, numbers, theirs), daemon=True)
+    process.start()
+    theirs.close()
+    number = numbers[0]
+    try:
+        while True:
+            if not ours.poll(PATIENCE):
+                yield number, {"kind": "hangs", "detail": f"no result within {PATIENCE:g} s"}
+                return
+            try:
+                number, record = ours.recv()
+            except EOFError:
+                yield number, {"kind": "dies", "detail": "the process ended"}
+                return
+            if number < 0:
+                return
+            if record is not None:
+                yield number, record
+    finally:
+        process.kill()
+        process.join()
+
+
+def search(fault: Fault, folder: Path) -> dict[str, Any]:
+    """The first structure that finds a fault, among as many as are drawn."""
+    package, first, others = copied(folder / fault.name, fault), 0, 0
+    began = time.perf_counter()
+    while first < MOST:
+        for number, record in found(package, fault.trial, list(range(first, MOST))):
+            if any(True for _ in found(folder / "as-it-stands", fault.trial, [number])):
+                others += 1  # not by this fault
+                first = number + 1
+                break
+            seconds = time.perf_counter() - began
+            return {"fault": fault.name, "structures": number + 1, "seconds": round(seconds), "by": record}
+        else:
+            break
+    return {
+        "fault": fault.name,
+        "structures": MOST,
+        "by": None,
+        "seconds": round(time.perf_counter() - began),
+    }
+
+
+def by_test(fault: Fault, folder: Path) -> dict[str, Any]:
+    """Whether a test of the repository finds a fault."""
+    package = copied(folder / fault.name, fault)
+    options = ["-q", "-x", "-n0", "-p", "no:cacheprovider", "-p", "no:randomly"]
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "pytest", *options, str(ROOT / fault.test)],
+        env=os.environ | {"PYTHONPATH": str(package), "HYBRIDSIM_JIT": "0"},
+        capture_output=True,
+        text=True,
+        cwd=folder,
+    )
+    last = [line for line in done.stdout.splitlines() if line.startswith("FAILED")]
+    by = {"kind": "test", "detail": last[0]} if done.returncode == 1 and last else None
+    return {"fault": fault.name, "structures": 0, "by": by}
+
+
+def shown(by: dict[str, Any] | None) -> str:
+    """What a finding is, in a cell of a table."""
+    if by is None:
+        return "not found"
+    where = f" by `{by['integrator']}`" if by.get("integrator") else ""
+    text = " ".join(str(by.get("detail", "")).split()).replace("|", "\\|")
+    return f"{by['kind']}{where}: {text[:120]}{'...' if len(text) > 120 else ''}"
+
+
+def table(done: list[dict[str, Any]]) -> str:
+    """The results as a table."""
+    results = {one["fault"]: one for one in done}
+    answers = [f for f in faults() if f.trial != "test"]
+    count = sum(results[f.name]["by"] is not None for f in answers)
+    out = f"The trials find {count} of the {len(answers)} faults ({100 * count / len(answers):.0f} %).\n\n"
+    out += "| fault | trial | structures | what was seen |\n| --- | --- | --- | --- |\n"
+    for fault in answers:
+        one = results[fault.name]
+        out += f"| {fault.words} | {fault.trial} | {one['structures']} | {shown(one['by'])} |\n"
+    out += "\nFaults of files and of the cache are found by tests, not by trials:\n\n"
+    out += "| fault | test | found |\n| --- | --- | --- |\n"
+    for fault in faults():
+        if fault.trial == "test":
+            is_found = "yes" if results[fault.name]["by"] else "no"
+            out += f"| {fault.words} | `{fault.test}` | {is_found} |\n"
+    return out
+
+
+def main() -> None:
+    """Try the faults that are named, or all."""
+    journal = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("faults-put-back.jsonl")
+    done = [json.loads(line) for line in journal.read_text().splitlines()] if journal.exists() else []
+    known = {one["fault"] for one in done}
+    for name in HEAVY:
+        importlib.import_module(name)
+    with tempfile.TemporaryDirectory() as temporary, journal.open("a", encoding="utf-8") as out:
+        folder = Path(temporary)
+        copied(folder / "as-it-stands")
+        for fault in faults():
+            if fault.name in known or (sys.argv[2:] and fault.name not in sys.argv[2:]):
+                continue
+            one = (by_test if fault.trial == "test" else search)(fault, folder)
+            done.append(one)
+            print(json.dumps(one), flush=True)
+            out.write(json.dumps(one) + "\n")
+            out.flush()
+    if {fault.name for fault in faults()} <= {one["fault"] for one in done}:
+        head, _, _ = PAGE.read_text(encoding="utf-8").partition(RESULTS)
+        PAGE.write_text(f"{head}{RESULTS}\n\n{table(done)}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,81 @@
+"""Random models with friction by time stepping, beside the judge: the error is small, and falls with the step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import hybridsim as hs
+
+from .builder import Builder, number_set
+from .compare import hold, judged
+from .forms import Contact, Node, var
+from .gaps import bouncing, loaded_contact
+from .render import Renderer, Style
+from .rubbing import contact, relay, resting, stack
+
+STEPS = 1000
+LARGEST = 0.02  # error of the finer run, relative to the motion
+POINTS = 4  # times the error falls with a step of an eighth, at the least, where it is not small
+
+
+def leaning(b: Builder) -> None:
+    """Two bodies with friction, one of which is pressed on by the friction force of the other."""
+    v, u, f, g = (b.name(stem) for stem in ("v", "v", "f", "f"))
+    b.m.states[v] = b.num(-2, 2), b.force() - var(f)
+    b.m.states[u] = b.num(-2, 2), b.force() - var(g)
+    load, low, more = b.num(1, 2), b.num("0.2", "0.5"), b.num("0.1", "0.4")
+    b.m.contacts[f] = Contact(var(v), load, low)
+    pressed: Node = b.num(2, 3) + b.either(b.num("0.3", 1)) * var(f)
+    b.m.contacts[g] = Contact(var(u), pressed, low + more)
+
+
+PARTS = (leaning, contact, resting, stack, relay, bouncing, loaded_contact)
+
+
+def friction(number: int) -> Builder:
+    """A structure with friction, relays and gaps."""
+    b = Builder(number * 37 + 2)
+    for part in b.rng.choices(PARTS, (3, 3, 1, 2, 1, 1, 1), k=b.rng.choice([1, 1, 2])):
+        part(b)
+    return b
+
+
+def time_stepping(number: int) -> Iterator[dict[str, Any]]:
+    """One model by `moreau` with two steps, and by a method that locates events."""
+    b = friction(number)
+    numbers = number_set(b.m, number, 0)
+    motion, times, certain = truth = judged(b.m, numbers)
+    if certain < 1e-3:
+        return
+    renderer = Renderer(b.m, Style(number))
+    try:
+        compiled = hs.Model.from_toml(renderer.toml(numbers))
+    except hs.ModelError:
+        return
+    v = hold(b.m, compiled, renderer, numbers, b.rng.choice(["taylor", "dop853"]), truth)
+    if v.kind in ("differs", "chose", "went on", "refused", "crash"):
+        yield {"kind": v.kind, "integrator": v.integrator, "detail": v.detail}
+        return
+    names, values = list(b.m.states), renderer.values(numbers)
+    sizes = {k: max([1.0, *(abs(motion.at(t, names)[k]) for t in times)]) for k in names}
+    errors = []
+    for steps in (STEPS, 8 * STEPS):
+        try:
+            sol = hs.simulate(
+                compiled,
+                (0, b.m.duration),
+                params=values,
+                integrator="moreau",
+                step=b.m.duration / steps,
+            )
+        except hs.HybridsimError:
+            return  # refused by name
+        if sol.status != "finished" or sol.warnings:
+            return
+        right = {t: motion.at(t, names) for t in times}
+        off = [abs(float(sol.output(k, t)) - right[t][k]) / sizes[k] for t in times for k in names]
+        errors.append(sorted(off)[len(off) * 3 // 4] if off else 0.0)  # not the instants next to events
+    if errors[1] > LARGEST / 4 and errors[1] > errors[0] / POINTS:
+        detail = f"error {errors[0]:.2g} with {STEPS} steps, {errors[1]:.2g} with {8 * STEPS}"
+        yield {"kind": "differs", "integrator": "moreau", "detail": detail}
