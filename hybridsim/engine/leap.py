@@ -282,8 +282,6 @@ def leap(
                 sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
                 min(left, max_step), powers, totals,
             )  # fmt: skip
-            if h < left:
-                h = on_the_grid(s, h)
             short = short + 1 if h < STANDSTILL * s else 0
             if not h > 0.0 or short >= IN_A_ROW:
                 return STOPPED, first_step, n_segments
@@ -314,14 +312,16 @@ def leap(
                         where_it_ends, (u, kind, order, d, room.a, room.stack, codes.bernstein[1])
                     )
                     if end < d:
-                        d, outcome = on_the_grid(s, end), NEVER
-            if not d > 0.0:
-                return STOPPED, first_step, n_segments
+                        d, outcome = end, NEVER
             trials = 0
             first_look = len(BETWEEN)
             if seems_straight(tapes.computed[k], coefficients, order, powers, rtol, atol):
                 first_look = 0
             while True:
+                if outcome == NEVER and d < left:
+                    d = on_the_grid(s, d)
+                if trials > _TRIALS or not d > 0.0:
+                    return STOPPED, first_step, n_segments
                 look, holds_so_far = first_look, True
                 while holds_so_far and look <= len(BETWEEN):
                     e = d if look == len(BETWEEN) else BETWEEN[look] * d
@@ -341,9 +341,7 @@ def leap(
                     holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
                 if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
                     break
-                d, outcome, trials = on_the_grid(s, _SHORTER * d), NEVER, trials + 1
-                if trials > _TRIALS or not d > 0.0:
-                    return STOPPED, first_step, n_segments
+                d, outcome, trials = _SHORTER * d, NEVER, trials + 1
             steps[n_steps, 0], steps[n_steps, 1] = s, d
             n_steps += 1
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d

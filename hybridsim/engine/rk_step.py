@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.jit import call, kernel
+from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.packs import packed
 
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
@@ -140,7 +140,7 @@ def attempt(
     return abs(h) * square / math.sqrt(weighted * n) if weighted > 0.0 else math.nan
 
 
-@kernel
+@inlined
 def on_the_grid(s: float, h: float) -> float:
     """The length of a step from s that ends at a double of time: the one next to s + h, or 0 if there is none.
 
