@@ -95,17 +95,16 @@ def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
 class Locator:
     """Searches the steps of one segment; remembers on which side each guard and monitor is."""
 
-    def __init__(self, flow: Flow, watch: Watch, rounding: Callable[[], np.ndarray]) -> None:
+    def __init__(self, flow: Flow, watch: Watch) -> None:
         self.flow = flow
-        self.rounding = rounding  # of the states, on the segment so far
         self.numbers, self.x_error = watch.guards, watch.x_error
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
 
-    def search(self, step: Step) -> Findings:
-        """All that happens in a step."""
+    def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
+        """All that happens in a step; rounding: of the states, on the segment so far."""
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
@@ -120,7 +119,7 @@ class Locator:
                 order = int(self.orders[g]) if side else 0
                 floor = self.floors[g]
                 if flow.system.is_corner[flow.system.owner[g]]:  # within rounding either of its sides will do
-                    floor = max(floor, self._bound(step, int(g), self.rounding()))
+                    floor = max(floor, self._bound(step, int(g), rounding()))
                 try:
                     found, grazed, guard_ends[g], gap = find_roots(
                         sample,

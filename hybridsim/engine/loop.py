@@ -136,7 +136,7 @@ class ModeLoop:
         else:
             due = self.timetable.due_at_start(self.origin) if self.forward else ()
             self.timetable.kept(self.origin)
-            self.standing, self.adopted, stop = self.plan.start(due), self.origin, False
+            self.standing, self.adopted, stop = self.plan.start(task, due), self.origin, False
             if not self.plan.begins_silently:
                 stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due, ())
             step_size = task.tolerances.first_step

@@ -23,23 +23,23 @@ _TURNS = 100
 
 
 class Plan:
-    """Of a task for a system by a method."""
+    """Of a task for a system by a method; it is kept with the task, and so does not hold it."""
 
     def __init__(self, system: System, method: Method, task: Task) -> None:
-        self.system, self.method, self._task = system, method, task
+        self.system, self.method = system, method
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.renewal = _TURNS * 2.0 * math.pi / system.fastest if system.fastest else math.inf
-        self._pattern = self._leaper()
+        self._pattern = self._leaper(task)
         self.begins_silently = False  # known after `start`: nothing is to be recorded there
         self._start: tuple[Outcome, np.ndarray] | None = None
         self._laid: Laid | None = None  # the same
 
-    def _leaper(self) -> Leaps | None:
+    def _leaper(self, task: Task) -> Leaps | None:
         """The compiled loop, where method and model allow it."""
         system, model = self.system, self.system.model
-        if not self.method.leaps or not self._task.forward or system.n == 0 or model.monitors or model.inputs:
+        if not self.method.leaps or not task.forward or system.n == 0 or model.monitors or model.inputs:
             return None
-        return self.method.leaper(system, self._task.tolerances, self.renewal)
+        return self.method.leaper(system, task.tolerances, self.renewal)
 
     def leaper(self) -> Leaps | None:
         """A compiled loop for one run; None where there is none."""
@@ -57,11 +57,11 @@ class Plan:
             self._laid = laid_out(*self._start)
         return self._laid
 
-    def start(self, due: tuple[int, ...]) -> Standing:
-        """What holds just after the start, the schedules due then applied."""
-        system, forward = self.system, self._task.forward
+    def start(self, task: Task, due: tuple[int, ...]) -> Standing:
+        """What holds just after the start of its task, the schedules due then applied."""
+        system, forward = self.system, task.forward
         if self._start is None:
-            outcome = settled_start(system, self._task, self.origin, due)
+            outcome = settled_start(system, task, self.origin, due)
             self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
             told = due or outcome.changes or outcome.warnings or outcome.status or system.monitor_names
             self.begins_silently = forward and not told

@@ -20,9 +20,8 @@ SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
 # Nor is a rest of less than this share of the step: some thousand steps of one length add up to their span but for
 # roundings of that size, and a step that is longer by it has the same error but for a part in 10**8.
 STRETCH = 1.0 + 2.0**-30
-_COARSE = (
-    2.0**-42
-)  # a length of fewer ulps of time than 2**10 changes by more than 2**-11 of itself when it is rounded
+# A length of fewer ulps of time than 2**10 changes by more than 2**-11 of itself when it is rounded.
+_COARSE = 2.0**-42
 
 
 class Coefficients(NamedTuple):

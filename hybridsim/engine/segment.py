@@ -108,7 +108,7 @@ class SegmentRun:
         self.tolerances, self.counters, self.progress = tolerances, counters, progress
         self.watch = watch
         self.flow = Flow(system, p, z, counters, forward)
-        self.locator = Locator(self.flow, watch, self.rounding)
+        self.locator = Locator(self.flow, watch)
         self.monitors = system.model.monitors
         self.knots, self.states = [0.0], [x]
         self.interpolants: list[Dense] = []
@@ -237,7 +237,7 @@ class SegmentRun:
 
     def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
         """Search a step; where something stops the segment, return the step up to there and the arrival."""
-        found = self.locator.search(step)
+        found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
         if first is not None and self._has_not_moved(step, *first):
             return self._examine(stepper, stepper.restep(step, step.s0 + _SHORTER * (step.s1 - step.s0)))

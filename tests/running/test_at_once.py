@@ -14,6 +14,8 @@ import hybridsim as hs
 from hybridsim.engine.at_once import AtOnce
 from hybridsim.engine.exact_leaper import ExactLeaper
 from hybridsim.engine.leaper import Leaper
+from hybridsim.engine.loop import ModeLoop
+from hybridsim.engine.segment import SegmentRun
 from hybridsim.engine.stepping import StepFailure
 from hybridsim.errors import RunInterrupted
 
@@ -122,6 +124,21 @@ def test_what_waits_takes_no_more_memory_than_what_is_made(engine: str, save: st
     # the least of three: what is made once meanwhile, such as machine code of another thread, is not held by solutions
     made, waiting = (min(held(**options) for _ in range(3)) for options in ({"limits": ENOUGH}, {}))
     assert waiting <= 1.1 * made
+
+
+@pytest.mark.parametrize("options", [{}, {"limits": ENOUGH}])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_run_that_is_over_is_let_go_at_once(engine: str, options: dict[str, Any]) -> None:
+    """The blocks that its compiled loop wrote to are megabytes, and do not wait for a collection of garbage."""
+    model = hs.load("feeny-moon")  # some of its segments go through the general loop
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(3):
+            hs.simulate(model, (0, 30), integrator=engine, save="nothing", **options)
+        assert not [o for o in gc.get_objects() if isinstance(o, (ModeLoop, SegmentRun))]
+    finally:
+        gc.enable()
 
 
 def test_who_breaks_off_while_it_is_made_asks_again(monkeypatch: pytest.MonkeyPatch) -> None:
