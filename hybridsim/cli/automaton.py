@@ -184,7 +184,10 @@ def _engine(report: Report) -> Iterator[str]:
     clusters = [", ".join(cluster) for cluster in report.clusters]
     if clusters:
         yield f"clusters, each decided jointly: {'; '.join(clusters)}"
+    written = f", written in {report.lowering_seconds:.1g} s" if report.lowering_seconds else ""
     cost = (
-        f"about {report.compile_seconds:.1g} s, once" if report.compile_seconds else "nothing, it is cached"
+        f"a run compiles those that it uses, once, in up to about {report.compile_seconds:.1g} s of a processor"
+        if report.compile_seconds
+        else "all are compiled already"
     )
-    yield f"compiling its {report.operations} operations costs {cost}"
+    yield f"{report.operations} operations{written}: {cost}"

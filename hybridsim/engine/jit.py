@@ -44,7 +44,7 @@ if ENABLED:
     from numba.np.arrayobj import populate_array
 
     from hybridsim.engine.kernel_cache import keep_on_disk
-    from hybridsim.engine.machine_code import compile_text, machine_name, ready
+    from hybridsim.engine.machine_code import compile_text, definition_in, functions_in, machine_name, ready
 
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
@@ -180,6 +180,15 @@ if ENABLED:
         path = getattr(module, "__file__", None)  # None for a module that is in memory alone
         kept = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
         return compile_text(module.__loader__.get_source(module.__name__), name, kept)
+
+    def texts_to_compile(module: Any) -> list[str]:
+        """The texts of the functions of a generated module whose machine code is not on disk."""
+        path, text = getattr(module, "__file__", None), module.__loader__.get_source(module.__name__)
+        return [
+            definition_in(text, name)
+            for name in functions_in(text)
+            if path is None or not is_kept(Path(path).with_suffix(f".{name}"))
+        ]
 
     def compile_series(
         kept: Path | None, names: Sequence[str], written: Callable[[], str]
@@ -385,6 +394,10 @@ else:
                 return 1
 
         return guarded, guarded
+
+    def texts_to_compile(module: Any) -> list[str]:
+        """Nothing is compiled."""
+        return []
 
     def call_apart(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Call a kernel."""

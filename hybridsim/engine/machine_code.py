@@ -10,6 +10,7 @@ import ast
 import ctypes
 import ctypes.util
 import hashlib
+import re
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -276,12 +277,21 @@ def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -
 
 def _translated(text: str, name: str) -> str:
     """A function of a generated module as a module of LLVM."""
-    definition = next(
-        node for node in python_tree(text).body if isinstance(node, ast.FunctionDef) and node.name == name
-    )
     module = ir.Module(name)
-    Translator(module, definition)
+    Translator(module, python_tree(definition_in(text, name)).body[0])
     return str(module)
+
+
+def functions_in(text: str) -> list[str]:
+    """The names of the functions of a generated module that are compiled."""
+    return re.findall(r"^def (\w+)\(t, x, p, z, out", text, re.MULTILINE)
+
+
+def definition_in(text: str, name: str) -> str:
+    """The lines of one function of a generated module: to parse all of a large one for each function takes seconds."""
+    found = re.search(rf"^def {name}\(.*?(?=^\S|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert found is not None, f"the module has no function {name}"
+    return found.group()
 
 
 def _compiled(text: str) -> bytes:

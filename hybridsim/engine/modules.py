@@ -48,6 +48,12 @@ class Compiled:
             self._shared.setdefault(name, make())
         return self._shared[name]
 
+    def lengths_to_compile(self) -> list[int]:
+        """The lengths of the texts of those functions that have no machine code yet."""
+        from hybridsim.engine.jit import texts_to_compile
+
+        return [len(text) for text in texts_to_compile(self.module)]
+
     def address(self, name: str) -> Any:
         """Address of one of flow, tangent, project, guards, surfaces, monitors, quantities; compiled on first use."""
         if name not in self._kept:
@@ -93,12 +99,6 @@ def _code_of_functions(model: Model) -> PythonCode:
             del _of_functions[next(iter(_of_functions))]
         _of_functions[key] = code
         return code
-
-
-def is_cached(model: Model) -> bool:
-    """Whether the generated module of a model is on disk."""
-    path = _path(_name(model))
-    return path is not None and path.exists()
 
 
 def _name(model: Model) -> str:

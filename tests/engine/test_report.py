@@ -1,0 +1,49 @@
+"""What `check` says of compiling: measured where it is known, and of the right size where it is estimated."""
+
+from __future__ import annotations
+
+import secrets
+import time
+
+import pytest
+
+import hybridsim as hs
+from hybridsim.cli.automaton import lines_of
+from hybridsim.engine.jit import ENABLED
+from hybridsim.engine.machine_code import functions_in
+from hybridsim.engine.modules import compiled
+from hybridsim.engine.report import describe
+
+pytestmark = pytest.mark.skipif(not ENABLED, reason="nothing is compiled")
+
+
+def beads(count: int) -> hs.Model:
+    """Beads on springs that are stiffer the longer they are, under names that no model had before."""
+    name = f"x{secrets.token_hex(6)}_"
+    states = []
+    for k in range(count):
+        left, right = (f"{name}{(k + shift) % count}" for shift in (-1, 1))
+        force = f"sin({left} - {name}{k})**3 + exp({right})*cos({name}{k}*{left}) - f{k}/(2 + {name}{k}**2)"
+        states += [hs.State(f"{name}{k}", 0.1, f"v{k}"), hs.State(f"v{k}", 1, force)]
+    contacts = [hs.Contact(f"f{k}", f"v{k}", "1", "coulomb", {"mu": 0.1}) for k in range(count)]
+    return hs.Model(name, states=states, contacts=contacts)
+
+
+def test_the_estimate_is_of_the_size_of_the_measured_time() -> None:
+    model = beads(4)
+    before = describe(model)
+    assert before.lowering_seconds > 0.0
+    text = "\n".join(lines_of(model, before, (), ()))
+    assert (
+        f"{before.operations} operations, written in {before.lowering_seconds:.1g} s: a run compiles those"
+        in text
+    )
+    assert f"in up to about {before.compile_seconds:.1g} s of a processor" in text
+    code, start = compiled(model), time.process_time()
+    for name in functions_in(code.module.__loader__.get_source(code.module.__name__)):
+        code.address(name)
+    measured = time.process_time() - start
+    assert before.compile_seconds / 5.0 < measured < 5.0 * before.compile_seconds
+    after = describe(model)
+    assert after.compile_seconds == 0.0
+    assert "operations" in text and "all are compiled already" in "\n".join(lines_of(model, after, (), ()))
