@@ -55,13 +55,14 @@ def simulate_mechanical(
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
     from hybridsim.integrators.fixed_step_length import refuse_endless, refuse_longer
-    from hybridsim.integrators.registry import keyword_elsewhere
+    from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
     from hybridsim.mechanics.plant import build
     from hybridsim.mechanics.run import MechanicalRun
     from hybridsim.mechanics.solution import MechanicalSolution
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
+        integrator_class(name)  # what is no integrator at all is refused as such
         raise UsageError(
             f"{name} does not run a MechanicalSystem",
             remedy=f"choose taylor, or run to_model() with {name} {_INDEPENDENT}",

@@ -271,7 +271,10 @@ class MechanicalSystem:
 
     def _check(self) -> None:
         if len(self.names) != self.n:
-            raise UsageError(f"{self.name}: {len(self.names)} names for {self.n} coordinates")
+            raise UsageError(
+                f"{self.name}: names has {len(self.names)} of them for {self.n} coordinates",
+                remedy="give a name for each coordinate",
+            )
         every = [*self.names, *self.velocities, *(c.name for c in self.all_contacts)]
         twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
         if twice:

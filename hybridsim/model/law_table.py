@@ -53,7 +53,8 @@ class LawTable(Declared):
         self._expressions("over")
         if len(self.at) != len(self.values):
             raise self._fault(
-                f"{len(self.at)} arguments and {len(self.values)} values", "give one value for each"
+                f"at has {len(self.at)} numbers, and values has {len(self.values)}",
+                "give a value for each of at",
             )
         if len(self.at) < 2:
             raise self._fault(f"{len(self.at)} points", "give at least two")

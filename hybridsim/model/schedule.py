@@ -55,7 +55,11 @@ class Schedule(Declared):
 
     def __post_init__(self) -> None:
         self._texts("name")
-        object.__setattr__(self, "times", tuple(parse(time, self.place) for time in as_tuple(self.times)))
+        object.__setattr__(
+            self,
+            "times",
+            tuple(self._parsed(time, "times", functions=False) for time in as_tuple(self.times)),
+        )
         if self.start is None and self.period is not None:
             object.__setattr__(self, "start", parse(0))
         self._expressions("start", "period")

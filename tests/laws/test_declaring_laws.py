@@ -44,7 +44,7 @@ WRONG = {
     "reset of another": ("reset = { z", "reset = { q", "the law has no state 'q'", 10),
     "mode sets another": ("guards.top", 'set = { g = "1" }\nguards.top', "sets 'g'", 10),
     "no such mode": ('to = "only"', 'to = "other"', "there is no mode 'other'", 18),
-    "unequal table": ("values = [1, 0.9]", "values = [1]", "2 arguments and 1 values", 15),
+    "unequal table": ("values = [1, 0.9]", "values = [1]", "at has 2 numbers, and values has 1", 15),
     "table falls": ("at = [0, 1]", "at = [1, 0]", "let them increase", 15),
     "table of texts": ("values = [1, 0.9]", 'values = [1, "a"]', "list of numbers", 15),
     "rate unknown": ('normal = "10 + x"', 'normal = "10 + f"', "cannot be used here", 7),

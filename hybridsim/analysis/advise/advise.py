@@ -21,7 +21,7 @@ from hybridsim.analysis.allowance import OutOfTime
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.race import Budget
 from hybridsim.analysis.rungs import LADDER, Rung
-from hybridsim.analysis.wanted import positive, words
+from hybridsim.analysis.wanted import mapping, positive, words
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
@@ -117,8 +117,10 @@ def advise(
     began = time.perf_counter()
     model = arguments.chosen_model(model, params)
     if x0 is not None:
-        model = model.with_start(**x0)
+        model = model.with_start(**mapping(x0, "x0"))
     model.validate()
+    integrators = arguments.flag(integrators, "integrators")
+    over = None if over is None else mapping(over, "over")
     tol = positive(tol, "tol")
     if not tol < 1.0:
         raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance below 1, such as 0.01")

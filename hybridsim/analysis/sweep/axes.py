@@ -93,7 +93,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
     if not isinstance(values, Mapping) or not values:
         raise UsageError(
-            f"the values of the sweep are {values!r}",
+            f"values is {values!r}",
             remedy="give a mapping from names of parameters to values, {'F0': [20, 30, 40]}",
         )
     units = {p.name: p.unit for p in model.parameters}
