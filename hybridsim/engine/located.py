@@ -12,7 +12,7 @@ from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.segment import Arrival, SegmentRun
-from hybridsim.engine.segment_end import ROUNDED
+from hybridsim.engine.segment_end import spread
 from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 
@@ -114,8 +114,10 @@ def located(
         zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
         late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
         is_met = abs(target - arrival.s) <= at.s_error + late
-        at, series = (wide, known) if is_met else (at, series)
-    if not is_met and others_near(system, at, series, arrival, len(segment.knots)):
+        if is_met:  # so far from the time that is known
+            wide.s_error += abs(target - arrival.s)
+            at, series = wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+    if not is_met and others_near(system, at, series, arrival, segment):
         at, series = together(system, origin, at, series, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired, series)
     sides = _before_instant(series, arrival, segment)
@@ -139,14 +141,14 @@ def located(
 
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
     """The state at an event with bounds that count what the steps to it have rounded away, and the series there."""
-    wide = replace(at)
-    add_steps(system, wide, segment.scale + np.abs(arrival.x - segment.states[0]), len(segment.knots))
+    wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
+    add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
     return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
 
 
-def others_near(system: System, at: Situation, series: Any, arrival: Arrival, steps: int) -> bool:
+def others_near(system: System, at: Situation, series: Any, arrival: Arrival, segment: SegmentRun) -> bool:
     """Whether something that has not fired is beyond its bound, and so little that steps may have rounded it away."""
-    share = 1.0 + ROUNDED * steps
+    share = spread(len(segment.knots), segment.method.rounding)
     active = set(map(int, np.flatnonzero(system.active(at.z)))) - set(arrival.fired)
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active]
@@ -204,23 +206,27 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
 
 
 def before_appointment(
-    system: System, target: Instant, at: Situation, steps: int, scale: np.ndarray
+    system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
 ) -> dict[int, int]:
     """Guards that are zero and leave at a time known beforehand, which a compiled loop has reached: they come first.
 
-    It took so many steps, with states of this size; the errors in `at` are completed by their rounding.
+    It took so many steps of a method that rounds like this, from these states; the errors in `at` are completed by
+    their rounding.
     """
+    way = np.abs(at.x - before)
+    scale = np.maximum(np.abs(before), np.abs(at.x)) + way
     at.x_error = at.x_error + 4.0 * UNIT * scale
     at.s_error = math.ulp(float(target))
-    add_steps(system, at, scale, steps)
+    add_steps(system, at, scale, steps, rounding * way)
     return coincident(system, target, at, ())
 
 
-def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int) -> None:
+def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
     """Add to the errors of the states what so many steps have rounded away.
 
-    A step sums up to sixteen stages (dop853), each rounded. scale: of the states and of the way they went.
+    A step is a sum of terms, each rounded. scale: of the states and of the way they went. stages: that way, times what
+    the stages of the method add up to, which cancel each other.
     """
     held = system.evaluated(at.z)
-    at.x_error = at.x_error + 16.0 * UNIT * steps * scale
+    at.x_error = at.x_error + UNIT * (16.0 * steps * scale + stages)
     at.x_error[held] = UNIT * np.abs(at.x[held])

@@ -261,8 +261,7 @@ class ModeLoop:
             return True, True
         self.timetable.kept(target)
         at, steps = self._at_target(target), self.record.counters.steps - steps
-        scale = np.maximum(np.abs(x_before), np.abs(at.x)) + np.abs(at.x - x_before)
-        if fired := before_appointment(self.system, target, at, steps, scale):
+        if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
             x, settled = at.x.copy(), Settling(self.system, at, at.z.copy(), True).run(fired, ())
             if self._adopt(target, settled, x, (), ()):
                 return True, True

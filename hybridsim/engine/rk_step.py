@@ -68,6 +68,11 @@ class Tableau:
         return q, float(terms[0]), float(terms[1]), q_low, float(terms_low[0])
 
     @cached_property
+    def rounding(self) -> float:
+        """What a step rounds away, in units of rounding of h*f: sum |b_i| (1 + sum |a_ij|)."""
+        return float(np.abs(self.b) @ (1.0 + np.abs(self.a).sum(axis=1)))
+
+    @cached_property
     def real_stability(self) -> float:
         """Up to which z all |R(-z)| <= 1, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to 1e-3 or so."""
         power, terms = np.ones(len(self.c)), [1.0]

@@ -274,6 +274,10 @@ class Method(Protocol):
     def stable_to(self) -> float:
         """How far along the negative axis of h*lambda its steps are stable; 0 where they are far enough for any."""
 
+    @property
+    def rounding(self) -> float:
+        """What its steps round away at most, in units of rounding of the way that the states went."""
+
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
         """Its compiled loop for one run, no segment longer than `longest`; None where this model rules it out."""
 

@@ -77,6 +77,11 @@ class Integrator(ABC):
         """Of an explicit method, how far along the negative axis of h*lambda its steps are stable; else 0."""
         return 0.0
 
+    @property
+    def rounding(self) -> float:
+        """What steps round away at most, in units of rounding of the way that the states went."""
+        return 100.0
+
     def prepare(self, system: System) -> None:
         """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
         return

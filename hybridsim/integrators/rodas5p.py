@@ -38,6 +38,11 @@ class Rodas5P(Integrator):
     when: ClassVar[str] = "stiff modes, and many events among them"
     lacks: ClassVar[dict[str, str]] = {"functions": NEEDS_TAPE}
 
+    @property
+    def rounding(self) -> float:
+        """Three times the root of the squares that the roundings of the stages, whose c are large, add up to."""
+        return 2500.0
+
     def start(
         self,
         flow: Flow,

@@ -96,6 +96,11 @@ class RungeKuttaIntegrator(Integrator):
         """The border of the stability region of the tableau, on the negative axis."""
         return self.tableau.real_stability
 
+    @property
+    def rounding(self) -> float:
+        """Of the sums of stages, and of the sums within them, which cancel in part."""
+        return self.tableau.rounding
+
     @classmethod
     def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
         return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)

@@ -41,3 +41,41 @@ def test_two_bodies_that_reach_a_third_at_one_time_strike_it_at_once(integrator)
             expected = [middle - e1 * v1, middle, middle - e3 * v3]
             assert sol(end)[3:] == pytest.approx(expected, abs=1e-9)
             assert len({event.t for event in sol.events}) == 1
+
+
+BALL = """schema = 1
+name = "ball"
+[states]
+h = {{ start = {height}, der = "w" }}
+w = {{ start = 0, der = "-{g}" }}
+[discrete]
+n = 0
+[components.b.modes.flight]
+guards.floor = {{ expr = "h", then = [{{ to = "flight", reset = {{ h = "0", w = "-0.8*w", n = "+= 1" }} }}] }}
+[schedules.kick]
+times = [1]
+reset = {{ w = "+= 2", n = "+= 10" }}
+"""
+CLOCK = """
+[monitors.m]
+expr = "t - 1"
+action = "reset"
+reset = { n = "+= 100" }
+"""
+
+
+@pytest.mark.parametrize(
+    "integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853", "cvode-bdf"]
+)
+@pytest.mark.parametrize("more", ["", CLOCK])
+def test_a_bounce_at_a_time_known_beforehand_comes_before_what_is_due_then(integrator, more):
+    """The ball from g/2 falls for one second, on whichever side of it the bounce is located."""
+    draw = random.Random(5)
+    for _ in range(12):
+        g, end = round(draw.uniform(1.4, 20.0), 3), draw.choice([1.1, 1.2, 1.5])
+        model = hs.Model.from_toml(BALL.format(height=g / 2, g=g) + more)
+        sol = hs.simulate(model, (0.0, end), integrator=integrator)
+        assert sol(end)[1] == pytest.approx(
+            0.8 * g + 2.0 - g * (end - 1.0), abs=1e-5 if "cvode" in integrator else 1e-9
+        )
+        assert sol.output("n", end) == (111.0 if more else 11.0)
