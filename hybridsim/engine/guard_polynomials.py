@@ -66,7 +66,9 @@ def safe_step(terms: Any, first: int, rest: float, longest: float, error: float,
     d = longest
     a, b, c = lower[m - 1], lower[m - 2], lower[m - 3]
     if b < 0.0 or c < 0.0:  # the zero of three terms is a good guess
-        d = min(d, 2.0 * a / (math.sqrt(b * b - 4.0 * a * c) - b))
+        turn = math.sqrt(b * b - 4.0 * a * c) - b
+        if 2.0 * a < d * turn:
+            d = 2.0 * a / turn
     for _ in range(_ITERATIONS):
         value, slope = value_and_slope(lower, m, d, -rest)
         if value > 0.0:
