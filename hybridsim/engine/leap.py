@@ -19,6 +19,7 @@ from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
 from hybridsim.engine.modes_index import find_modes
 from hybridsim.engine.rk_step import on_the_grid
 from hybridsim.engine.segment_end import (
+    differ_by_rounding,
     is_crowded,
     is_hidden,
     is_shallow,
@@ -339,7 +340,12 @@ def leap(
                         ahead,
                     )
                     holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
-                if holds_so_far and keeps_up(guard_series, numbers, order, ahead, rtol, values, sums):
+                if holds_so_far and (
+                    keeps_up(guard_series, numbers, order, ahead, rtol, values, sums)
+                    or call_apart(
+                        differ_by_rounding, (automata, tapes, inputs, lin, k, s, values, sums, state, work)
+                    )
+                ):
                     break
                 d, outcome, trials = _SHORTER * d, NEVER, trials + 1
             steps[n_steps, 0], steps[n_steps, 1] = s, d

@@ -107,6 +107,34 @@ def is_hidden(
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 
+@kernel
+def differ_by_rounding(
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    lin: Any,
+    k: int,
+    s: float,
+    values: Any,
+    sums: Any,
+    state: Any,
+    work: Any,
+) -> bool:
+    """Whether values of the active guards and the sums of their series differ by no more than rounding.
+
+    A guard may be the small difference of large terms, which no shorter step makes agree better. Row k is that of the
+    modes; y of the work space is the state from which the series are taken, at local time s.
+    """
+    for i in range(work.y.shape[0]):
+        work.y_error[i] = 4.0 * UNIT * abs(work.y[i])
+    judge(automata, tapes, inputs, lin, s, 0.0, state, work)
+    for j in range(values.shape[0]):
+        rounding = work.judged[1, tapes.active[tapes.active_start[k] + j], 0]
+        if not abs(sums[j] - values[j]) <= 4.0 * rounding:
+            return False
+    return True
+
+
 @inlined
 def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
     """An instant and a time after it."""

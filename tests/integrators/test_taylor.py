@@ -54,3 +54,17 @@ def test_a_rate_that_begins_flat_is_not_taken_for_rest(n: int, rtol: float, has_
     sol = hs.simulate(model, (0, 10), integrator="taylor", rtol=rtol)
     turns = 10 * math.comb(n, n // 2) / 2**n
     assert sol(10.0)[:2] == pytest.approx([turns, turns], rel=300 * rtol)
+
+
+@pytest.mark.parametrize("floor", [0.0, 1.0, 1000.0])
+@pytest.mark.parametrize("rtol", [1e-9, 1e-11, 1e-12])
+def test_a_small_hop_over_a_high_floor_is_one_step(floor, rtol):
+    """Thrown up at w the ball is back after 2 w/g; the gap is a small difference of large terms."""
+    model = hs.Model(
+        "hop",
+        states=[hs.State("h", floor, "w"), hs.State("w", 1e-3, "-10 + p")],
+        impacts=[hs.Impact("p", gap=f"h - {floor}", restitution=0.3)],
+    )
+    sol = hs.simulate(model, (0.0, 2.5e-4), integrator="taylor", rtol=rtol)
+    assert sol.event_times("p") == pytest.approx([2e-4], abs=1e-15 + 1e-12 * floor)
+    assert sol.stats["steps"] == 2
