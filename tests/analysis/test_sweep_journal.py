@@ -8,10 +8,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from analysis import swept
 from analysis.swept import end
 
 import hybridsim as hs
@@ -61,12 +64,13 @@ def test_a_journal_that_is_cut_anywhere_goes_on(measure: object, tmp_path: Path)
         assert path.read_bytes().count(b"\n") >= written[:kept].count(b"\n")
 
 
-def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
+def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, calls = tmp_path / "sweep.journal", []
+    monkeypatch.setattr(swept, "note", calls.append)  # not read by the measure itself, or it would change it
 
     def measure(model: hs.Model) -> float:
-        calls.append(model.parameter_values()["F0"])
-        return calls[-1]
+        swept.note(None)
+        return model.parameter_values()["F0"]
 
     hs.sweep("dfcs", VALUES, measure, journal=path, workers=1)
     assert len(calls) == COUNT
@@ -131,3 +135,60 @@ def test_a_sweep_that_is_killed_goes_on(tmp_path: Path) -> None:
     assert main([*argv, "--out", str(out)]) == 0
     assert not journal.exists()
     assert (out / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()
+
+
+def _reading(name: str, factor: float = 1.0) -> Callable[[hs.Model], float]:
+    return lambda model: factor * model.parameter_values()[name]
+
+
+def _named(model: hs.Model, name: str) -> float:
+    return model.parameter_values()[name]
+
+
+LEVEL = 1.0
+
+
+def _over_level(model: hs.Model) -> float:
+    return model.parameter_values()["F0"] / LEVEL
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (lambda model: 1.0, lambda model: 2.0),
+        (_reading("F0"), _reading("omega")),
+        (_reading("F0", 1.0), _reading("F0", 1.0 + 1e-15)),
+        (partial(_named, name="F0"), partial(_named, name="omega")),
+    ],
+)
+def test_a_journal_serves_no_other_measure_of_the_same_name(
+    one: Callable[[hs.Model], float], other: Callable[[hs.Model], float], tmp_path: Path
+) -> None:
+    path = tmp_path / "sweep.journal"
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, one, journal=path)
+    with pytest.raises(hs.UsageError, match="of another sweep"):
+        hs.sweep("dfcs", {"F0": [20.0, 30.0]}, other, journal=path)
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, one, journal=path)
+
+
+def test_a_journal_serves_no_measure_that_reads_another_constant(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "sweep.journal"
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, _over_level, journal=path)
+    monkeypatch.setattr(sys.modules[__name__], "LEVEL", 2.0)
+    with pytest.raises(hs.UsageError, match="of another sweep"):
+        hs.sweep("dfcs", {"F0": [20.0, 30.0]}, _over_level, journal=path)
+
+
+def test_a_measure_is_told_alike_in_another_process() -> None:
+    """By code, constants, closures and functions that are not written in Python."""
+    text = (
+        "import numpy as np, hybridsim as hs\n"
+        "from hybridsim.analysis.sweep.identity import identity\n"
+        "measure = (lambda k: lambda model: np.max(k))(2.0)\n"
+        "print(identity([measure, np.max, np.arange(3.0), hs.load('dfcs')]))"
+    )
+    told = {subprocess.check_output([sys.executable, "-c", text]) for _ in range(2)}
+    assert len(told) == 1
+    assert b" at 0x" not in told.pop()

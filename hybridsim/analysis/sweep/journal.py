@@ -20,6 +20,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from hybridsim.analysis.sweep.identity import identity
 from hybridsim.analysis.sweep.job import Outcome
 from hybridsim.analysis.sweep.readings import Reading
 from hybridsim.errors import UsageError
@@ -31,7 +32,7 @@ _MOST_BYTES = 1 << 28  # of a line: some 10 million numbers
 
 def fingerprint(*parts: object) -> str:
     """What tells one sweep from another: model, values, measure, options."""
-    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+    return hashlib.sha256("\n".join(map(identity, parts)).encode()).hexdigest()
 
 
 class Journal:
@@ -117,7 +118,7 @@ class Journal:
             )
         if found.get("sweep") != head["sweep"]:
             raise UsageError(
-                f"{self.path} is of another sweep: model, values, measure or options differ",
+                f"{self.path} is of another sweep: model, values, options or measure differ",
                 remedy="finish that one, delete the file, or give another path",
             )
 

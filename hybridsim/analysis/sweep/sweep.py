@@ -138,7 +138,7 @@ def sweep(
     )
     began = time.perf_counter()
     mark = fingerprint(
-        _text_of(model), points, _named(measure), warm_start, sorted(options.items()), __version__
+        model.to_toml() if model.flow is None else model, points, measure, warm_start, options, __version__
     )
     with Journal(journal, mark) if journal is not None else nullcontext() as file:
         collected, finished, who = work(job, points, executor, count, tell, file)
@@ -159,11 +159,6 @@ def sweep(
         time.perf_counter() - began,
         who,
     )
-
-
-def _text_of(model: Model) -> str:
-    """What tells a model from others; of functions their names."""
-    return repr(model) if model.flow is not None else model.to_toml()
 
 
 def _named(measure: Any) -> str:
