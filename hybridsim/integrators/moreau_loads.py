@@ -24,7 +24,7 @@ def refuse_loads_of_friction(model: Model, integrator: str) -> None:
         for mode in component.modes:
             for name, expr in mode.set.items():
                 if name not in frictions:
-                    behind[name] = behind.get(name, set()) | names_of(expr.tree)
+                    behind[name] = behind.get(name, frozenset()) | names_of(expr.tree)
     for component in components:
         surface = component.surface
         if surface is None or surface.is_unilateral:

@@ -1,14 +1,16 @@
 """Conditions taken apart: a conditional of any Boolean combination as conditionals of single comparisons.
 
 `a if p and q else b` is `(a if q else b) if p else b`, and so for `or`, `not`, chains and conditions that depend on
-conditions. A comparison with a corner or a jump inside is one of what is smooth: `abs(u) < d` is `u < d and -u < d`.
+conditions. A comparison with a corner or a jump inside is one of what is smooth: `abs(u) < d` is `u < d and -u < d`. A
+conditional that is an absolute value or a maximum of what it compares becomes that: `u if u > 0 else -u` is `abs(u)`.
 """
 
 from __future__ import annotations
 
 import ast
+from fractions import Fraction
 
-from hybridsim.expr.polynomial import difference, number_tree, polynomial
+from hybridsim.expr.polynomial import difference, number_tree, polynomial, scaled
 from hybridsim.expr.rebuild import exchanged
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import Sides, sides_of
@@ -29,7 +31,8 @@ def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
     TooManyConditions
         Where that would be too long.
     """
-    return _Conditions(meanings).chosen(node.test, node.body, node.orelse, node)
+    conditions = _Conditions(meanings)
+    return conditions.corner(node) or conditions.chosen(node.test, node.body, node.orelse, node)
 
 
 class _Conditions:
@@ -120,6 +123,29 @@ class _Conditions:
                 if sides is not None or isinstance(part, ast.IfExp):
                     return part, sides
         return None, None
+
+    def corner(self, node: ast.IfExp) -> ast.expr | None:
+        """A conditional as abs or max of what it compares, where that is not smooth; None where it is neither.
+
+        It is if its branches differ by a multiple of what it compares, which then is not taken apart.
+        """
+        sides = sides_of(node)
+        if sides is None:
+            return None
+        border, above, below, _ = sides
+        written, below_zero = self.meanings.written_out(border), self.meanings.written_out(below)
+        if self._rough(written)[0] is None:
+            return None
+        whole, apart = polynomial(written), difference(self.meanings.written_out(above), below_zero)
+        factors = {apart.get(monomial, 0) / factor for monomial, factor in whole.items()}
+        if apart.keys() != whole.keys() or len(factors) != 1:
+            return None
+        factor = Fraction(factors.pop())
+        size = ast.Call(ast.Name("abs", ast.Load()), [border], [])
+        if abs(factor) == 2 and polynomial(below_zero) == scaled(whole, -factor / 2):
+            return size if factor > 0 else ast.UnaryOp(ast.USub(), size)
+        larger = ast.Call(ast.Name("max", ast.Load()), [border, ast.Constant(0)], [])
+        return ast.BinOp(below, ast.Add(), ast.BinOp(number_tree(factor), ast.Mult(), larger))
 
     def _factor(self, tree: ast.expr, node: ast.expr) -> float:
         """The number by which a tree is a multiple of an abs, min or max, plus what does not contain it; else 0."""

@@ -88,11 +88,14 @@ def number_of(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> f
         return None
 
 
-def names_of(node: ast.expr) -> set[str]:
-    """Names of quantities in a tree, functions and constants left out."""
-    called = {id(part.func) for part in ast.walk(node) if isinstance(part, ast.Call)}
-    return {
-        part.id
-        for part in ast.walk(node)
-        if isinstance(part, ast.Name) and id(part) not in called and part.id not in CONSTANTS
-    }
+def names_of(node: ast.AST) -> frozenset[str]:
+    """Names of quantities in a tree, functions and constants left out; each part keeps its own, as no tree changes."""
+    found: frozenset[str] | None = getattr(node, "names_of", None)
+    if found is None:
+        if isinstance(node, ast.Name):
+            found = frozenset() if node.id in CONSTANTS else frozenset((node.id,))
+        else:
+            parts = node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+            found = frozenset().union(*map(names_of, parts))
+        node.names_of = found  # type: ignore[attr-defined]  # an attribute of our own
+    return found

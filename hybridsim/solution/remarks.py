@@ -112,7 +112,7 @@ def _standing_sides(
 def _read_by(system: System, occurrence: Occurrence) -> set[str]:
     """The names that the guards or the monitor of an event read, also those behind definitions and variables."""
     model = system.model
-    behind: dict[str, set[str]] = {name: names_of(expr.tree) for name, expr in model.definitions}
+    behind: dict[str, set[str]] = {name: set(names_of(expr.tree)) for name, expr in model.definitions}
     for component in model.all_components():
         for mode in component.modes:
             for name, expr in mode.set.items():
