@@ -24,6 +24,7 @@ def verdicts_on(
     settling: Settling,
     members: list[int],
     candidates: np.ndarray,
+    current: np.ndarray,
     holds: np.ndarray,
     cluster: tuple[int, ...],
 ) -> tuple[np.ndarray, bool]:
@@ -34,7 +35,7 @@ def verdicts_on(
     """
     if settling.is_thorough or any(settling.system.automata[c].is_unique for c in members):
         return all_verdicts(settling, members, candidates, cluster), True
-    count, current = len(members), settling.at.z[members]
+    count = len(members)
     ranks = [preference(modes, current, holds, count) for modes in candidates]
     verdicts, least = np.full(len(candidates), LEAVES, dtype=np.int64), -1
     for number in sorted(range(len(candidates)), key=ranks.__getitem__, reverse=True):

@@ -100,7 +100,7 @@ def _decide_cluster(
         if z[c] == _UNKNOWN:
             if count == members.shape[0]:
                 return False
-            members[count], current[count], holds[count] = c, _UNKNOWN, automata.hold[c]
+            members[count], current[count], holds[count] = c, automata.hold[c], automata.hold[c]
             count += 1
     for c in range(z.shape[0]):
         trial[c] = max(z[c], 0)

@@ -346,15 +346,16 @@ class Settling:
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
         holds = np.array([automata[c].hold for c in taking_part])
         caused = candidates[with_cause(self, taking_part, candidates, open_)]
-        verdicts, is_whole = verdicts_on(self, taking_part, caused, holds, cluster)
+        current = self._current(taking_part, holds)
+        verdicts, is_whole = verdicts_on(self, taking_part, caused, current, holds, cluster)
         if len(caused) < len(candidates) and (verdicts == LEAVES).all():
-            verdicts, is_whole = verdicts_on(self, taking_part, candidates, holds, cluster)
+            verdicts, is_whole = verdicts_on(self, taking_part, candidates, current, holds, cluster)
         else:
             candidates = caused
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
             return f"{'' if self.forward else 'backward-'}nonunique", self._say(taking_part, rival, _SEVERAL)
-        number = int(choose(candidates, verdicts, at.z[taking_part], holds))
+        number = int(choose(candidates, verdicts, current, holds))
         if number == NONUNIQUE:
             verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
             left = np.flatnonzero(verdicts != LEAVES)
@@ -381,6 +382,15 @@ class Settling:
                         Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x)
                     )
         return None
+
+    def _current(self, components: list[int], holds: np.ndarray) -> np.ndarray:
+        """The modes that stay if nothing speaks against them: at a start on its surface, a contact rests.
+
+        So static friction holds what is at its limit as far as rounding tells.
+        """
+        modes = self.at.z[components]
+        begins = [modes[k] < 0 and not self.system.automata[c].is_unique for k, c in enumerate(components)]
+        return np.where(begins, holds, modes)
 
     def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
         """Status and message where no joint candidate is preferred: from a rate without a value nothing follows."""

@@ -1,0 +1,32 @@
+"""Static friction holds what is just at its limit."""
+
+from __future__ import annotations
+
+import pytest
+
+import hybridsim as hs
+
+
+def at_the_limit(static: str, load: str, gravity: float) -> hs.Model:
+    arguments = {"mu_s": static, "mu_k": 0.3}
+    contact = hs.Contact("f", "v", "N", "static-kinetic", arguments)
+    numbers = {"a": 0.3, "b": 0.36, "N": gravity}
+    return hs.Model("m", states=[hs.State("v", 0, f"{load} - f")], contacts=[contact], parameters=numbers)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor", "dop853", "tsit5", "rodas5p"])
+@pytest.mark.parametrize("static", ["(a + b)", "2.2*a", "a/0.7"])
+@pytest.mark.parametrize("gravity", [1.0, 9.81])
+def test_a_body_rests_at_the_limit_of_static_friction(static: str, gravity: float, method: str) -> None:
+    """The load is the limit, whatever rounding makes of either: the body stays; a run may say that it was close."""
+    for load in (f"{static}*N", f"-{static}*N", f"N*{static}"):
+        sol = hs.simulate(at_the_limit(static, load, gravity), (0.0, 2.0), integrator=method)
+        assert sol.success and sol(2.0)[0] == 0.0
+        assert set(sol.warnings) <= {"undecided at rounding: f keeps mode stick"}
+
+
+@pytest.mark.parametrize("method", ["exact", "dop853"])
+def test_a_body_slips_beyond_the_limit(method: str) -> None:
+    """A load above the limit by one part in 1e12 is no question of rounding."""
+    sol = hs.simulate(at_the_limit("(a + b)", "(a + b)*(1 + 1e-12)", 1.0), (0.0, 2.0), integrator=method)
+    assert sol(2.0)[0] == pytest.approx(2 * 0.36, rel=1e-9)
