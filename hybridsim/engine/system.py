@@ -223,7 +223,8 @@ class System:
         self.rates = self.rates_at(self._base)
         self.fastest = float(max(map(abs, self.rates), default=0.0))
         self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
-        self.signals = tuple(Signal(i, self.values) for i in model.inputs)
+        numbers = {**model.discrete_values(), **self.values} if model.inputs else {}
+        self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.tables: dict[float, Any] = {}  # what `hybridsim.engine.linear_tables` has made last
         self.runs: dict[Any, Any] = {}  # what `hybridsim.preparation` remembers

@@ -1,7 +1,8 @@
 """A condition on time alone as a known signal: 1 while it holds, 0 while it does not, with its changes as knots.
 
 In a rate a component stands for such a condition, since a run goes over it without a pause. In the velocity of a
-contact, a load, a law, a gap or a guard it is a signal, so that its jumps are those of an input.
+contact, a load, a law, a gap or a guard it is a signal, so that its jumps are those of an input. Its times may depend
+on parameters, and on discrete states that nothing sets.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Set
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression, of_tree, parse, substitute
 from hybridsim.expr.grammar import TIME
@@ -16,6 +18,9 @@ from hybridsim.expr.polynomial import difference
 from hybridsim.expr.rebuild import exchanged, with_names
 from hybridsim.model.inputs import Input
 from hybridsim.model.one_sided import names_of
+
+if TYPE_CHECKING:
+    from hybridsim.model.model import Model
 
 STEP = "__step_"  # begins the name of a signal; names of a model do not begin with two underscores
 _ZERO, _ONE = ast.Constant(0), ast.Constant(1)
@@ -28,7 +33,7 @@ class TimeStep(Input):
     Parameters
     ----------
     shift, rate, amplitude, phase, period : Expression
-        Expressions of parameters; the last three for the sine only.
+        Expressions of parameters and discrete states that nothing sets; the last three for the sine only.
     title : str
         What is above zero, as it was written.
     """
@@ -47,6 +52,14 @@ class TimeStep(Input):
         """Its expressions of parameters by field name."""
         fields = ("shift", "rate", "amplitude", "phase", "period")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
+
+
+def never_set(model: Model) -> frozenset[str]:
+    """The discrete states that nothing sets: each keeps its start, as a parameter keeps its value."""
+    choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
+    resets = [choice.reset for choice in choices]
+    resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]
+    return frozenset(part.name for part in model.discrete).difference(*resets)
 
 
 def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:

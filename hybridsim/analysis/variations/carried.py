@@ -159,8 +159,10 @@ class Carrier:
     def _refuse_inputs(self, G: np.ndarray) -> None:
         """Derivatives of an input's shape by its parameters are not known."""
         moving = {p.name for p, row in zip(self.system.model.parameters, G, strict=True) if row.any()}
+        starts = {part.name: part.start.names for part in self.system.model.discrete}
         for declared in self.system.model.inputs:
-            used = sorted(moving & {n for e in declared.expressions.values() for n in e.names})
+            names = {n for e in declared.expressions.values() for n in e.names}
+            used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
             if used:
                 raise UsageError(
                     f"{declared.subject} depends on {used[0]}, and its derivative by that is not known",

@@ -1,0 +1,47 @@
+"""Conditions on time whose borders are discrete states that nothing sets: as known as those of parameters."""
+
+from __future__ import annotations
+
+import pytest
+
+import hybridsim as hs
+
+
+def on_a_belt(velocity: str, normal: str, rate: str = "0") -> hs.Model:
+    """Friction of 0.5 times the load acts on a body of mass 1 at rest; a is c, and b is 2 w."""
+    return hs.Model(
+        "m",
+        states=[hs.State("v", 0, f"{rate} - f")],
+        contacts=[hs.Contact("f", velocity, normal, "coulomb", {"mu": 0.5})],
+        parameters={"c": 1.0, "w": 0.5},
+        discrete={"a": "c", "b": "2*w"},
+    )
+
+
+@pytest.mark.parametrize("method", ["exact", "dop853"])
+@pytest.mark.parametrize("belt", ["v - (1 if t > a else 0)", "v - (0 if not t >= a else 1)"])
+def test_a_belt_that_starts(belt: str, method: str) -> None:
+    """From a on the body is drawn along at the rate 0.5."""
+    model = on_a_belt(belt, "1")
+    for changed, speed in (({}, 0.75), ({"params": {"c": 1.5}}, 0.5), ({"x0": {"a": 0.75}}, 0.875)):
+        sol = hs.simulate(model, (0.0, 2.5), integrator=method, **changed)
+        assert sol.success and not sol.warnings
+        assert sol(2.5)[0] == pytest.approx(speed, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["exact", "dop853"])
+@pytest.mark.parametrize(
+    "load", ["(4 if t < a + b else 1)", "(4 if t < a or t < b + a else 1)", "(1 if b < t - a else 4)"]
+)
+def test_a_load_that_falls(load: str, method: str) -> None:
+    """A pull of 1 is held until a + b, and draws with 0.5 from then on."""
+    sol = hs.simulate(on_a_belt("v", load, "1"), (0.0, 3.0), integrator=method)
+    assert sol.success and not sol.warnings
+    assert sol(3.0)[0] == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_derivative_by_what_moves_the_time_is_refused() -> None:
+    model = on_a_belt("v", "(4 if t < a else 1)", "1")
+    sol = hs.simulate(model, (0.0, 3.0), integrator="dop853")
+    with pytest.raises(hs.UsageError, match="depends on c, and its derivative by that is not known"):
+        hs.sensitivities(sol, ["c"])
