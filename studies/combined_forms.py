@@ -4,7 +4,8 @@
     python studies/combined_forms.py shrink STRUCTURE DRAW INTEGRATOR      (a small model that shows the same)
 
 The generator and the judge are in tests/reference/combined. The runs go to two processes; one that does not come back
-within a minute is ended, and counts as a finding. With a journal the same call goes on where it stopped.
+in time is ended, counts as a finding, and the next set of numbers follows. With a journal the same call goes on where
+it stopped. SEEDS="3 17" in the environment takes these structures instead.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 import time
 from collections import Counter
 from itertools import combinations
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "combined-forms.md"
 BY_HAND = "## What it found"
-PATIENCE = 120.0  # seconds without a result after which a run counts as one that hangs
-QUIET = ("agrees", "names refused", "unclear", "cannot")
+PATIENCE = 600.0  # seconds without a result after which a run counts as one that hangs
 
 
 def work(tasks: Any, results: Any, draws: int) -> None:
@@ -52,28 +53,36 @@ class Worker:
         self.orders = ours
         self.process = context.Process(target=work, args=(theirs, back, draws), daemon=True)
         self.process.start()
-        self.seed, self.draw, self.heard = -1, 0, time.perf_counter()
+        self.seed, self.draw, self.runs, self.heard = -1, 0, 0, time.perf_counter()
 
     def begin(self, seed: int, first: int = 0) -> None:
-        self.seed, self.draw, self.heard = seed, first, time.perf_counter()
+        self.seed, self.draw, self.runs, self.heard = seed, first, 0, time.perf_counter()
         self.orders.send((seed, first))
+
+    def hears(self) -> dict[str, Any]:
+        """What the process sends next."""
+        record: dict[str, Any] = self.pipe.recv()
+        self.heard, draw = time.perf_counter(), record.get("draw", self.draw)
+        self.draw, self.runs = draw, self.runs + 1 if draw == self.draw else 1
+        return record
 
     def end(self) -> None:
         self.process.kill()
         self.process.join()
 
 
-def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[dict[str, Any]]:
+def study(seeds: list[int], draws: int, journal: Path) -> list[dict[str, Any]]:
     """All structures, by two processes."""
     done: list[dict[str, Any]] = []
     if journal.exists():
         done = [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines()]
     finished = {r["seed"] for r in done if r.get("done")}
-    todo = [s for s in range(first, first + structures) if s not in finished]
+    todo = [s for s in seeds if s not in finished]
     context = mp.get_context("spawn")
     workers = [Worker(context, draws) for _ in range(int(os.environ.get("WORKERS", "2")))]
     idle = list(workers)
     with journal.open("a", encoding="utf-8") as out:
+        from reference.combined.trial import QUIET
 
         def keep(record: dict[str, Any]) -> None:
             done.append(record)
@@ -88,31 +97,30 @@ def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[di
         while todo or len(idle) < len(workers):
             while todo and idle:
                 idle.pop().begin(todo.pop(0))
+            wait([worker.pipe for worker in workers if worker not in idle], timeout=5.0)
             for worker in list(workers):
                 if worker in idle:
                     continue
-                if worker.pipe.poll(0.05):
-                    record = worker.pipe.recv()
-                    worker.heard = time.perf_counter()
-                    worker.draw = record.get("draw", worker.draw)
+                if worker.pipe.poll():
+                    record = worker.hears()
                     keep(record)
                     if record.get("done"):
                         idle.append(worker)
                 elif time.perf_counter() - worker.heard > PATIENCE or not worker.process.is_alive():
                     hung = worker.process.is_alive()
                     worker.end()
+                    at = worker.draw + (worker.runs >= 2)
                     keep(
                         {
                             "seed": worker.seed,
-                            "draw": worker.draw,
+                            "draw": at,
                             "kind": "hangs" if hung else "dies",
                             "integrator": "",
                             "detail": "no result in time" if hung else "the process ended",
                         }
                     )
-                    keep({"seed": worker.seed, "done": True})
                     workers[workers.index(worker)] = fresh = Worker(context, draws)
-                    idle.append(fresh)
+                    fresh.begin(worker.seed, at + 1)
     for worker in workers:
         worker.end()
     return done
@@ -120,12 +128,12 @@ def study(structures: int, draws: int, journal: Path, first: int = 0) -> list[di
 
 def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
     """In how many structures each form and each pair of forms is."""
-    from reference.combined.trial import features
+    from reference.combined.chosen import forms
 
     single: Counter[str] = Counter()
     double: Counter[tuple[str, str]] = Counter()
     for seed in seeds:
-        found = sorted(f for f in features(seed) if not f.startswith("part: "))
+        found = forms(seed)
         single.update(found)
         double.update(combinations(found, 2))
     return single, double
@@ -164,7 +172,7 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     from reference.combined.compare import ALLOWED, POINTS
 
     runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model", "unclear")]
-    seeds = sorted({r["seed"] for r in done})
+    seeds = sorted({r["seed"] for r in runs})
     out = HEAD.format(allowed=ALLOWED, points=POINTS)
     instants = sum(r.get("instants", 0) for r in runs)
     out += f"{len(seeds)} structures with {draws} sets of numbers each: {len(runs)} runs, {instants} instants.\n\n"
@@ -200,7 +208,10 @@ def main() -> None:
     structures = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
     draws = int(sys.argv[2]) if len(sys.argv) > 2 else 10
     journal = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("combined-forms.jsonl")
-    done = study(structures, draws, journal, int(os.environ.get("FIRST", "0")))
+    from reference.combined.chosen import chosen_seeds
+
+    seeds = [int(s) for s in os.environ.get("SEEDS", "").split()]
+    done = study(seeds or chosen_seeds(structures), draws, journal)
     out = page(done, draws)
     print(out)
     if draws >= 10:

@@ -21,6 +21,11 @@ def drifter(b: Builder) -> Node:
     return b.state("x", start, b.num(-1, 1) - b.corner(me, "rate"))
 
 
+def signal(b: Builder) -> Node:
+    """A state to look at: one that is there already, or one of its own."""
+    return (b.other() if b.chance(0.4) else None) or drifter(b)
+
+
 def counter(b: Builder) -> Node:
     name = b.name("n")
     b.m.discrete[name] = node(0)
@@ -30,7 +35,7 @@ def counter(b: Builder) -> Node:
 def automaton(b: Builder) -> None:
     """Two modes with corners in their guards, resets, conditions, a counter."""
     b.tag("automaton")
-    x, n, name = drifter(b), counter(b), b.name("auto")
+    x, n, name = signal(b), counter(b), b.name("auto")
     other = drifter(b)
     there = Choice("two", reset={n.args[0]: n + 1})
     if b.chance(0.5):
@@ -216,10 +221,7 @@ def monitor_at_reset(b: Builder) -> None:
 def monitor(b: Builder) -> None:
     """A monitor of a function with corners that records, resets or ends the run."""
     b.tag("monitor")
-    x, action = (
-        (b.other() if b.chance(0.5) else None) or drifter(b),
-        b.rng.choice(["record", "record", "reset", "terminate"]),
-    )
+    x, action = signal(b), b.rng.choice(["record", "record", "reset", "terminate"])
     n = counter(b)
     b.m.monitors[b.name("mon")] = Monitor(
         b.corner(x, "monitor", 2),

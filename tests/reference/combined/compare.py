@@ -71,7 +71,6 @@ def hold(
     model: Abstract,
     compiled: hs.Model,
     renderer: Renderer,
-    numbers: dict[str, Fraction],
     integrator: str,
     truth: Truth,
     way: str = "plain",
@@ -83,7 +82,6 @@ def hold(
         sol = hs.simulate(
             compiled,
             (shift, end),
-            params=renderer.values(numbers),
             integrator=integrator,
             limits=LIMITS,
         )
@@ -115,10 +113,11 @@ def compared(model: Abstract, renderer: Renderer, sol: Any, truth: Truth, integr
     for t in times:
         for k, v in motion.at(t, names).items():
             size[k] = max(size.get(k, 1.0), abs(v))
-    for t in seen:
-        true = motion.at(t, names)
-        for k, v in true.items():
-            ours = value_of(sol, renderer, k, t + shift)
+    right = [motion.at(t, names) for t in seen]
+    found = values_of(sol, renderer, [*names, *model.discrete], [t + shift for t in seen])
+    for i, t in enumerate(seen):
+        for k, v in right[i].items():
+            ours = float(found[k][i])
             off = abs(ours - v) / size[k]
             if not off <= ALLOWED:
                 detail = f"{k}({t:.6g}) right {v:.10g} got {ours:.10g}"
@@ -156,7 +155,12 @@ def compared(model: Abstract, renderer: Renderer, sol: Any, truth: Truth, integr
     return Verdict("agrees", integrator, sol.status, f"{worst[0]:.1e}", certain, worst[0])
 
 
-def value_of(sol: Any, renderer: Renderer, name: str, time: float) -> float:
-    scale = renderer.style.scales.get(name)
-    value = float(sol.output(renderer.called(name), time))
-    return value * float(scale) if scale else value
+def values_of(sol: Any, renderer: Renderer, names: list[str], times: list[float]) -> dict[str, Any]:
+    """States and discrete states of a run, in the scale of the abstract model."""
+    states = dict(zip(sol.names, sol(times), strict=True)) if times else {}
+    out = {}
+    for name in names if times else []:
+        called = renderer.called(name)
+        values = states[called] if called in states else sol.output(called, times)
+        out[name] = values * float(renderer.style.scales.get(name, 1))
+    return out

@@ -35,11 +35,22 @@ class Judge(Configurations):
                     if self.config.get(name, mode) != mode:
                         self.note(name, mode)
                 self.config, self.sides = config, sides
+                self.look_for_borders(watch, c)
                 if self.monitors(watch, c):
                     continue
                 return
             self.transitions(fired)
         raise Stop("cascade")
+
+    def look_for_borders(self, watch: list[tuple[str, str, str, int]], c: Slots) -> None:
+        """Note where static friction above kinetic holds a load that is and stays just at its limit.
+
+        In decimals this is certain; in doubles, the numbers themselves decide by how they are rounded.
+        """
+        for kind, f, _, slot in watch:
+            contact = self.m.contacts.get(f)
+            if kind == "limit" and contact and contact.mu_k and all(abs(v) <= self.tol for v in c[slot]):
+                self.motion.borders.append(float(self.time))
 
     def note(self, owner: str, what: str) -> None:
         self.motion.events.append((float(self.time), owner, what))

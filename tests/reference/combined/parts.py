@@ -68,6 +68,15 @@ def structure(seed: int, count: int | None = None) -> Builder:
         used.add(part.__name__)
         b.tag(f"part: {part.__name__}")
         part(b)
+    return with_a_parameter(b)
+
+
+def with_a_parameter(b: Builder) -> Builder:
+    """The same with one number at least that the draws differ in."""
+    numbers = [n for n in b.m.numbers.values() if n.formula is None]
+    if numbers and all(n.value is not None for n in numbers):
+        numbers[0].written, numbers[0].value = "parameter", None
+        b.tag("number: parameter")
     return b
 
 
@@ -76,4 +85,4 @@ def alone(name: str, seed: int) -> Builder:
     b = Builder(seed)
     b.tag(f"part: {name}")
     next(part for _, part in PARTS if part.__name__ == name)(b)
-    return b
+    return with_a_parameter(b)

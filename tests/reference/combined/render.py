@@ -24,6 +24,7 @@ class Style:
     scales: dict[str, Fraction] = field(default_factory=dict)  # of states
     shift: Fraction = Fraction(0)  # of time
     signs: float = 0.4  # share of the relays that are written as signs in the rates
+    named: float = 0.0  # share of the parts of expressions that are definitions
     plain: bool = False  # everything in its first form: for small reproductions
 
 
@@ -91,7 +92,14 @@ class Renderer:
     # -- expressions -----------------------------------------------------------------------------------------------
 
     def text(self, e: Node, plain: bool = False) -> str:
-        """An expression, in brackets where it needs them."""
+        """An expression, in brackets where it needs them, or the name of a definition of it."""
+        text = self.spelled(e, plain)
+        if plain or len(text) < 10 or self.rng.random() >= self.style.named:
+            return text
+        self.definitions[f"part{len(self.definitions)}"] = text
+        return f"part{len(self.definitions) - 1}"
+
+    def spelled(self, e: Node, plain: bool = False) -> str:
         op, a = e.op, e.args
         if op == "const":
             return decimal(a[0]) if a[0].denominator != 1 or a[0] < 0 else str(a[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .automata import counter, drifter
+from .automata import counter, drifter, signal
 from .builder import Builder
 from .forms import (
     TIME,
@@ -25,11 +25,15 @@ from .forms import (
 def body(b: Builder, speed: Node | None = None) -> tuple[Node, Node]:
     """A mass with a force, perhaps a spring with a corner."""
     v = var(f"v{b.count.get('v', 0) + 1}")
+    other = b.other()
     q = b.state("q", b.num(-1, 1), v)
     force = b.force()
-    kind = b.rng.choice(["free", "spring", "corner"])
+    kind = b.rng.choice(["free", "spring", "corner"] + ["coupled"] * (other is not None))
     if kind == "spring":
         force = force - b.num("0.5", 3) * q
+    elif kind == "coupled":
+        b.tag("rate of another part")
+        force = force - b.num("0.5", 3) * (q - node(other))
     elif kind == "corner":
         b.tag("corner in rate")
         force = force - b.num("0.5", 3) * b.corner(q, "rate")
@@ -46,7 +50,7 @@ def contact(b: Builder) -> None:
     q, v = body(b, node(0) if rest else None)
     f = b.name("f")
     b.add_rate(v, -var(f))
-    about = b.rng.choice([q, drifter(b)])
+    about = q if b.chance(0.5) else signal(b)
     normal, opens = b.num(1, 3), False
     kind = b.rng.choice(["constant", "corner", "switched", "opens", "vanishes"])
     if kind == "corner":
@@ -154,7 +158,7 @@ def relay(b: Builder) -> None:
     b.tag("relay")
     r = b.name("r")
     strength = b.num(1, 3)
-    other = drifter(b)
+    other = signal(b)
     if b.chance(0.4):
         strength = b.positive(other, "rate")
         b.tag("corner in rate")

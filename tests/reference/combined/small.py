@@ -26,10 +26,10 @@ def small(seed: int, draw: int, integrator: str, tries: int = 150) -> str:
                 text = renderer.toml(numbers)
                 compiled = hs.Model.from_toml(text)
                 truth = judged(m, numbers)
-                v = hold(m, compiled, renderer, numbers, integrator, truth)
+                v = hold(m, compiled, renderer, integrator, truth)
                 if v.kind not in ("agrees", "cannot"):
                     truth = second_look(m, numbers, truth, v)
-                    v = hold(m, compiled, renderer, numbers, integrator, truth)
+                    v = hold(m, compiled, renderer, integrator, truth)
             except Exception:
                 return False
             if not kinds:

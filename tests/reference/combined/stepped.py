@@ -53,7 +53,9 @@ def time_stepping(number: int) -> Iterator[dict[str, Any]]:
         compiled = hs.Model.from_toml(renderer.toml(numbers))
     except hs.ModelError:
         return
-    v = hold(b.m, compiled, renderer, numbers, b.rng.choice(["taylor", "dop853"]), truth)
+    v = hold(
+        b.m, compiled.with_(**renderer.values(numbers)), renderer, b.rng.choice(["taylor", "dop853"]), truth
+    )
     if v.kind in ("differs", "chose", "went on", "refused", "crash"):
         yield {"kind": v.kind, "integrator": v.integrator, "detail": v.detail}
         return

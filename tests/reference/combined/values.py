@@ -57,6 +57,7 @@ class Motion:
     jumps: list[float] = field(default_factory=list)  # all instants at which something happened
     touches: list[tuple[float, str]] = field(default_factory=list)
     unclear: list[tuple[float, str]] = field(default_factory=list)
+    borders: list[float] = field(default_factory=list)  # times at which static friction is just enough
 
     def at(self, time: float, names: list[str]) -> dict[str, float]:
         """States and discrete states at a time."""
