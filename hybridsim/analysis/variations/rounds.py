@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.gathering import LIMIT
 from hybridsim.engine.reset_keys import added
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.engine.timepair import Instant
@@ -166,8 +167,10 @@ class Rounds:
             names = [schedule.name for schedule in system.model.schedules]
             return "schedule", names.index(one.component) if one.component in names else -1
         c, automaton = component_of(system, one)
-        if automaton.has_surface or guard_number(system, one) < 0:
+        if automaton.has_surface:
             return ("none",)
+        if guard_number(system, one) < 0:
+            return ("limit", c) if one.guard == LIMIT else ("none",)
         m = automaton.modes.index(one.source)
         g = automaton.guard_names[m].index(one.guard)
         return "choice", c, m, g, system.choose(c, m, g, s, self.x, p, self.z)

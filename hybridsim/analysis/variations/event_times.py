@@ -1,0 +1,159 @@
+"""Derivatives of the times of events: of zeros of guards and monitors, and of schedules."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.analysis.variations.parameters import expression_slope
+from hybridsim.analysis.variations.rounds import component_of, guard_number, is_knot
+from hybridsim.analysis.variations.seeds import seeds
+from hybridsim.engine.tangents import TangentTape
+from hybridsim.errors import UsageError
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.system import System
+
+_ALIKE = 1e-7  # events at one instant are one event if their times change alike to that part
+_ROUNDING = 1e-11  # of what a change of everything by its own size does to a time: below it is rounding
+_AT_ZERO = 1e-9  # of a guard's terms
+_TANGENTIAL = (
+    1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
+)
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Derivatives (M,) of a time, and for each of them the size (M,) of the terms whose sum it is."""
+
+    values: np.ndarray
+    sizes: np.ndarray
+
+
+class EventTimes:
+    """Derivatives of event times in M directions.
+
+    Parameters
+    ----------
+    scale : (n,) sizes of the states.
+    own : (M,) the change along each direction that is as large as what it changes.
+    G : derivatives of the parameters (P, M).
+    rates : derivatives of the forcing's angular rates by the parameters.
+    """
+
+    def __init__(
+        self, system: System, scale: np.ndarray, own: np.ndarray, G: np.ndarray, rates: np.ndarray
+    ) -> None:
+        self.system = system
+        self._scale, self._own, self._G, self._rates = scale, own, G, rates
+        self._slopes = {p.name: row for p, row in zip(system.model.parameters, G, strict=True)}
+
+    def of(
+        self,
+        segment: Segment,
+        happened: Sequence[Occurrence],
+        s: float,
+        x: np.ndarray,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+    ) -> np.ndarray:
+        """Of what happened at local time s of a segment (M,): of everything that came about by itself, the same."""
+        width = self._G.shape[1]
+        if not happened:
+            return np.zeros(width)
+        at = segment.origin.plus(s)
+        shifts = [
+            Shift(row, np.abs(row))
+            for one in happened
+            if one.kind == "scheduled"
+            for row in self.scheduled(one)
+        ]
+        if is_knot(self.system, at):  # inputs whose knots move are refused
+            shifts.append(Shift(np.zeros(width), np.zeros(width)))
+        for one in happened:
+            if one.kind == "monitor" or one.guard:
+                shift = self._located(segment, one, s, x, Y, Yd, is_first=not shifts)
+                shifts += [] if shift is None else [shift]
+        if not shifts:
+            raise UsageError(
+                f"what set off the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is not "
+                "known, and so the derivatives of its time are not",
+                remedy="take other parameters, or a run that ends before",
+            )
+        first = shifts[0]
+        if any(
+            (np.abs(shift.values - first.values) > _ALIKE * np.maximum(shift.sizes, first.sizes)).any()
+            for shift in shifts
+        ):
+            raise UsageError(
+                f"several events at t = {float(happened[0].instant):.9g} move apart when the run is changed: "
+                f"{', '.join(sorted({o.component for o in happened}))}; there is no derivative",
+                remedy="take other parameters, or a run that ends before",
+            )
+        return first.values
+
+    def _located(
+        self,
+        segment: Segment,
+        one: Occurrence,
+        s: float,
+        x: np.ndarray,
+        Y: np.ndarray,
+        Yd: np.ndarray,
+        is_first: bool,
+    ) -> Shift | None:
+        """Of an event at a zero of a guard or monitor; None for one that followed from another."""
+        system, n = self.system, self.system.n
+        is_monitor = one.kind == "monitor"
+        if is_monitor:
+            number = system.monitor_names.index(one.component)
+        else:
+            c, automaton = component_of(system, one)
+            number = guard_number(system, one)
+            if number < 0 or automaton.modes[segment.z[c]] != one.source:
+                return None
+        tape = TangentTape(system, segment.z, *(((), (number,)) if is_monitor else ((number,), ())))
+        found = tape(np.array([s]), x[None, :], segment.p, seeds(system, segment, self._rates))
+        row = found.slopes[0, n]
+        terms = np.append(row[:n] * found.values[0, :n], row[n])
+        size = np.abs(row[:n]) @ self._scale
+        if not is_first and abs(found.values[0, n]) > _AT_ZERO * size:
+            return None
+        rate = terms.sum()
+        if not abs(rate) > _TANGENTIAL * np.abs(terms).sum():
+            if not is_first:
+                return None
+            raise UsageError(
+                f"{one.component} has an event at t = {float(one.instant):.9g} at which its guard does "
+                "not fall: the time of such an event has no derivatives",
+                remedy="take other parameters, or a run that ends before",
+            )
+        changes = np.concatenate([Y, Yd, self._G])
+        by = np.concatenate([row[:n], row[n + 1 :]])
+        constants = np.abs(np.concatenate([system.discrete(segment.p), segment.p[: len(self._G)]]))
+        whole = size + np.abs(row[n + 1 :]) @ constants
+        sizes = np.abs(by) @ np.abs(changes) + _ROUNDING / _ALIKE * whole / self._own
+        return Shift(-(by @ changes) / rate, sizes / abs(rate))
+
+    def scheduled(self, one: Occurrence) -> list[np.ndarray]:
+        """Of a scheduled event (M,): of each time of its schedule that it may be."""
+        width = self._G.shape[1]
+        declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
+        if declared is None:
+            return [np.zeros(width)]
+        values, t = self.system.values, float(one.instant)
+        if declared.start is None or declared.period is None:
+            away = [abs(evaluate(e, values) - t) for e in declared.times]
+            return [
+                expression_slope(e, values, self._slopes, width)
+                for e, gap in zip(declared.times, away, strict=True)
+                if gap == min(away)
+            ]
+        k = round((t - evaluate(declared.start, values)) / evaluate(declared.period, values))
+        by_start = expression_slope(declared.start, values, self._slopes, width)
+        return [by_start + k * expression_slope(declared.period, values, self._slopes, width)]

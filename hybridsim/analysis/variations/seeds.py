@@ -1,0 +1,41 @@
+"""Directions in all that formulas read: states, local time, discrete states, parameters and angles of forcing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
+
+if TYPE_CHECKING:
+    from hybridsim.engine.pieces import Segment
+    from hybridsim.engine.system import System
+    from hybridsim.engine.timepair import Instant
+
+
+def rate_slopes(system: System, at: Instant) -> np.ndarray:
+    """d(angular rates of the forcing)/d(parameters), (R, P)."""
+    layout, module = system.layout, system.code.module
+    P = layout.parameters
+    p: list[Any] = list(system.vector(at, np.zeros(layout.discrete)))
+    p[:P] = with_slopes(p[:P], np.eye(P))
+    out: list[Any] = [0.0] * layout.phases
+    differentiated(module.rates)(0.0, [], p, [], out)
+    return values_and_slopes(out, P)[1]
+
+
+def seeds(system: System, segment: Segment, rates: np.ndarray) -> np.ndarray:
+    """Of the states, local time, discrete states and parameters, (n + 1 + layout.size, n + 1 + d + P).
+
+    rates: what `rate_slopes` returns.
+    """
+    layout, n = system.layout, system.n
+    P, d = layout.parameters, layout.discrete
+    found = np.zeros((n + 1 + layout.size, n + 1 + d + P))
+    found[: n + 1, : n + 1] = np.eye(n + 1)
+    found[n + 1 + layout.discrete_at : n + 1 + layout.discrete_at + d, n + 1 : n + 1 + d] = np.eye(d)
+    found[n + 1 : n + 1 + P, n + 1 + d :] = np.eye(P)
+    for k, row in enumerate(rates):  # an angle rate*origin
+        found[n + 1 + layout.phases_at + k, n + 1 + d :] = float(segment.origin) * row
+    return found
