@@ -62,6 +62,10 @@ class AtOnce(Trajectory):
 
         self._make = make
 
+    def whole(self) -> None:
+        """Make the whole record now."""
+        vars(self).update(vars(self._make()))
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
@@ -76,7 +80,7 @@ class AtOnce(Trajectory):
         elif name == "segments" and self._segments is not None:
             self.segments = self._segments()
         else:
-            vars(self).update(vars(self._make()))
+            self.whole()
         return getattr(self, name)
 
 

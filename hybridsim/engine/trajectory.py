@@ -122,6 +122,10 @@ class Trajectory:
     def checkpoint(self, checkpoint: Checkpoint | None) -> None:
         self._checkpoint = checkpoint
 
+    def forget_checkpoint(self) -> None:
+        """Leave no place from which the run could go on."""
+        self._checkpoint = self._mark = None
+
     def up_to_checkpoint(self, system: System) -> Trajectory:
         """A copy that ends at the checkpoint, to go on with."""
         assert self.checkpoint is not None

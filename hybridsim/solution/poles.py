@@ -1,50 +1,150 @@
-"""A run across the zero of a denominator is pointed out: what follows a pole, or a 0/0, has no meaning."""
+"""A run across a pole of its rates ends there: what would follow has no meaning.
+
+The zero of a denominator is no pole where the rates are continuous, as those of sin(x)/x are: a run goes on through it.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.model.denominators import denominators
+from hybridsim.engine.blocks import OccurrenceList, SegmentList
+from hybridsim.engine.pieces import Segment
+from hybridsim.engine.stepping import Counters, Flow
+from hybridsim.model.denominators import Denominator, denominators
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from hybridsim.engine.system import System
     from hybridsim.engine.trajectory import Trajectory
-    from hybridsim.model.model import Model
 
 _LOOKS = 64  # at states of a run: a denominator that passes zero seldom comes back between two of them
+_HALVINGS = 60
+# So near to the zero the rates are looked at, in steps and at the least in ulps of time, and once more at a part r of
+# it. Continuous rates change by r times as much there, a root's by its root, what jumps or has a pole by as much or
+# more; the slope of a root is 1/sqrt(r) times as steep, that of a pole 1/r times or more. The borders are
+# half way between.
+_NEAR, _PART, _ULPS = 1e-2, 1e-2, 4.0
+_ROUNDING = 1e-9  # of the rates: a change of less is none
+_REMEDY = "end the run before by a monitor, or write the rate so that its denominator stays away from zero"
 
 
-def poles_passed(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    """A sentence for each denominator of a rate that has changed its sign in a run."""
-    every = denominators(model)
-    segments = trajectory.segments if every else ()
-    count = sum(len(segment.s) for segment in segments)
-    if count < 2:
+class _Way:
+    """The states that a run went through."""
+
+    def __init__(self, system: System, segments: list[Segment]) -> None:
+        model = system.model
+        self.system, self.segments = system, segments
+        self._names, self._parameters = [s.name for s in model.states], model.parameter_values()
+
+    def sign(self, divisor: Denominator, number: int, s: float, x: np.ndarray) -> int:
+        """The sign of a denominator at a local time of a segment."""
+        t = float(self.segments[number].origin.plus(s))
+        states = dict(zip(self._names, x.tolist(), strict=True))
+        return divisor.sign({**self._parameters, "t": t, **states})
+
+    def passage(self, divisor: Denominator) -> tuple[int, float, float] | None:
+        """The first zero that is passed in a pole: number of the segment, local time, and length of the step there."""
+        stride = max(sum(len(segment.s) for segment in self.segments) // _LOOKS, 1)
+        for number, segment in enumerate(self.segments):
+            last = len(segment.s) - 1
+            looks = sorted({*range(0, last, stride), last})
+            signs = [self.sign(divisor, number, float(segment.s[k]), segment.x[k]) for k in looks]
+            for i in range(len(looks) - 1):
+                if signs[i] * signs[i + 1] < 0:
+                    s, step = self._zero(divisor, number, looks[i], looks[i + 1])
+                    if self._is_pole(segment, s, step):
+                        return number, s, step
+        return None
+
+    def _zero(self, divisor: Denominator, number: int, first: int, last: int) -> tuple[float, float]:
+        """The last time before the sign changes between two knots, and the length of the step there."""
+        segment = self.segments[number]
+        sign = self.sign(divisor, number, float(segment.s[first]), segment.x[first])
+        while last - first > 1:
+            middle = (first + last) // 2
+            is_before = self.sign(divisor, number, float(segment.s[middle]), segment.x[middle]) == sign
+            first, last = (middle, last) if is_before else (first, middle)
+        before, after = float(segment.s[first]), float(segment.s[last])
+        step = after - before
+        for _ in range(_HALVINGS):
+            s = 0.5 * (before + after)
+            is_before = self.sign(divisor, number, s, segment.dense(np.array([s]))[0]) == sign
+            before, after = (s, after) if is_before else (before, s)
+        return before, step
+
+    def _is_pole(self, segment: Segment, s: float, step: float) -> bool:
+        """Whether the rates jump or grow beyond all bounds at a local time, or their derivatives do."""
+        flow, low, high = Flow(self.system, segment.p, segment.z, Counters()), *sorted(segment.s[[0, -1]])
+        nearest = max(_NEAR * _PART * abs(step), _ULPS * math.ulp(s))
+        near = max(_NEAR * abs(step), 10.0 * nearest)
+        changes, slopes, size = [], [], np.zeros(0)
+        for length in (near, nearest):
+            times = np.clip(np.array([s - length, s + length]), low, high)
+            states = segment.dense(times)
+            left, right = (flow.rhs(t, x) for t, x in zip(times.tolist(), states, strict=True))
+            changes.append(np.abs(right - left))
+            size = np.maximum(np.abs(left), np.abs(right))
+            slopes.append(np.abs(flow.jacobian(float(times[1]), states[1])))
+        part = nearest / near
+        jumps = ~(changes[1] <= np.maximum(part**0.25 * changes[0], _ROUNDING * size))
+        # 0/0 that has a limit along one motion and not beside it: from there on any may follow
+        steep = ~(slopes[1] <= part**-0.75 * np.maximum(slopes[0], _ROUNDING * slopes[0].max(initial=0.0)))
+        return bool(jumps.any() or steep.any())
+
+
+def end_at_pole(system: System, trajectory: Trajectory) -> None:
+    """End a run where the denominator of a rate passes zero and the rates are not continuous."""
+    every = denominators(system.model)
+    if not every or not trajectory.segments or system.n == 0:
         return
-    names = [state.name for state in model.states]
-    parameters = model.parameter_values()
-    stride = max(count // _LOOKS, 1)
-    times, states = [], []
-    for number, segment in enumerate(segments):
-        last = len(segment.s) - 1
-        for k in sorted({*range(0, last + 1, stride), *((last,) if number == len(segments) - 1 else ())}):
-            times.append(float(segment.origin.plus(float(segment.s[k]))))
-            states.append(segment.x[k])
-    for divisor in every:
-        signs = np.array(
-            [
-                divisor.sign({**parameters, "t": t, **dict(zip(names, x.tolist(), strict=True))})
-                for t, x in zip(times, states, strict=True)
-            ]
-        )
-        changed = np.flatnonzero(signs[1:] * signs[:-1] < 0)
-        if len(changed):
-            before, after = times[changed[0]], times[changed[0] + 1]
-            yield (
-                f"the denominator {divisor.text} in the rate of {divisor.state} passes zero between t = {before:.9g} "
-                f"and {after:.9g}: the rate has a pole there or is 0/0, and what follows means nothing; end the run "
-                "before by a monitor, or write the rate so that its denominator stays away from zero"
-            )
+    way = _Way(system, list(trajectory.segments))
+    passed = [(found, divisor) for divisor in every if (found := way.passage(divisor)) is not None]
+    if not passed:
+        return
+    (number, s, _), divisor = min(
+        passed, key=lambda one: (one[0][0], abs(one[0][1] - way.segments[one[0][0]].s[0]))
+    )
+    last = way.segments[number]
+    inside = np.abs(last.s - last.s[0]) < abs(s - last.s[0])
+    at = np.array([s])
+    ended = Segment(
+        last.origin,
+        last.z,
+        last.p,
+        np.append(last.s[inside], at),
+        np.append(last.x[inside], last.dense(at), 0),
+        last.dense,
+    )
+    trajectory.segments.blocks = [SegmentList(system, [*way.segments[:number], ended])]
+    forward = last.s[-1] >= last.s[0]
+    kept = [o for o in trajectory.occurrences if (o.instant.minus(ended.end) <= 0.0) == forward]
+    trajectory.occurrences.blocks = [OccurrenceList(kept)] if kept else []
+    trajectory.forget_checkpoint()
+    trajectory.status = "step-failure"
+    trajectory.message = (
+        f"after t = {float(ended.end)!r}: the denominator {divisor.text} in the rate of {divisor.state} passes zero, "
+        f"where the rates have a pole or jump, so that no motion goes on from there: {_REMEDY}"
+    )
+
+
+def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: float) -> list[str]:
+    """A sentence for each denominator that has changed its sign in a run of which the way is not kept."""
+    every = denominators(system.model)
+    if not every or not trajectory.segments or system.n == 0:
+        return []
+    way = _Way(system, list(trajectory.segments))
+    first, last = way.segments[0], way.segments[-1]
+    if float(first.start) == t0:
+        return []
+    start = Segment(first.origin, first.z, first.p, first.s[:1], x0[None], first.dense)
+    begun = _Way(system, [start])
+    return [
+        f"the denominator {d.text} in the rate of {d.state} has another sign at the end than at the start: where it "
+        f"passes zero the rate may have a pole, beyond which nothing means anything; save all, or {_REMEDY}"
+        for d in every
+        if begun.sign(d, 0, float(first.s[0]), x0)
+        * way.sign(d, len(way.segments) - 1, float(last.s[-1]), last.x[-1])
+        < 0
+    ]

@@ -13,8 +13,9 @@ from hybridsim.engine.at_once import AtOnce
 from hybridsim.engine.jit import seconds_compiling
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.errors import RunInterrupted
+from hybridsim.model.denominators import denominators
 from hybridsim.model.hygiene import jumps_of
-from hybridsim.solution.poles import poles_passed
+from hybridsim.solution.poles import end_at_pole, passed_unseen
 from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class Run:
         wall_time = time.perf_counter() - began - within
         if isinstance(trajectory, AtOnce):
             trajectory.then(self._close)
+            if denominators(self.model):
+                trajectory.whole()
         else:
             self._close(trajectory)
         run = self
@@ -77,7 +80,8 @@ class Run:
             self.system.code.report(trajectory)
         for caution in jumps_of(self.model):
             trajectory.warnings[caution.sentence] = 1
-        for sentence in poles_passed(self.model, trajectory):
+        end_at_pole(self.system, trajectory)
+        for sentence in passed_unseen(self.system, trajectory, self.task.x0, self.task.t0):
             trajectory.warn(sentence)
         if self.task.t0 == self.task.t1:
             trajectory.warn(f"t_span begins and ends at {self.task.t0!r}: nothing was integrated")
