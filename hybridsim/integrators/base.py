@@ -26,6 +26,7 @@ CAPABILITIES = {
     "multiple-roots": "several zeros of a guard within one step",
     "accumulation": "events that follow each other ever faster, down to rounding",
     "tangent-exit": "sliding that is left, at a tangency as ever, where several states make the surface",
+    "poles": "motions that grow without bound towards a time that is not reached",
     "exact-stick": "a held state is exact, bit for bit",
     "backward": "time running backward",
     "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",

@@ -166,7 +166,10 @@ class ScipyBDF(ScipyIntegrator):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Shampine and Reichelt 1997, doi:10.1137/S1064827594276424"
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
-    lacks: ClassVar[dict[str, str]] = _NOISE
+    lacks: ClassVar[dict[str, str]] = {
+        **_NOISE,
+        "poles": "where a trial goes beyond a pole it begins again at order one, with steps that doubles of time lack",
+    }
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "BDF"
     is_multistep: ClassVar[bool] = True

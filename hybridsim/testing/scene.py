@@ -20,6 +20,7 @@ VOCABULARY = (
     "multiple-roots",
     "accumulation",
     "tangent-exit",
+    "poles",
     "exact-stick",
     "backward",
     "corners",

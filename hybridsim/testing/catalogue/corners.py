@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from hybridsim.testing.facts import TRUTHS
-from hybridsim.testing.scene import Scene, Truth
+from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Bilinear spring, backlash, saturation, drag, a hinge, and the clipped elastogap."""
-    return _bilinear(), _backlash(), _saturation(), _drag(), _hinge(), _elastogap()
+    """Bilinear spring, backlash, saturation, drag, a hinge, the clipped elastogap, and sizes of sizes in guards."""
+    return _bilinear(), _backlash(), _saturation(), _drag(), _hinge(), _elastogap(), _sizes()
 
 
 def _bilinear() -> Scene:
@@ -87,4 +87,16 @@ def _elastogap() -> Scene:
         unit=2.0,
         speed=3.0,
         tol_x=1e-7,
+    )
+
+
+def _sizes() -> Scene:
+    """The guards come to zero at x = 1.06, y = -0.86 and z = -1.75."""
+    events = ((0.04, "second:off"), (0.16, "first:off"), (0.25, "third:off"))
+    return Scene(
+        "sizes-of-sizes",
+        "sizes-of-sizes",
+        (0.0, 1.0),
+        Truth(events, ((1.0, (1.9, 0.1, -1.0)),)),
+        needs("transitions"),
     )

@@ -1,4 +1,4 @@
-"""Scenes of several changes at one instant: resets that add, and guards and monitors at the tick of a clock."""
+"""Scenes of several changes at one instant: resets that add, zeros at ticks, touches, copies of located values."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Resets that add, and what comes to zero where a clock ticks."""
-    return (_doses(), _counting_balls(), _guard_and_tick(), _carried_back())
+    """Resets that add, zeros where a clock ticks, touches beside events, copies of located values, chains of zeros."""
+    return _doses(), _counting_balls(), _guard_and_tick(), _carried_back(), _samples(), _copied(), _chain()
 
 
 def _doses() -> Scene:
     """The amount follows from the doses before: each decays by exp(-1.2 t)."""
-    doses = ((0.0, 100.0), (12.0, 50.0), (24.0, 200.0), (48.0, 100.0))
+    doses = ((0.0, 100.0), (3.0, 50.0), (6.0, 200.0), (12.0, 100.0))
 
     def amount(t: float) -> tuple[float, ...]:
         return (math.fsum(dose * math.exp(-1.2 * (t - due)) for due, dose in doses if due <= t),)
 
-    events = ((0.0, "morning"), (12.0, "evening"), (24.0, "evening"), (24.0, "evening"), (24.0, "morning"))
+    events = ((0.0, "morning"), (3.0, "evening"), (6.0, "evening"), (6.0, "evening"), (6.0, "morning"))
     return Scene(
         "doses-at-one-instant",
         "doses",
-        (0.0, 50.0),
-        Truth((*events, (48.0, "morning")), tuple((t, amount(t)) for t in (12.0, 24.0, 25.0, 50.0))),
+        (0.0, 13.0),
+        Truth((*events, (12.0, "morning")), tuple((t, amount(t)) for t in (3.0, 6.0, 7.0, 13.0))),
         needs("scheduled"),
         count_scheduled=True,
     )
@@ -86,3 +86,73 @@ def _carried_back() -> Scene:
 def _never_crossed(solution: Any) -> list[str]:
     crossed = [event.t for event in solution.events if event.kind == "monitor"]
     return [f"the monitor fires {at_times(crossed)} instead of never"] if crossed else []
+
+
+def _samples() -> Scene:
+    """A sine is sampled whenever it has moved by 3: at 3, 6, 9, 6, 3, 0, and the same below zero."""
+    a, b, c = (math.asin(0.1 * k) / math.tau for k in (3, 6, 9))
+    times = [0.5 * k + t for k in range(6) for t in (a, b, c, 0.5 - b, 0.5 - a, 0.5)]
+
+    def state(t: float) -> tuple[float, float]:
+        return 10.0 * math.sin(math.tau * t), 10.0 * math.cos(math.tau * t)
+
+    def sampled(solution: Any) -> list[str]:
+        found = [e.t for e in solution.events if e.component == "one" and e.kind == "transition"]
+        is_near = len(found) == len(times) and all(
+            abs(t - due) < 1e-3 for t, due in zip(found, times, strict=True)
+        )
+        return (
+            []
+            if is_near
+            else [f"the sine is sampled {at_times(found)}, {len(found)} times; due: {len(times)}"]
+        )
+
+    return Scene(
+        "touch-beside-a-sample",
+        "samplers",
+        (0.0, 3.02),
+        Truth(None, tuple((t, state(t)) for t in (0.4, 1.0, 2.6, 3.02)), checks=(("", sampled),)),
+        needs("transitions", "adaptive", "multiple-roots"),
+        speed=60.0,
+    )
+
+
+def _copied() -> Scene:
+    """x = 10 - 11.3 cos(sqrt(3) t) comes to 0.7, and what is made of it falls at the rate one from then on."""
+    at, end = math.acos(9.3 / 11.3) / math.sqrt(3.0), 1.0
+
+    def state(t: float) -> tuple[float, ...]:
+        phase, since = math.sqrt(3.0) * t, t - at
+        copies = (0.7 - since, 1.4 - since, -since) if since >= 0.0 else (-t, -t, -t)
+        return (10.0 - 11.3 * math.cos(phase), 11.3 * math.sqrt(3.0) * math.sin(phase), *copies)
+
+    return Scene(
+        "copied-value",
+        "copied-value",
+        (0.0, end),
+        Truth(((at, "s:after"),), tuple((t, state(t)) for t in (0.2, 0.6, end))),
+        needs("transitions"),
+        speed=20.0,
+    )
+
+
+def _chain() -> Scene:
+    """Three guards in a row are zero at 0.87/0.7, and the last mode's own leave zero there."""
+    at = 0.87 / 0.7
+    return Scene(
+        "chain-of-zeros",
+        "chain-of-zeros",
+        (0.0, 3.0),
+        Truth(
+            tuple((at, f"c:{mode}") for mode in ("second", "third", "last")),
+            ((3.0, (2.1, 2.7)),),
+            checks=(("", _not_near),),
+        ),
+        needs("transitions", "adaptive"),
+        tol_t=1e-12,
+    )
+
+
+def _not_near(solution: Any) -> list[str]:
+    near = [event.t for event in solution.events if event.kind == "near-grazing"]
+    return [f"a guard is called near to zero {at_times(near)}, which leaves it there"] if near else []

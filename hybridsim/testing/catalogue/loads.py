@@ -12,7 +12,17 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """All of them."""
-    return _floor(), _touching(), _series(), _painleve(), _stop_off_zero(), _moving_floor()
+    return (
+        _floor(),
+        _touching(),
+        _series(),
+        _painleve(),
+        _stop_off_zero(),
+        _moving_floor(),
+        _kinked_floors(),
+        _own_speed(),
+        _element(),
+    )
 
 
 def _floor() -> Scene:
@@ -121,4 +131,89 @@ def _moving_floor() -> Scene:
         unit=2 * math.pi / turns,
         start_is_event=False,
         speed=speed,
+    )
+
+
+def _kinked_floors() -> Scene:
+    """The rising floor closes the gap at 0.5, which opens at 0.25; what lies on the sinking one falls freely."""
+    end = 1.04
+
+    def state(t: float) -> tuple[float, ...]:
+        since = max(t - 1.0, 0.0)
+        if not since:
+            return 0.0, 0.0, 0.0, 0.0
+        return 0.75 * since - 5 * since**2, 0.75 - 10 * since, -5 * since**2, -10 * since
+
+    return Scene(
+        "kinked-floors",
+        "kinked-floors",
+        (0.0, end),
+        Truth(((1.0, "p:open"), (1.0, "q:open")), tuple((t, state(t)) for t in (0.5, 1.02, end))),
+        needs("impacts", "located"),
+        unit=0.1,
+        start_is_event=False,
+    )
+
+
+def _own_speed() -> Scene:
+    """v' = 0.48 min(-v, 0.85) - 2 from v = -0.2: up to 0.85 an exponential, then a straight line."""
+    limit = 2.0 / 0.48
+    reached = math.log((limit - 0.2) / (limit - 0.85)) / 0.48
+
+    def speed(t: float) -> float:
+        if t < reached:
+            return (limit - 0.2) * math.exp(-0.48 * t) - limit
+        return -0.85 - (2.0 - 0.48 * 0.85) * (t - reached)
+
+    return Scene(
+        "own-speed-in-load",
+        "own-speed-in-load",
+        (0.0, 1.0),
+        Truth((), tuple((t, (speed(t),)) for t in (0.2, 0.6, 1.0))),
+        needs("contacts"),
+        start_is_event=False,
+    )
+
+
+def _element() -> Scene:
+    """The spring stretches up to the limit; the slider stops where the spring would be no faster than the limit."""
+    stiffness, mu, end = 20.0, 0.5, 7.0
+
+    def place(t: float) -> float:
+        return 2.0 / 1.3 * math.sin(1.3 * t)
+
+    def limit(t: float) -> float:
+        return mu * (1.0 + 0.6 * math.sin(2.1 * t))
+
+    def slider(t: float, side: float) -> float:
+        return side * stiffness * 2.0 * math.cos(1.3 * t) - mu * 0.6 * 2.1 * math.cos(2.1 * t)
+
+    events, held, force, side = [], 0.0, 0.0, 1.0
+    for turn in (1.0, 3.0, 5.0, 7.0):  # the motion turns at these quarters of its period
+        about = turn * math.pi / 2.6
+        start, before = held, force
+
+        def short(t: float, start: float = start, before: float = before, side: float = side) -> float:
+            return limit(t) - side * (before + stiffness * (place(t) - place(start)))
+
+        slips = float(brentq(short, held, about - 0.3, xtol=1e-15))
+        if slips > end:
+            break
+        events.append((slips, "f:slip+" if side > 0.0 else "f:slip-"))
+        held = float(brentq(slider, about - 0.2, about + 0.2, args=(side,), xtol=1e-15))
+        force = side * limit(held)
+        if held > end:
+            break
+        events.append((held, "f:stick"))
+        side = -side
+    states = tuple((t, (place(t), 2.0 * math.cos(1.3 * t), None)) for t in (3.0, end))
+    return Scene(
+        "element-under-varying-load",
+        "element",
+        (0.0, end),
+        Truth(tuple(events), states),
+        needs("contacts", "located"),
+        unit=2.0 * math.pi / 1.3,
+        start_is_event=False,
+        speed=2.0,
     )

@@ -6,12 +6,19 @@ import math
 from functools import partial
 from typing import Any
 
+from hybridsim.testing.checks import exact_stick
 from hybridsim.testing.scene import Scene, Truth, needs
+
+_SUMS = (
+    (-1.57, 0.265),
+    (1.55, 0.547),
+    (2.19, -0.164),
+)  # a and b of starts-at-zeros and starts-at-belt-speeds
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Guards, contacts, a relay and a gap beside corners; a clock at the start; the order of guards; a flat corner."""
-    return _guards(), _contacts(), _relay(), _gap(), _sampled(), _order(), _flat()
+    """Guards, contacts, a relay and a gap beside corners; a clock; the order of guards; a flat corner; zeros."""
+    return _guards(), _contacts(), _relay(), _gap(), _sampled(), _order(), _flat(), _zeros(), _held()
 
 
 def _guards() -> Scene:
@@ -124,4 +131,34 @@ def _flat() -> Scene:
             ((math.pi / 3, "band:outside"),), ((0.5, (9.0 + math.cos(0.5),)), (2.0, (9.0 + math.cos(2.0),)))
         ),
         needs("transitions"),
+    )
+
+
+def _zeros() -> Scene:
+    """Each state begins where something is zero, written as a sum, and leaves that at the rate one."""
+    starts = tuple(a + b for a, b in _SUMS)
+    return Scene(
+        "starts-at-zeros",
+        "starts-at-zeros",
+        (0.0, 1.0),
+        Truth((), tuple((t, tuple(start + t for start in starts)) for t in (0.5, 1.0))),
+        needs("transitions", "monitors"),
+    )
+
+
+def _held() -> Scene:
+    """Three bodies begin at the speed of their belts, and the force of 0.1 is less than friction holds."""
+    starts = {f"v{k}": a + b for k, (a, b) in enumerate(_SUMS[:3])}
+    return Scene(
+        "starts-at-belt-speeds",
+        "starts-at-belt-speeds",
+        (0.0, 1.0),
+        Truth(
+            (),
+            ((1.0, tuple(starts.values())),),
+            checks=tuple(
+                ("exact-stick", exact_stick(f"f{k}", {f"v{k}": v})) for k, v in enumerate(starts.values())
+            ),
+        ),
+        needs("contacts", "exact-stick"),
     )

@@ -51,14 +51,15 @@ def _neuron() -> Scene:
 
     marks = (-70.6, -60.0, -52.0, -48.0, -44.0, -40.0, -30.0, -15.0, 0.0)
     period = sum(quad(time_per_volt, a, b, epsrel=1e-13, epsabs=0.0)[0] for a, b in pairwise(marks))
-    spikes = tuple((k * period, "c:charging") for k in (1, 2, 3))
+    spikes = tuple((k * period, "c:charging") for k in (1, 2))
     return Scene(
         "exponential-neuron",
         "neuron",
-        (0.0, 3.5 * period),
+        (0.0, 2.5 * period),
         Truth(spikes, ()),
-        needs("transitions", "adaptive", "nonlinear"),  # no fixed step leads into a pole
-        tol_t=1e-6,
+        needs("transitions", "adaptive", "nonlinear", "poles"),  # no fixed step leads into a pole
+        unit=period,
+        tol_t=1e-6 / period,
     )
 
 
