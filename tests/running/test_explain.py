@@ -352,3 +352,26 @@ def test_a_schedule_and_a_monitor_say_what_they_set() -> None:
     sol = hs.simulate(hs.Model.from_toml(text), (0, 1))
     assert "it sets F = 0.5 + x" in str(sol.explain(0))
     assert "it sets F = 0" in str(sol.explain(1))
+
+
+def test_a_cascade_at_the_start_of_a_run_is_explained() -> None:
+    """Both guards are -1 - x at x = 0: each mode is left as it begins."""
+    model = hs.Model(
+        "to-and-fro",
+        states=[hs.State("x", 0, "1")],
+        components=[
+            hs.Component(
+                "c",
+                [
+                    hs.Mode("one", hs.Guard("g", "-1 - x", "two")),
+                    hs.Mode("two", hs.Guard("h", "-1 - x", "one")),
+                ],
+                initial="one",
+            )
+        ],
+    )
+    sol = hs.simulate(model, (0, 1))
+    assert sol.status == "cascade" and len(sol.events) > 2
+    for number in (0, 1, -1):
+        event = sol.events[number]
+        assert f"transition c {event.source} -> {event.target} at t = 0" in str(sol.explain(number))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -188,8 +189,10 @@ def test_the_reference_takes_sides_first() -> None:
 
 
 @pytest.mark.parametrize("integrator", ["cvode-bdf", "cvode-adams"])
-@pytest.mark.parametrize(("rate", "end"), [("t", 1.0), ("-t", 1.0), ("t**2", 1.5 ** (1 / 3))])
-@pytest.mark.parametrize("start", [0, 3, -40])
+@pytest.mark.parametrize(
+    ("rate", "end"), [("t", 1.0), ("-t", 1.0), ("t**2", 1.5 ** (1 / 3)), ("-sin(t)", math.pi / 3)]
+)
+@pytest.mark.parametrize("start", [0, 3, 10, -40])
 def test_a_corner_that_begins_at_zero_without_a_rate(
     start: float, rate: str, end: float, integrator: str
 ) -> None:
