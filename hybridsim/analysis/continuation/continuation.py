@@ -15,7 +15,7 @@ from hybridsim.analysis.continuation.branch import Branch, BranchPoint, specials
 from hybridsim.analysis.steady.measures import word_of
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.settling import relative
-from hybridsim.analysis.steady.shooting import Orbit, multipliers
+from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.carried import rates_of
@@ -290,9 +290,8 @@ class _Follower:
             kept = previous.orbit.start.values[self.section]
             change = np.append(change, (start.values[self.section] - kept) / unit[self.section])
         orbit = Orbit(start, period, self.multiple, relative(end.values - start.values, unit[:count]))
-        point = BranchPoint(
-            value, orbit, motion, multipliers(found.by_start, self.is_free), _word(solution), self.is_free
-        )
+        found_here = multipliers(found.by_start, rates_at_end(solution) if self.is_free else None)
+        point = BranchPoint(value, orbit, motion, found_here, _word(solution), self.is_free)
         return _Closing(point, change, jacobian)
 
     @staticmethod

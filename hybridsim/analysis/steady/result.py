@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
-from hybridsim.analysis.steady.shooting import multipliers
+from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
 from hybridsim.analysis.variations import sensitivities
 from hybridsim.errors import HybridsimError, UsageError
 
@@ -123,12 +123,13 @@ class SteadyState(Measures):
         """
         if not self.success:
             raise UsageError(f"the motion is {self.kind}: it has no multipliers", remedy="see lyapunov")
-        return multipliers(sensitivities(self.solution, ()).by_start, self._is_free)
+        rates = rates_at_end(self.solution) if self._is_free else None
+        return multipliers(sensitivities(self.solution, ()).by_start, rates)
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle, or on it to rounding."""
-        return bool((np.abs(self.multipliers) <= 1.0 + _NEUTRAL).all())
+        """Whether all multipliers are inside the unit circle, or on it as far as the tolerance tells: 100 rtol."""
+        return bool((np.abs(self.multipliers) <= 1.0 + max(_NEUTRAL, 100.0 * self._motion.rtol)).all())
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
         """All that it says as plain values; harmonics up to that number, with their phases in radians.

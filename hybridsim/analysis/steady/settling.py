@@ -41,6 +41,7 @@ class Passings:
     last : the motion at the last one.
     rests : whether nothing moves any more.
     state : the state that keeps its value from passing to passing, without forcing.
+    adds_up : whether states that move on at constant rates are all that moves, without forcing.
     """
 
     times: np.ndarray
@@ -49,6 +50,7 @@ class Passings:
     last: Point
     rests: bool = False
     state: int = 0
+    adds_up: bool = False
 
     def residual(self, multiple: int) -> float:
         """The largest change of a state over so many passings up to the last, relative to its scale."""
@@ -109,6 +111,7 @@ class Passings:
 
 
 _STEADY = 0.1  # of a drift: what it may change by
+_CONSTANT = 1e-8  # of one at a constant rate, which is not that of a slow end
 _ABOUT = 10.0
 
 
@@ -188,13 +191,16 @@ def free_passings(
             end = point_at_end(following)
             return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
         largest[:] = 0.5 * (high - low)
-    others = np.where(_goes_on(late, high - low), 0.0, moves)
+    others = np.where(_goes_on(late, high - low, _STEADY), 0.0, moves)
     j = int(np.argmax(others if others.max() > RESTS else moves))
     times = orbit.passes(motion.names[j], 0.5 * (low[j] + high[j]))
     times, j = _without_events(late, orbit, times, j, others > RESTS)
     points = [point_at(late, t) for t in times]
     values = np.array([p.values for p in points]).reshape(len(points), len(scale))
-    return Passings(times, values, scale_of(late, 0.0), points[-1] if points else end, state=j)
+    adds_up = bool((moves <= RESTS)[~_goes_on(late, high - low, _CONSTANT)].all())
+    return Passings(
+        times, values, scale_of(late, 0.0), points[-1] if points else end, state=j, adds_up=adds_up
+    )
 
 
 def _without_events(
@@ -231,10 +237,10 @@ def _without_events(
 _FEW = 3  # last passings at which events are looked for
 
 
-def _goes_on(solution: Solution, moves: np.ndarray) -> np.ndarray:
-    """Which states (n,), whose ranges are given, move on as much in each quarter of a run, the same way."""
+def _goes_on(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
+    """Which states (n,), whose ranges are given, move on as much in each quarter of a run, but for a steady share."""
     steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
-    is_steady = np.ptp(steps, axis=1) <= _STEADY * np.abs(steps[:, 0])
+    is_steady = np.ptp(steps, axis=1) <= steady * np.abs(steps[:, 0])
     return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,15 @@ from hybridsim.analysis.variations import sensitivities
 from hybridsim.analysis.variations.carried import rates_of
 from hybridsim.errors import HybridsimError
 
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
 _STEPS = 12
 _LESS = 0.5  # a step that leaves more of the residual than that is none
 _ROUNDING = 1e-14  # of the states' scale: no step makes the residual smaller
 # what has a multiplier beyond that is not come to by waiting: it repels, or lies among others
 _ATTRACTS = 1.0 - 1e-6
+_DOUBLE = 1e-3  # of two multipliers: so close to 1 they are taken apart by the direction of the motion
 
 
 @dataclass(frozen=True)
@@ -68,8 +73,7 @@ def shoot(
             break
         rates = None
         if section is not None:
-            last = solution._segments[-1]
-            rates = rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
+            rates = rates_at_end(solution)
         move, longer = _newton(matrix, change, scale, section, rates)
         best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
         # what is left of the error is the step itself
@@ -100,12 +104,35 @@ def _newton(
 
 
 def _attracts(matrix: np.ndarray, rates: np.ndarray | None) -> bool:
-    return bool((np.abs(multipliers(matrix, rates is not None)) <= _ATTRACTS).all())
+    return bool((np.abs(multipliers(matrix, rates)) <= _ATTRACTS).all())
 
 
-def multipliers(matrix: np.ndarray, is_free: bool) -> np.ndarray:
-    """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out."""
+def rates_at_end(solution: Solution) -> np.ndarray:
+    """dx/dt (n,) where a run ends."""
+    last = solution._segments[-1]
+    return rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
+
+
+def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
+    """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out.
+
+    rates (n,): dx/dt at the end of the orbit, without forcing. Where another multiplier is about 1 as well, as on the
+    closed orbits of what conserves energy, the two of them are known to the root of rounding only. The motion is the
+    eigenvector of the first one: the others are those of the matrix beside it.
+    """
     found = np.linalg.eigvals(matrix)
-    if is_free:
-        found = np.delete(found, np.argmin(np.abs(found - 1.0)))
+    if rates is not None:
+        distance = np.abs(found - 1.0)
+        near = np.argsort(distance)
+        found = np.delete(found, near[0])
+        if len(near) > 1 and distance[near[1]] < _DOUBLE and rates.any():
+            found = np.linalg.eigvals(_beside(matrix, rates))
     return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def _beside(matrix: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """What a matrix makes of changes across a direction, but for what it adds along that."""
+    direction = np.zeros((len(matrix), 1))
+    direction[: len(rates), 0] = rates
+    across = np.linalg.qr(direction, mode="complete")[0][:, 1:]
+    return across.T @ matrix @ across

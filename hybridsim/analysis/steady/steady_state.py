@@ -186,6 +186,7 @@ class _Search:
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
         self.seen = np.zeros(0)  # largest scale of each state so far
         self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
+        self.without = 0  # stretches in a row on which nothing came back
         self.expected = 0  # periods that the motion is expected to need until it has settled
 
     def run(self) -> SteadyState:
@@ -198,6 +199,9 @@ class _Search:
             orbit = self._closed(passings)
             if orbit is not None:
                 return self._periodic(orbit)
+            self.without = self.without + 1 if len(passings.times) < _FEWEST else 0
+            if self.without > 1 and (passings.adds_up or self.without > _ROUNDS):
+                return self._without_return(passings)
             if self.periods >= self.max_periods:
                 return self._other(passings)
             passings = self._follow(passings)
@@ -245,7 +249,7 @@ class _Search:
                 # a stretch that was cut short tells nothing of what is slow
                 if self.duration >= self.least or self.motion.stands_still(passings.last):
                     break
-            elif len(passings.times) >= _FEWEST:
+            elif len(passings.times) >= _FEWEST or (passings.adds_up and last is not None):
                 break
             self.duration *= 4.0
         self.periods += len(passings.times)
@@ -376,6 +380,16 @@ class _Search:
         found.lyapunov, found.message, found.periods = exponent, message, self.periods
         return found
 
+    def _without_return(self, passings: Passings) -> SteadyState:
+        """A motion that does not come back to where it was, however long it is followed."""
+        name = self.motion.names[passings.state]
+        orbit = Orbit(passings.last, self.duration, 1, math.inf)
+        message = (
+            f"{UNSETTLED} within {self.duration:.3g} units of time: {name} does not come back; if it only "
+            f"adds up, leave it out, and if it is slow, give the model a longer duration"
+        )
+        return _found(self.motion, UNSETTLED, orbit, periods=self.periods, message=message)
+
     def _leaving(self, passings: Passings) -> str:
         """The name of a state that never comes back; empty if all do."""
         names = [*self.motion.names, *self.motion.discrete]
@@ -386,7 +400,10 @@ class _Search:
         return names[int(np.argmax(grown))] if grown.any() else ""
 
 
-_LONGER = 8
+_LONGER, _ROUNDS = (
+    8,
+    3,
+)  # times that a stretch is made longer at once, and stretches on which nothing comes back
 
 
 def _found(
