@@ -79,6 +79,13 @@ def text(value: Any, what: str) -> str:
     return value
 
 
+def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
+    """One of the names that are known; `what` says of whom it is none, such as "the run has no contact"."""
+    if not isinstance(value, str) or value not in known:
+        raise UsageError(f"{what} {value!r}", remedy=nearest(str(value), known, kind=kind))
+    return value
+
+
 def flag(value: Any, what: str) -> bool:
     """A truth value."""
     if not isinstance(value, bool | np.bool_):
@@ -157,17 +164,22 @@ def chosen_model(model: Any, params: Any) -> Model:
 def time_span(t_span: Any) -> tuple[float, float]:
     """(t0, t1), both finite."""
     remedy = "give two numbers, (t0, t1)"
-    if not is_row(t_span):
-        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
-    ends = [number(t, "a time of t_span", remedy) for t in t_span]
-    if len(ends) > 2:
-        remedy += "; the times at which states are wanted go to t_eval"
+    if is_row(t_span):
+        t_span = t_span if isinstance(t_span, tuple | list | np.ndarray) else list(t_span)
+        remedy += "; the times at which states are wanted go to t_eval" if len(t_span) > 2 else ""
+    return two_numbers(t_span, "t_span", remedy, "; a monitor can end a run early")
+
+
+def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
+    """Two finite numbers; `but`: what to do who wants one that is not finite."""
+    if not is_row(value):
+        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+    ends = [number(t, f"a value of {what}", remedy) for t in value]
     if len(ends) != 2:
-        given = repr(t_span) if len(ends) < 5 else f"{len(ends)} times from {ends[0]!r} to {ends[-1]!r}"
-        raise UsageError(f"t_span is {given}", remedy=remedy)
+        given = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
+        raise UsageError(f"{what} is {given}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
-        remedy = "give two finite numbers; a monitor can end a run early"
-        raise UsageError(f"t_span is {t_span!r}", remedy=remedy)
+        raise UsageError(f"{what} is {value!r}", remedy=f"give two finite numbers{but}")
     return ends[0], ends[1]
 
 
@@ -181,17 +193,17 @@ def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
     )
 
 
-def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
-    """Initial values of states by name, and the model with those of its discrete states changed."""
+def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
+    """Values of states by name, and the model with those of its discrete states changed; `what`: the argument."""
     names = [s.name for s in model.states]
     if x0 is None:
         return {}, model
     if not isinstance(x0, Mapping):
         each = f"give one number for each of {', '.join(names)}, or a mapping from names to numbers"
-        values = numbers(x0, "x0", each)
+        values = numbers(x0, what, each)
         if len(values) != len(names):
             raise UsageError(
-                f"x0 has {len(values)} values and model {model.name} has {len(names)} states ({', '.join(names)})",
+                f"{what} has {len(values)} values and model {model.name} has {len(names)} states ({', '.join(names)})",
                 remedy="give one value for each state, or a mapping from names to values",
             )
         x0 = dict(zip(names, values, strict=True))
@@ -200,14 +212,14 @@ def start_values(model: Model, x0: Any) -> tuple[dict[str, float], Model]:
     for name, value in x0.items():
         if name not in names + discrete:
             raise UsageError(
-                f"x0 names {name!r}, which is no state of model {model.name}",
+                f"{what} names {name!r}, which is no state of model {model.name}",
                 remedy=_states_in_order(str(name), names, discrete),
             )
         found[name] = number(
-            value, f"x0 of {name}", f"give a number; an expression goes to model.with_start({name}=...)"
+            value, f"{what} of {name}", f"give a number; an expression goes to model.with_start({name}=...)"
         )
         if not math.isfinite(found[name]):
-            raise UsageError(f"x0 of {name} is {value!r}", remedy="give a finite number")
+            raise UsageError(f"{what} of {name} is {value!r}", remedy="give a finite number")
     changed = {n: v for n, v in found.items() if n in discrete}
     return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
 

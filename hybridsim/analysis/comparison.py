@@ -12,6 +12,8 @@ from typing import Any
 from hybridsim.analysis.errors_against_reference import Errors
 from hybridsim.analysis.rows import QUANTITIES, Reading, Row
 from hybridsim.analysis.table import table
+from hybridsim.arguments import known_name
+from hybridsim.errors import UsageError
 from hybridsim.files import json_text, whole_file, write_text
 
 
@@ -67,6 +69,8 @@ class Comparison:
 
         Event times are in periods where there is a period, else in the model's unit of time.
         """
+        if not isinstance(row, Row):
+            raise UsageError(f"row is {row!r}", remedy="give one of rows")
         value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
@@ -87,6 +91,9 @@ class Comparison:
 
     def scaled(self, errors: Errors | None, quantity: str) -> float | None:
         """An error in the units of `reading`."""
+        known_name(quantity, QUANTITIES, "a comparison has no quantity", "quantities")
+        if errors is not None and not isinstance(errors, Errors):
+            raise UsageError(f"errors is {errors!r}", remedy="give the errors of a row, row.errors")
         value: float | None = getattr(errors, quantity, None)
         return (
             value / self.period if value is not None and quantity == "event_time" and self.period else value

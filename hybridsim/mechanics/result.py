@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
-from hybridsim.arguments import as_times
+from hybridsim.arguments import as_times, known_name, text
 from hybridsim.errors import UsageError
 from hybridsim.solution.in_tables import InTables
 from hybridsim.solution.solution import Solution
@@ -110,9 +110,17 @@ class ArraysResult(InTables):
         if not inside.all():
             bad = float(times[~inside][0])
             raise UsageError(
-                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}"
+                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}",
+                remedy="give times within it",
             )
         return times
+
+    def _asked(self, component: Any, kind: Any, names: list[str]) -> None:
+        """Refuse a component that the run does not have, and a kind that is no word."""
+        self._require_events()
+        known_name(component, names, f"{self.model.name} has no component", "components")
+        if kind is not None:
+            text(kind, "kind")
 
     def _require_states(self) -> None:
         if self._save != "all":

@@ -76,6 +76,7 @@ def chain_on_belt(
 
     n, seed = whole_number(n, "n", 1, MOST_BLOCKS), whole_number(seed, "seed", 0, 2**63)
     coupling, leaf = finite_number(coupling, "coupling"), finite_number(leaf, "leaf")
+    belt = finite_number(belt, "belt")
     spread, gap = finite_number(spread, "spread"), None if gap is None else finite_number(gap, "gap")
     if not spread >= 0.0:
         raise UsageError(f"spread is {spread!r}", remedy="give a number >= 0")
@@ -141,7 +142,8 @@ def two_blocks_on_belt(
     >>> len(hs.two_blocks_on_belt().contacts)
     2
     """
-    coupling = finite_number(coupling, "coupling")
+    coupling, second = finite_number(coupling, "coupling"), finite_number(second, "second")
+    belt = finite_number(belt, "belt")
     law: Any = {"mu": 1.0, "delta": delta}
     loads = (1.0, second)
     contacts = [
@@ -199,7 +201,8 @@ def three_coupled_blocks(
         )
         for i, load in enumerate((30.0, 20.0, 10.0))
     ]
+    forces = [0, Harmonic(omega, sin=finite_number(amplitude, "amplitude")), 0]
     return MechanicalSystem(
-        np.ones(3), None, None, [0, Harmonic(omega, sin=amplitude), 0], contacts, name="three-blocks",
+        np.ones(3), None, None, forces, contacts, name="three-blocks",
         title="Three blocks on top of each other", source="after D. E. Stewart, Numer. Math. 58 (1990) 299",
     )  # fmt: skip

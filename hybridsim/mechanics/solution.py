@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from hybridsim.arguments import as_times
+from hybridsim.arguments import as_times, known_name, side_of_event
 from hybridsim.engine.packs import packed
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.run import STATUS, new_room, new_state, reach_kernels
@@ -154,19 +154,16 @@ class MechanicalSolution(ArraysResult):
         ----------
         t : a number or an array of times; without it ``sol.t``.
         """
-        given = self.t if t is None else t
+        given, side = self.t if t is None else t, side_of_event(side)
         times = as_times(given)
+        name = known_name(
+            name, [*self.names, *self.quantities], f"{self.model.name} has no quantity", "quantities"
+        )
         if name in self.names:
             values = self(times, side)[self.names.index(name)]
         else:
             contacts = [c.name for c in self.model.contacts]
             own = name.removeprefix("v_rel(").removesuffix(")")
-            if own not in contacts:
-                known = [*self.names, *self.quantities]
-                raise UsageError(
-                    f"{self.model.name} has no quantity {name!r}",
-                    remedy=nearest(name, known, kind="quantities"),
-                )
             right = side == "+"
             column = int(np.argsort(self._contact_of)[contacts.index(own)])
             both = self._quantities(times, right, self._pieces.states(times, right))
@@ -192,7 +189,7 @@ class MechanicalSolution(ArraysResult):
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one contact."""
-        self._require_events()
+        self._asked(component, kind, [contact.name for contact in self.model.contacts])
         numbers = [i for i, c in enumerate(self.model.contacts) if c.name == component]
         chosen = np.isin(self._contact_of[self._event[:, 0]], numbers) & (kind in (None, "transition"))
         return self._when[chosen]

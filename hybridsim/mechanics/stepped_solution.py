@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.arguments import as_times
-from hybridsim.errors import UsageError, nearest
+from hybridsim.arguments import as_times, known_name
 from hybridsim.mechanics.result import ArraysResult
 from hybridsim.mechanics.stepped_kernels import BOUNCES, STEPS, SWEEPS, UNSETTLED
 from hybridsim.mechanics.stepped_plant import directions
@@ -125,6 +124,9 @@ class SteppedSolution(ArraysResult):
         """
         given = self.t if t is None else t
         times = as_times(given)
+        name = known_name(
+            name, [*self.names, *self.quantities], f"{self.model.name} has no quantity", "quantities"
+        )
         nc, names = len(self.model.contacts), [part.name for part in self._parts]
         speeds = {f"v_rel({c.name})": k for k, c in enumerate(self.model.contacts)}
         gaps = {f"gap({i.name})": nc + k for k, i in enumerate(self.model.impacts)}
@@ -135,16 +137,11 @@ class SteppedSolution(ArraysResult):
             self(times)
             mean = np.concatenate([*self._run.forces, np.zeros((0, len(names)))])[self._step_of(times), k]
             values = mean if k >= nc else -mean
-        elif name in speeds or name in gaps:
+        else:
             k, n = speeds.get(name, gaps.get(name, 0)), self.model.n
             x = self(times)
             values = (directions(self.model)[[k]] @ (x[n:] if name in speeds else x[:n])).ravel()
             values = values - self._base(k, times) if name in speeds else values + self._run.plant.gap[k - nc]
-        else:
-            known = [*self.names, *self.quantities]
-            raise UsageError(
-                f"{self.model.name} has no quantity {name!r}", remedy=nearest(name, known, kind="quantities")
-            )
         return values[0] if np.ndim(given) == 0 else values
 
     @property
@@ -187,7 +184,7 @@ class SteppedSolution(ArraysResult):
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
         """Times of the events of one contact or impact."""
-        self._require_events()
+        self._asked(component, kind, [part.name for part in self._parts])
         numbers = [k for k, part in enumerate(self._parts) if part.name == component]
         return self._when[np.isin(self._event[:, 1], numbers) & (kind in (None, "transition"))]
 

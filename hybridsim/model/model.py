@@ -10,6 +10,7 @@ from typing import Any
 
 from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, resolve
+from hybridsim.files import path_text
 from hybridsim.model.component import Component, Corner
 from hybridsim.model.contact import Contact
 from hybridsim.model.declared import Declared, as_tuple
@@ -427,6 +428,8 @@ class Model(Declared):
 
         if not isinstance(text, str):
             raise UsageError(f"the model's text is {text!r}", remedy="give TOML, or load a file by its path")
+        if path is not None:
+            path = path_text(path)
         return read_model(text, path)
 
 

@@ -26,15 +26,15 @@ _TRIALS = 8  # points at which a law is tried for a jump at rest; one would do b
 
 def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
     """The model with every contact in a regularised form; see `Model.regularized`."""
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise UsageError(
-            f"there is no regularisation {kind!r}", remedy=nearest(kind, KINDS, kind="regularisations")
+            f"there is no regularisation {kind!r}", remedy=nearest(str(kind), KINDS, kind="regularisations")
         )
     if not any(contact.law.is_set_valued for contact in model.contacts):
         raise UsageError(f"the model '{model.name}' has no contact with a set-valued law to regularise")
     taken = names_of_model(model)
     name = free_name(taken, "v0")
-    width = Parameter(name, parse(v0))
+    width = Parameter(name, v0)  # type: ignore[arg-type]  # a text or a number becomes an expression
     changed = replace(model, parameters=(*model.parameters, width))
     value = changed.parameter_values()[name]
     if not value > 0.0:

@@ -54,7 +54,7 @@ def sweep_lines(
     across = over
     if over is None:  # texts are no distances
         across = max(dimensions, key=lambda name: (result.axes[name].dtype.kind == "f", lengths[name]))
-    if across not in dimensions:
+    if not isinstance(across, str) or across not in dimensions:
         raise UsageError(f"over is {over!r}", remedy=nearest(str(over), dimensions, kind="parameters"))
     found = chosen_names(result, names, arrays=True)
     if axes is None:

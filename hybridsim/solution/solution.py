@@ -234,7 +234,10 @@ class Solution(InTables):
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
-            raise UsageError(f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}")
+            raise UsageError(
+                f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}",
+                remedy="give times within it",
+            )
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # right-continuous in time: forward the later segment has an event time, backward the earlier one
         later = (side == "+") == (sign > 0)

@@ -114,7 +114,8 @@ def continuation(
             f"model {model.name} has no parameter {parameter!r}",
             remedy=model.remedy_for_parameter(str(parameter)),
         )
-    low, high = arguments.time_span(bounds)
+    low, high = arguments.two_numbers(bounds, "bounds", "give two numbers, (low, high)")
+    progress = arguments.callback(progress)
     value = model.parameter_values()[parameter]
     if not low <= value <= high or low == high:
         raise UsageError(

@@ -147,7 +147,7 @@ def linearize(
     from hybridsim.engine.recent import system_of
 
     system = system_of(model)
-    start, _ = arguments.start_values(model, at)
+    start, _ = arguments.start_values(model, at, "at")
     x = system.start_state(start)
     z, by_state = modes_of(system, mode)
     field = Field(system, z, arguments.number(t, "t"), by_state).at_sides(x)

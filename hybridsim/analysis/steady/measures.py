@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.orbit import Orbit
 from hybridsim.analysis.steady.resolving import orbit_of
+from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 
+MOST_HARMONICS = 100_000  # a segment has no digits left of a higher one
 _ROUNDING = 1e-10  # of a guard's largest value: what an event leaves of it
 
 
@@ -55,7 +57,7 @@ class ByName(Mapping[str, float]):
         self._names = tuple(name for name in names if name not in unreadable)
 
     def __getitem__(self, name: str) -> float:
-        if name not in self._names and name not in self._unreadable:
+        if not isinstance(name, str) or (name not in self._names and name not in self._unreadable):
             raise UnknownName(
                 f"the steady state has no {self._kind} {name!r}",
                 remedy=nearest(str(name), self._names, kind=self._kind),
@@ -141,12 +143,8 @@ class Measures:
 
         Integrated over the segments: no sampling, no aliasing.
         """
-        if name not in self._names:
-            raise UsageError(
-                f"the steady state has no quantity {name!r}",
-                remedy=nearest(str(name), self._names, kind="quantities"),
-            )
-        if not isinstance(k, int) or k < 0:
+        known_name(name, self._names, "the steady state has no quantity", "quantities")
+        if not isinstance(k, int) or not 0 <= k <= MOST_HARMONICS:
             raise UsageError(f"k is {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ...")
         frequency = 2.0 * math.pi * k / self._orbit.duration
         found = self._orbit.harmonic(name, frequency)
@@ -193,8 +191,10 @@ class Measures:
 
     def held_mode(self, contact: str) -> str:
         """Name of the mode that counts as stick: of a contact ``stick``, of a switching surface its sliding mode."""
-        system = self.solution._system
-        automaton = next(a for a in system.automata if a.name == contact)
+        automata = {a.name: a for a in self.solution._system.automata if a.has_surface}
+        automaton = automata[
+            known_name(contact, list(automata), "the steady state has no contact", "contacts")
+        ]
         return str(automaton.modes[automaton.hold])
 
     @property

@@ -12,6 +12,7 @@ from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
 from hybridsim.analysis.variations import sensitivities
+from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 _NEUTRAL = 1e-9
+_MOST_LISTED = 10_000  # harmonics of each quantity in a record
 
 
 class SteadyState(Measures):
@@ -136,6 +138,7 @@ class SteadyState(Measures):
 
         Where the motion has no multipliers ``multipliers`` and ``stable`` are None, and ``no_multipliers`` says why.
         """
+        harmonics = whole_number(harmonics, "harmonics", 0, _MOST_LISTED)
         record: dict[str, Any] = {
             "model": self.model.name,
             "parameters": self.model.parameter_values(),

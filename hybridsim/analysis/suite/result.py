@@ -14,6 +14,7 @@ from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import Verdict, verdict
 from hybridsim.analysis.table import setting
+from hybridsim.analysis.wanted import positives
 from hybridsim.files import json_text, whole_file, write_text
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
@@ -86,6 +87,7 @@ class SuiteComparison:
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
         """Scene -> accuracy -> the cheapest row that reaches it; None where none does."""
+        accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}
             for result in self.results

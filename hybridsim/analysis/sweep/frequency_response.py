@@ -63,7 +63,7 @@ def frequency_response(
         raise UsageError(f"levels is {levels!r}", remedy="give one parameter other than the frequency")
     if not model.states:
         raise UsageError(f"model {model.name} has no states", remedy="there is nothing that responds")
-    words = [f"amplitude.{model.states[0].name if quantity is None else quantity}"]
+    words = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
     for contact in model.contacts:
         words += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
     # with warm starts the frequency is the chain, which is the first axis
