@@ -225,6 +225,18 @@ def test_integrators(hybridsim: Callable) -> None:
             assert f"lacks {capability}: {' '.join(reason.split())}" in flat
 
 
+def test_clearing_the_cache_leaves_folders_of_others(
+    hybridsim: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder whose name alone is like ours was made by somebody else."""
+    monkeypatch.setenv("HYBRIDSIM_CACHE", str(tmp_path))
+    drawing = tmp_path / "engine-0123" / "drawing.txt"
+    drawing.parent.mkdir()
+    drawing.write_text("of a steam engine")
+    assert hybridsim("cache", "clear").code == 0
+    assert drawing.read_text() == "of a steam engine"
+
+
 def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from hybridsim.engine.cache import kernel_folder, store
 

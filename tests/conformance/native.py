@@ -52,7 +52,7 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "stepped-guard": (CLOSED, {}),
     "elastic-floor": (CLOSED, {}),
     "starts-at-zeros": (CLOSED, {}),
-    "touch-beside-a-sample": (CLOSED, {"scipy-rk45": "", "scipy-rk23": ""}),
+    "touch-beside-a-sample": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
     "sizes-of-sizes": ("", {"scipy-radau": TWO_VALUES}),
     "twisting": ("", {"scipy-radau": TWO_VALUES}),
     "long-swing": ("", {"scipy-rk23": LONG, "scipy-radau": LONG, "scipy-bdf": LONG}),

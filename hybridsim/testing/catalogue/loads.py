@@ -136,10 +136,10 @@ def _moving_floor() -> Scene:
 
 def _kinked_floors() -> Scene:
     """The rising floor closes the gap at 0.5, which opens at 0.25; what lies on the sinking one falls freely."""
-    end = 1.04
+    began, end = 0.1, 0.14
 
     def state(t: float) -> tuple[float, ...]:
-        since = max(t - 1.0, 0.0)
+        since = max(t - began, 0.0)
         if not since:
             return 0.0, 0.0, 0.0, 0.0
         return 0.75 * since - 5 * since**2, 0.75 - 10 * since, -5 * since**2, -10 * since
@@ -148,7 +148,7 @@ def _kinked_floors() -> Scene:
         "kinked-floors",
         "kinked-floors",
         (0.0, end),
-        Truth(((1.0, "p:open"), (1.0, "q:open")), tuple((t, state(t)) for t in (0.5, 1.02, end))),
+        Truth(((began, "p:open"), (began, "q:open")), tuple((t, state(t)) for t in (0.05, 0.12, end))),
         needs("impacts", "located"),
         unit=0.1,
         start_is_event=False,
