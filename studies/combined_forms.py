@@ -150,8 +150,14 @@ with hybridsim. The models combine the forms that people combine:
   combinations, by tables and by waves.
 - Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors meet at one
   instant.
+- Parts look at states of other parts. Parts of expressions may be definitions.
 - Names, the order of declaration, the scale and sign of the states and the origin of time are drawn as well. One run in
   ten is stopped in the middle and resumed.
+
+Each set of numbers is run by one integrator of hybridsim, or by the default, and by another one at random. The first
+structures are chosen so that rare pairs of forms come together: each is the one of {pool} drawn ones that has the most
+pairs which are in fewer than {enough} structures so far. The others are taken as they are drawn. No two forms exclude
+each other: every form is of a part, and parts are drawn independently.
 
 *The judge* (`tests/reference/combined`) reads an abstract form of the model, not the model file. It follows the motion
 by Taylor series in each configuration, finds zeros by dense sampling and bisection, and decides an instant by
@@ -169,11 +175,12 @@ separately, and so is a wrong run whose warnings say that a jump inside a mode w
 
 def page(done: list[dict[str, Any]], draws: int) -> str:
     """The page of the results."""
+    from reference.combined.chosen import ENOUGH, POOL
     from reference.combined.compare import ALLOWED, POINTS
 
     runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model", "unclear")]
     seeds = sorted({r["seed"] for r in runs})
-    out = HEAD.format(allowed=ALLOWED, points=POINTS)
+    out = HEAD.format(allowed=ALLOWED, points=POINTS, pool=POOL, enough=ENOUGH)
     instants = sum(r.get("instants", 0) for r in runs)
     out += f"{len(seeds)} structures with {draws} sets of numbers each: {len(runs)} runs, {instants} instants.\n\n"
     out += "| result | runs |\n| --- | --- |\n"

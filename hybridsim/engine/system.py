@@ -23,6 +23,7 @@ from hybridsim.engine.timepair import Instant, phase_of
 from hybridsim.model.component import Corner, LoadAutomaton
 from hybridsim.model.jumps import SIGN
 from hybridsim.model.smoothing import smoothed
+from hybridsim.model.steps_in_time import constant_inputs
 from hybridsim.model.toml_automata import SINGLE
 
 if TYPE_CHECKING:
@@ -223,7 +224,7 @@ class System:
         self.rates = self.rates_at(self._base)
         self.fastest = float(max(map(abs, self.rates), default=0.0))
         self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
-        numbers = {**model.discrete_values(), **self.values} if model.inputs else {}
+        numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.start` has found
         self.tables: dict[float, Any] = {}  # what `hybridsim.engine.linear_tables` has made last

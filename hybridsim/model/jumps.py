@@ -22,7 +22,7 @@ from hybridsim.model.component import Choice, Component, Corner, Guard, Mode
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import sides_of
 from hybridsim.model.one_sided import names_of
-from hybridsim.model.steps_in_time import never_set
+from hybridsim.model.steps_in_time import lasting
 from hybridsim.model.switching import ABOVE, BELOW, SwitchingSurface
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ class Borders:
         self._rates = {state.name: state.der.tree for state in model.states}
         still = {state.name for state in model.states if not polynomial(state.der.tree)} - rates
         self._moving = {state.name for state in model.states} - still
-        set_by_resets = {part.name for part in model.discrete} - never_set(model)
-        self._held = {*still, *set_by_resets, *(signal.name for signal in model.inputs)}
+        given = {part.name for part in model.discrete} | {signal.name for signal in model.inputs}
+        self._held = still | (given - lasting(model))
         self._surfaces = [
             c.surface.function.tree for c in components if c.surface and not c.surface.is_unilateral
         ]

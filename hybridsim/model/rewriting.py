@@ -35,7 +35,7 @@ from hybridsim.model.nonsmooth import (
     uses_sign,
 )
 from hybridsim.model.one_sided import names_of, never_negative, number_of
-from hybridsim.model.steps_in_time import STEP, TimeStep, never_set, step_of
+from hybridsim.model.steps_in_time import STEP, TimeStep, lasting, step_of
 from hybridsim.model.switching import blend
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Rewriting:
         self.meanings = Meanings(model)
         self.borders, self._has_sign = Borders(model, self.meanings), uses_sign(model)
         self.has_jumps = self._has_sign or uses_conditions(model)
-        self._parameters = {parameter.name for parameter in model.parameters} | never_set(model)
+        self._parameters = {parameter.name for parameter in model.parameters} | lasting(model)
         self.components = model.all_components()
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}

@@ -2,7 +2,7 @@
 
 In a rate a component stands for such a condition, since a run goes over it without a pause. In the velocity of a
 contact, a load, a law, a gap or a guard it is a signal, so that its jumps are those of an input. Its times may depend
-on parameters, and on discrete states that nothing sets.
+on parameters, on discrete states that nothing sets and on inputs that are constant.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class TimeStep(Input):
     Parameters
     ----------
     shift, rate, amplitude, phase, period : Expression
-        Expressions of parameters and discrete states that nothing sets; the last three for the sine only.
+        Expressions of parameters and of what lasts, see `lasting`; the last three for the sine only.
     title : str
         What is above zero, as it was written.
     """
@@ -54,12 +54,18 @@ class TimeStep(Input):
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 
 
-def never_set(model: Model) -> frozenset[str]:
-    """The discrete states that nothing sets: each keeps its start, as a parameter keeps its value."""
+def constant_inputs(model: Model) -> dict[str, float]:
+    """The tables of one value."""
+    tables = (signal for signal in model.inputs if signal.kind == "table")
+    return {table.name: table.values[0] for table in tables if len(set(table.values)) == 1}
+
+
+def lasting(model: Model) -> frozenset[str]:
+    """What keeps its value as a parameter does: the discrete states that nothing sets, and constant inputs."""
     choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
     resets = [choice.reset for choice in choices]
     resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]
-    return frozenset(part.name for part in model.discrete).difference(*resets)
+    return frozenset(part.name for part in model.discrete).difference(*resets) | constant_inputs(model).keys()
 
 
 def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:

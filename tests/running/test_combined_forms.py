@@ -6,29 +6,44 @@ import math
 from collections import Counter
 
 import pytest
+from reference.combined import compare
 from reference.combined.compare import judged
 from reference.combined.forms import TIME, Abstract, Contact, Impact, Node, abs_, node, sin, var
 from reference.combined.parts import PARTS, alone
 from reference.combined.shrink import shrunk
-from reference.combined.trial import QUIET, features, trials
+from reference.combined.trial import QUIET, features, single_runs, trials
 from reference.combined.values import Digits
 
 import hybridsim as hs
 
-STRUCTURES = (525, 34, 664, 361, 351, 421, 142, 978, 17, 1075, 12)
+STRUCTURES = (101506, 100424, 17, 6, 7, 101032, 23, 101567, 11, 22, 100830, 101294, 3, 5, 26)
+ALONE = ("thermostat", "twins", "two_discs")  # parts that are in none of these
 
 
 def test_the_sample_has_every_part_and_form() -> None:
     """Those of the sample are all that the first 400 structures of the study have."""
     every = set().union(*map(features, range(400)))
+    sample = [features(seed) for seed in STRUCTURES] + [alone(part, 1).m.features for part in ALONE]
     assert {f"part: {part.__name__}" for _, part in PARTS} <= every
-    assert set().union(*map(features, STRUCTURES)) == every
+    assert set().union(*sample) >= every
+
+
+@pytest.fixture(autouse=True)
+def _limits_that_no_load_of_the_machine_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare, "LIMITS", {"steps": 100_000, "events": 5000})
 
 
 @pytest.mark.parametrize("seed", STRUCTURES)
 def test_a_structure_moves_as_the_judge_says(seed: int) -> None:
-    found = list(trials(seed, 3))
-    assert Counter(record["kind"] for record in found)["agrees"] >= 3
+    found = list(trials(seed, 2))
+    assert Counter(record["kind"] for record in found)["agrees"] >= 2
+    assert [record for record in found if record["kind"] not in QUIET] == []
+
+
+@pytest.mark.parametrize("part", ALONE)
+def test_a_part_alone_moves_as_the_judge_says(part: str) -> None:
+    found = list(single_runs(alone(part, 1).m, 1, 2))
+    assert Counter(record["kind"] for record in found)["agrees"] >= 2
     assert [record for record in found if record["kind"] not in QUIET] == []
 
 

@@ -1,4 +1,4 @@
-"""Conditions on time whose borders are discrete states that nothing sets: as known as those of parameters."""
+"""Conditions on time whose borders are discrete states that nothing sets, or constant inputs: as known as numbers."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ def on_a_belt(velocity: str, normal: str, rate: str = "0") -> hs.Model:
         contacts=[hs.Contact("f", velocity, normal, "coulomb", {"mu": 0.5})],
         parameters={"c": 1.0, "w": 0.5},
         discrete={"a": "c", "b": "2*w"},
+        inputs=[hs.Input("u", "table", times=(-1, 9), values=(1.0, 1.0))],
     )
 
 
@@ -38,6 +39,18 @@ def test_a_load_that_falls(load: str, method: str) -> None:
     sol = hs.simulate(on_a_belt("v", load, "1"), (0.0, 3.0), integrator=method)
     assert sol.success and not sol.warnings
     assert sol(3.0)[0] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["exact", "dop853"])
+def test_a_border_that_is_a_constant_input(method: str) -> None:
+    """The pull of 1 is held until u + c = 2; the belt of the second model starts there."""
+    for model in (
+        on_a_belt("v", "(4 if t < u + c else 1)", "1"),
+        on_a_belt("v - (1 if t > u + c else 0)", "1"),
+    ):
+        sol = hs.simulate(model, (0.0, 3.0), integrator=method)
+        assert sol.success and not sol.warnings
+        assert sol(3.0)[0] == pytest.approx(0.5, abs=1e-9)
 
 
 def test_a_derivative_by_what_moves_the_time_is_refused() -> None:
