@@ -79,7 +79,7 @@ def race(
         here = [run for run in runs if run.level == level]
         predicted = {run: _predicted(entries, rows, run) for run in here}
         too_long = {
-            run: f"it would take some {seconds:.2g} s, of a budget of {budget.seconds:.3g} s for all runs"
+            run: f"it would take about {seconds:.2g} s, more than its share of the budget of {budget.seconds:.3g} s"
             if math.isfinite(seconds)
             else "a looser setting took too long"
             for run, seconds in predicted.items()

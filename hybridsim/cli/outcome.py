@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
+    from hybridsim.solution.explanation import Explanation
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,7 +111,7 @@ def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
 
 def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:
     """Print the summary, write the files; 1 where the simulation did not succeed. Warnings `told` are not repeated."""
-    explanations = [solution.explain(number) for number in args.explain]
+    explanations, unexplained = _explanations(solution, args.explain)
     try:  # first, since whoever reads the rest may have had enough, as `head` has
         if solution.t.size:  # else it stopped before the first step, and there is nothing to write
             _write(solution, args, session)
@@ -125,6 +126,8 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
             say("\n".join([*_summary(solution), *map(str, explanations)]))
     for warning in (one for one in solution.warnings if one not in told):
         complain(f"warning: {warning}")
+    if unexplained is not None:
+        raise unexplained
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)
@@ -135,6 +138,17 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
         said += f"; {goes_on if args.save else 'with --save FILE.hsol, hybridsim resume could go on'}"
     complain(said)
     return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
+
+
+def _explanations(solution: Solution, numbers: Sequence[int]) -> tuple[list[Explanation], UsageError | None]:
+    """Explanations of events, and what is wrong with a number that has none: the run itself is not lost by it."""
+    found, fault = [], None
+    for number in numbers:
+        try:
+            found.append(solution.explain(number))
+        except UsageError as error:
+            fault = fault or error
+    return found, fault
 
 
 def _write(solution: Solution, args: argparse.Namespace, session: Session) -> None:
@@ -169,8 +183,14 @@ def _shares(solution: Solution) -> dict[str, dict[str, float]]:
 
 
 def _final(solution: Solution) -> list[tuple[str, float]]:
-    """Name and value of every state at the end of the run; none where the run never began."""
-    return [(name, row[-1]) for name, row in zip(solution.names, solution.y, strict=True) if row.size]
+    """Name and value of every state at the end of the run; none where the run never began.
+
+    Those of discrete states follow, where something of the run is kept.
+    """
+    found = [(name, row[-1]) for name, row in zip(solution.names, solution.y, strict=True) if row.size]
+    if not solution.t.size or solution._run.save in ("nothing", "events"):
+        return found
+    return found + [(d.name, float(solution.output(d.name, solution.t_end))) for d in solution.model.discrete]
 
 
 def _summary(solution: Solution) -> list[str]:
@@ -194,7 +214,9 @@ def _summary(solution: Solution) -> list[str]:
         lines.append(f"  {f'modes of {component}':<12} {shares}")
     if solution.t.size:
         units = {state.name: state.unit for state in model.states}
-        final = ", ".join(f"{name} = {value:.9g} {units[name]}".rstrip() for name, value in _final(solution))
+        final = ", ".join(
+            f"{name} = {value:.9g} {units.get(name, '')}".rstrip() for name, value in _final(solution)
+        )
         lines.append(f"  time         {solution.t_start:g} to {solution.t_end:.9g}")
         lines.append(f"  final state  {final}")
     lines.append(

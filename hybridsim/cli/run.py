@@ -111,8 +111,11 @@ def _kept(args: argparse.Namespace) -> str | float:
                     f"--{option} with --keep {args.keep}: no states are kept but those at the end",
                     remedy="keep last-period, or the last so much time",
                 )
-    if args.keep == "nothing" and args.explain:
-        raise UsageError("--explain with --keep nothing: no events are kept", remedy="keep events")
+    if args.keep != "all" and args.explain:
+        raise UsageError(
+            f"--explain with --keep {args.keep}: events are explained from a whole run",
+            remedy="leave --keep out",
+        )
     if args.keep in ("all", "events", "last-period", "nothing"):
         return str(args.keep)
     try:

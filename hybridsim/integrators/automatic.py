@@ -57,7 +57,10 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
-        return Choice("dop853", "its modes are not stiff at the start, and jump inside")
+        return Choice(
+            "dop853",
+            "its modes are not stiff at the start; what jumps inside them is integrated as it stands",
+        )
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")
     return Choice("dop853", f"its modes are smooth and not stiff at the start{rest}")

@@ -129,6 +129,22 @@ def _surface(scope: Scope, component: Component, what: str, names: list[str]) ->
         words = "two modes, above and hold" if surface.is_unilateral else "three modes, above, below and hold"
         message = f"{what}: a surface has {words}; these are {', '.join(names)}"
         scope.fail(surface, message, f"give it exactly {len(sides)}.")
+    for mode in component.modes:
+        ways = len(sides) - 1 if mode.name == surface.hold else 1
+        if mode.name in sides and len(mode.guards) < ways:
+            scope.fail(mode, f"{what}: mode {mode.name} {_lacking(mode, surface.hold)}", _GUARDS_OF_SURFACE)
+
+
+_GUARDS_OF_SURFACE = (
+    "above has the function itself as a guard, below has it with a minus sign, and hold has a guard for each side, "
+    "positive while it holds."
+)
+
+
+def _lacking(mode: Mode, hold: str) -> str:
+    if mode.name == hold:
+        return f"needs a guard for each side and has {len(mode.guards)}: it would not be left"
+    return "has no guard: its surface would never be met"
 
 
 def _mode_key(scope: Scope, part: Declared, what: str, key: str) -> None:

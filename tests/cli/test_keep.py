@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
+from hybridsim.cli import main
 
 
 @pytest.mark.parametrize("keep", ["all", "events", "last-period", "nothing", "0.05"])
@@ -71,3 +72,14 @@ def test_the_process_ends_with_its_last_line(tmp_path: Path) -> None:
     assert process.returncode == 0 and "cost" in lines[-1]
     assert after < 0.5  # to take the interpreter apart takes 1 to 4 s
     assert (tmp_path / "r.csv").read_text().endswith("\n")
+
+
+def test_an_event_that_there_is_not_does_not_lose_the_run(tmp_path, capsys):
+    table, kept = tmp_path / "run.csv", tmp_path / "run.hsol"
+    given = ["run", "dfcs", "--t-end", "0.1", "--explain", "0", "--explain", "1000"]
+    assert main([*given, "--csv", str(table), "--save", str(kept)]) == 2
+    printed = capsys.readouterr()
+    assert "1000" in printed.err
+    assert "is not zero decides" in printed.out
+    assert table.exists()
+    assert hs.load_solution(kept).success

@@ -223,6 +223,11 @@ def test_python_models_are_checked_alike() -> None:
         block(components=[hs.Component("s", [*sides, held], surface=surface)]).validate()
     assert "'r' is set, but this mode solves for it" in str(caught.value)
     assert "has choices, but a surface decides" in str(caught.value)
+    unguarded = [*sides, hs.Mode("c", [hs.Guard("g", "1 - r")])]
+    with pytest.raises(hs.ModelError) as caught:
+        block(components=[hs.Component("s", unguarded, surface=surface)]).validate()
+    assert "mode a has no guard: its surface would never be met" in str(caught.value)
+    assert "mode c needs a guard for each side and has 1: it would not be left" in str(caught.value)
     with pytest.raises(hs.ModelError, match="both choices and a fatal message"):
         block(components=[hs.Component("s", [hs.Mode("a", [hs.Guard("g", "x", "a", "end")])])]).validate()
 
