@@ -47,6 +47,11 @@ HEADWAY_SIZE, HEADWAY_PACE = (
 )  # numbers to go on with, and which of them is infinite until a window is over
 
 
+def cost(steps: float, compiled: float, events: float) -> float:
+    """Seconds, roughly, of steps in Python, of steps in compiled code, and of events."""
+    return steps * _STEP + compiled * _COMPILED_STEP + events * _EVENT
+
+
 class NoHeadway(StepFailure):
     """At this pace the run would not come to its end; advice: what to declare or to set where nothing else is known."""
 
@@ -107,7 +112,7 @@ class Headway:
     def _spent(self) -> float:
         compiled = self.counters.steps - self._steps - self._in_python
         events = self.counters.events - self._events
-        return self._in_python * _STEP + compiled * _COMPILED_STEP + events * _EVENT
+        return cost(self._in_python, compiled, events)
 
     def _judge(self, now: Instant, run: SegmentRun | None) -> None:
         spent, before = self._spent(), self._since

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.steady.scales import coupled_sizes, stands_still
+from hybridsim.engine.headway import cost
 from hybridsim.engine.recent import system_of
 from hybridsim.engine.timepair import Instant
 from hybridsim.errors import SimulationError
@@ -62,6 +64,17 @@ class GrowsWithoutBound(SimulationError):
         super().__init__(f"the motion grows without bound: {name} has passed {_WITHOUT_BOUND:g}")
 
 
+class CostsTooMuch(SimulationError):
+    """A search has taken as much work as one may."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "no motion was found with as much work as a search may take; declare the `duration` of some periods of the "
+            "motion, pass period=, a larger tol or a stiff integrator (rodas5p), or more max_periods, which allow more"
+        )
+
+
+_CARRIED = 1e-3  # seconds, roughly, of a step through which derivatives are carried
 _WITHOUT_BOUND = 1e100  # in any unit: squares of it, and of products of a few such, are no numbers
 
 
@@ -88,6 +101,9 @@ class Motion:
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
         self.sizes = np.zeros(len(self.names))  # of the states (n,), along what was followed last
+        # What all runs together may cost, what they have cost (`hybridsim.engine.headway.cost`), and the last one a
+        # unit of time. It is counted, so that a search ends at the same place on every machine.
+        self.allowance, self._spent, self._pace = math.inf, 0.0, 0.0
 
     def unwatched(self) -> Motion:
         """The same, for runs that are made later, when nobody looks on any more."""
@@ -133,6 +149,7 @@ class Motion:
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
         begin = 0.0 if start is None else start.at
+        self._spend(0.0, self._pace * float(duration))
         with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
             solution = simulate(
                 self.model,
@@ -140,6 +157,9 @@ class Motion:
                 progress=self.progress,
                 **(given | self.options | options),
             )
+        spent = float(_cost_of(solution))
+        self._pace = spent / max(float(solution.t_end - begin), 1e-300)
+        self._spend(spent)
         if solution.status == "interrupted":  # half of a search is no result
             raise KeyboardInterrupt
         if solution.status == "limit" and "limits" in options:
@@ -151,12 +171,27 @@ class Motion:
             )
         return solution
 
+    def carry(self, solution: Solution) -> None:
+        """Count what it costs to carry derivatives along a run."""
+        self._spend(_CARRIED * solution.stats["steps"])
+
+    def _spend(self, seconds: float, ahead: float = 0.0) -> None:
+        self._spent += seconds
+        if self._spent + ahead > self.allowance:
+            raise CostsTooMuch
+
     def _refuse_growth(self, solution: Solution) -> None:
         """Say of a run that failed because of its size that it is its size."""
         last = np.abs(solution._segments[-1].x[-1]) if solution._segments else np.zeros(0)
         last = np.where(np.isfinite(last), last, np.inf)
         if last.max(initial=0.0) >= _WITHOUT_BOUND:
             raise GrowsWithoutBound(self.names[int(np.argmax(last))])
+
+
+def _cost_of(solution: Solution) -> float:
+    steps, events = solution.stats["steps"], solution.stats["events"]
+    is_compiled = solution.stats["kernel_time"] > 0.0 and solution._trajectory.taken_over is None
+    return cost(0 if is_compiled else steps, steps if is_compiled else 0, events)
 
 
 def point_at_end(solution: Solution) -> Point:

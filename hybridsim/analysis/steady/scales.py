@@ -55,5 +55,6 @@ def _rates(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> tuple
     """Rates (n,) and their derivatives by the states (n, n)."""
     n = system.n
     seeds = np.eye(n + 1 + len(p), n)
-    found = TangentTape(system, z)(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
+        found = TangentTape(system, z)(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds)
     return found.values[0, :n], found.slopes[0, :n]

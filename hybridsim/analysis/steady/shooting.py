@@ -68,6 +68,7 @@ def shoot(
             residual = relative(change, scale)
             if not residual <= (_LESS * best.residual if count else np.inf) and residual > _ROUNDING:
                 break
+            motion.carry(solution)
             matrix = sensitivities(solution, ()).by_start
         except HybridsimError:
             break

@@ -13,7 +13,14 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
-from hybridsim.analysis.steady.motion import CostsMore, GrowsWithoutBound, Motion, Point, point_at_end
+from hybridsim.analysis.steady.motion import (
+    CostsMore,
+    CostsTooMuch,
+    GrowsWithoutBound,
+    Motion,
+    Point,
+    point_at_end,
+)
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
@@ -34,6 +41,8 @@ if TYPE_CHECKING:
 _SETTLE = 32  # periods at first
 _MOST_AT_ONCE = 512
 _MAX_PERIODS = 4096
+_MOST_PERIODS = 10**6  # more of them would take days
+_ALLOWANCE = 60.0  # seconds, roughly, for these periods
 _DURATION = 100.0  # of a first run without forcing, where the model has none of its own
 _FIRST_RUN = {
     "events": 1000,
@@ -148,8 +157,8 @@ def steady_state(
     refuse_unknown([steady_state, simulate], {**method, **options})
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     for name, count in (("settle", settle), ("max_periods", max_periods)):
-        if not isinstance(count, int) or isinstance(count, bool) or count < 1:
-            raise UsageError(f"{name} is {count!r}", remedy="give a whole number of periods")
+        arguments.whole_number(count, name, 1, _MOST_PERIODS)
+    motion.allowance = _ALLOWANCE * max(1.0, max_periods / _MAX_PERIODS)
     search = _Search(motion, period, tol, settle, max_periods)
     try:
         if period is None and (periods := all_periods(system)):
@@ -160,7 +169,7 @@ def steady_state(
         if told is not None:
             motion.progress = lambda _: told(search.share)
         return search.run()
-    except GrowsWithoutBound as fault:
+    except (CostsTooMuch, GrowsWithoutBound) as fault:
         return _found(
             motion, UNSETTLED, None, periods=search.periods, message=f"{UNSETTLED}: {fault.message}"
         )
