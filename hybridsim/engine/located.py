@@ -65,6 +65,7 @@ class Located:
     stopping : monitors that are zero and whose resets are due, or one that ends the run and is alone.
     sides : sides of the monitors just before it.
     is_met : whether what is due beforehand falls on it.
+    inputs : the run-time vector with the inputs as they were before a jump; None where `at` has them so.
     """
 
     at: Situation
@@ -72,6 +73,7 @@ class Located:
     stopping: tuple[int, ...]
     sides: np.ndarray
     is_met: bool
+    inputs: np.ndarray | None = None
 
 
 def coincident(

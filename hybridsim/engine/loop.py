@@ -17,6 +17,7 @@ from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_h
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
 from hybridsim.engine.located import Located, before_appointment, located, located_backward
+from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
 from hybridsim.engine.pieces import Occurrence
@@ -261,12 +262,17 @@ class ModeLoop:
             return True, True
         self.timetable.kept(target)
         at, steps = self._at_target(target), self.record.counters.steps - steps
+        error = self.outcome.x_error
         if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
-            x, settled = at.x.copy(), Settling(self.system, at, at.z.copy(), True).run(fired, ())
-            if self._adopt(target, settled, x, (), ()):
+            found = Located(at, fired, (), self.outcome.monitor_sides, True)
+            found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
+            if found.fired and self._adopt(target, self._settle_located(target, found), x, (), ()):
                 return True, True
+            error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
+                return True, True
+            error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
         x = self.outcome.x
-        settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
+        settled = self._settle_appointment(target, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules, ())
 
     def _at_target(self, target: Instant) -> Situation:
@@ -341,20 +347,23 @@ class ModeLoop:
                 self.record.status, self.record.message = "backward-nonunique", refused
                 return True
             found = located_backward(self.system, self.origin, arrival, segment)
-        sides, x_minus, error = found.sides, arrival.x, segment.rounding()
+        sides, x_minus, error, s_error = found.sides, arrival.x, segment.rounding(), 0.0
+        if appointment and not appointment.is_renewal and (found.fired or found.stopping):
+            found = on_new_pieces(self.system, instant, found, schedules, self.forward)
+            s_error = math.ulp(float(instant))
         # corners decide nothing: where something is due at their instant they take their sides with it
         has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
-        if has_only_corners:
+        if has_only_corners:  # or nothing, where what was located only touches zero
             error = np.maximum(error, found.at.x_error)
         if found.stopping or (found.fired and not has_only_corners):
-            outcome = self._settle_located(found)
+            outcome = self._settle_located(instant, found)
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
             stop = None if limit is None else self._gathered(limit)
             if stop is not None:
                 return stop
-            outcome = self._apply_crossed(outcome, arrival.s, sides, found.stopping)
+            outcome = self._apply_crossed(outcome, found.at.s, sides, found.stopping)
             settled = [*found.stopping, *self.crossed_by_reset]
             if self._adopt(instant, outcome, x_minus, (), found.stopping, sides, appointment is None):
                 return True
@@ -364,17 +373,19 @@ class ModeLoop:
             if not appointment.is_renewal:
                 self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
-            outcome = self._settle_appointment(instant, x_minus, schedules, error)
+            outcome = self._settle_appointment(instant, x_minus, schedules, error, s_error)
             outcome = self._apply_crossed(outcome, 0.0, sides, ())
             return self._adopt(instant, outcome, x_minus, schedules, (), sides)
         return self._accumulated(instant, arrival.x, arrival.fired)
 
-    def _settle_located(self, found: Located) -> Outcome:
+    def _settle_located(self, instant: Instant, found: Located) -> Outcome:
         """Settle the guards and stopping monitors that were located."""
         resets = [("monitor", k) for k in found.stopping if self.system.model.monitors[k].action == "reset"]
         if found.fired and not self.forward:
             return cross_backward(self.system, found.at, tuple(found.fired))
-        return Settling(self.system, found.at, found.at.z.copy(), self.forward).run(found.fired, resets)
+        settling = Settling(self.system, found.at, found.at.z.copy(), self.forward, inputs=found.inputs)
+        settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, found.at, True)
+        return settling.run(found.fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, sides: np.ndarray, done: tuple[int, ...]) -> Outcome:
         """Apply the resets of the monitors that an event carried to their other side, each once."""
@@ -412,14 +423,19 @@ class ModeLoop:
         return after if wanted == after else 0
 
     def _settle_appointment(
-        self, instant: Instant, x_minus: np.ndarray, schedules: tuple[int, ...], error: np.ndarray
+        self,
+        instant: Instant,
+        x_minus: np.ndarray,
+        schedules: tuple[int, ...],
+        error: np.ndarray,
+        s_error: float = 0.0,
     ) -> Outcome:
-        """Settle a scheduled instant, inputs as they are from then on."""
+        """Settle a scheduled instant, inputs as they are from then on; s_error: how well guards have their zeros there."""
         system, z = self.system, self.outcome.z
         p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
         error = error.copy()
         error[system.evaluated(z)] = 0.0
-        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, math.ulp(0.0))
+        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
         resets = [("schedule", k) for k in schedules]
         settling = Settling(system, at, z.copy(), self.forward)
         settling.jumped = surfaces_jump(system, instant, at, self.forward)

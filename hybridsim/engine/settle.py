@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -62,8 +63,11 @@ class Settling:
         before: np.ndarray,
         forward: bool,
         scope: Iterable[int] | None = None,
+        inputs: np.ndarray | None = None,
     ) -> None:
         self.system = system
+        # a run-time vector of before, which the first conditions and resets read
+        self.inputs = inputs
         # the components that are decided here; a method with rules of its own for surfaces leaves those out
         self.scope = set(range(len(system.automata))) if scope is None else set(scope)
         self.at = at
@@ -255,6 +259,8 @@ class Settling:
         x_error = at.x_error.copy()
         taken: list[tuple[int, str, int, int]] = []
         given = as_given(system, at)
+        if self.inputs is not None:
+            given, self.inputs = replace(given, p=self.inputs), None
         for c in sorted(components, key=lambda c: (self._place(c), c)):
             automaton, mode = system.automata[c], int(at.z[c])
             guards = automaton.guards[mode]

@@ -136,7 +136,10 @@ class Contact(Declared):
         values = self.values(varies, load_rate)
         loaded: tuple[Guard, ...] = ()
         if varies and not self.opens:
-            message = f"normal load of contact {self.name} became negative: {self.normal.text} < 0"
+            message = (
+                f"normal load of contact {self.name} became negative: {self.normal.text} < 0; if the contact may "
+                "lift off, say opens = true there, else correct the sign of the load"
+            )
             loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
         if self.law.is_set_valued:
             yield self._set_valued(loaded)
