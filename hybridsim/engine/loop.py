@@ -269,8 +269,6 @@ class ModeLoop:
             if found.fired and self._adopt(target, self._settle_located(target, found), x, (), ()):
                 return True, True
             error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
-                return True, True
-            error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
         x = self.outcome.x
         settled = self._settle_appointment(target, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules, ())
@@ -430,7 +428,10 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Settle a scheduled instant, inputs as they are from then on; s_error: how well guards have their zeros there."""
+        """Settle a scheduled instant, inputs as they are from then on.
+
+        s_error: how well the zeros of what was located there are known.
+        """
         system, z = self.system, self.outcome.z
         p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
         error = error.copy()

@@ -38,7 +38,9 @@ def on_new_pieces(
     settling.fired[list(found.fired)] = True
     take_corners(settling)
     series, side_of = settling.series_of(settling.at.z), side_after if forward else side_before
-    is_open = ~system.active(settling.at.z) | np.isin(system.owner, system.led)  # what corners decide by themselves
+    is_open = ~system.active(settling.at.z) | np.isin(
+        system.owner, system.led
+    )  # what corners decide by themselves
     fired = {
         g: place
         for g, place in found.fired.items()
@@ -59,8 +61,7 @@ def _loads_at_zero(system: System, found: Located) -> set[int]:
         c
         for c, (automaton, mode) in enumerate(modes)
         if any(
-            message and g in found.fired
-            for g, message in zip(automaton.guards[mode], automaton.fatal[mode])
+            message and g in found.fired for g, message in zip(automaton.guards[mode], automaton.fatal[mode])
         )
     ]
     return set(ends)

@@ -54,6 +54,7 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "starts-at-zeros": (CLOSED, {}),
     "touch-beside-a-sample": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
     "sizes-of-sizes": ("", {"scipy-radau": TWO_VALUES}),
+    "load-that-ends": (CLOSED, {}),
     "twisting": ("", {"scipy-radau": TWO_VALUES}),
     "long-swing": ("", {"scipy-rk23": LONG, "scipy-radau": LONG, "scipy-bdf": LONG}),
     "TORR": ("", {"scipy-bdf": NUMBERS, "scipy-lsoda": NUMBERS}),

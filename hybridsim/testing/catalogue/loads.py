@@ -15,6 +15,8 @@ def scenes() -> tuple[Scene, ...]:
     return (
         _floor(),
         _touching(),
+        _waves(),
+        _ending(),
         _series(),
         _painleve(),
         _stop_off_zero(),
@@ -56,6 +58,38 @@ def _touching() -> Scene:
         Truth(None, ((END, (1.0, 3.0 - 0.3 * 2.0)),), checks=(("located", no_transition),)),
         needs("contacts"),
         speed=3.0,
+    )
+
+
+def _waves() -> Scene:
+    """Two periods of mean load 25; in each the integral of that of the wave is that of 25/8."""
+    return Scene(
+        "load-of-waves",
+        "load-of-waves",
+        (0.0, 2.0),
+        Truth(
+            None,
+            ((END, (50.0 * 2 - 0.4 * 25 * (2.0 + 2 / 8), 50.0 - 0.4 * 25 * 2)),),
+            checks=(("located", no_transition),),
+        ),
+        needs("contacts", "scheduled"),
+        speed=50.0,
+    )
+
+
+def _ending() -> Scene:
+    """The areas under the ramps, and a force that grows from t = 2 on against no friction."""
+    return Scene(
+        "load-that-ends",
+        "load-that-ends",
+        (0.0, 3.0),
+        Truth(
+            ((2.0, "g:slip+"),),
+            ((END, (50.0 * 3 - 20 * (0.5 * 3 - 1 / 6), 40.0, 1 / 6, 0.5)),),
+        ),
+        needs("contacts", "scheduled", "exact-stick"),
+        start_is_event=False,
+        speed=50.0,
     )
 
 
