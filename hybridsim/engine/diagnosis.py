@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.load_at_zero import load_at_zero
+from hybridsim.model.load_at_zero import load_at_zero
 
 if TYPE_CHECKING:
     from hybridsim.engine.outcome import Outcome
@@ -36,12 +36,11 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     x = last.x[-1] if last is not None else outcome.x
     p, z = (last.p, last.z) if last is not None else (p, outcome.z)
     here = origin.plus(s) if last is None else last.end
-    began = (
-        (float(record.segments[0].origin), record.segments[0].x[0]) if record.segments else (float(here), x)
-    )
-    if load := load_at_zero(system, began, (float(here), x)):
+    t, began = float(here), record.segments[0].x[0] if record.segments else x
+    t0 = float(record.segments[0].origin) if record.segments else t
+    if load := load_at_zero(system.written, system.names, (t0, began.tolist()), (t, x.tolist())):
         return load
-    first = np.abs(began[1])
+    first = np.abs(began)
     grown = np.flatnonzero(np.abs(x) > _GROWN * np.maximum(first, 1.0))
     if len(grown):
         states = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in grown)
