@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
-from hybridsim.errors import Place, SimulationError, UsageError
+from hybridsim.errors import HybridsimError, Place, SimulationError, UsageError
 from hybridsim.files import held
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
     if any(word.partition(".")[0] == "final" for word in args.measure):
-        given["t_span"] = (0.0, values.end_time(model, args.t_end))
+        given["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
             raise UsageError(
                 "--after is for readings of a period", remedy="leave it out beside --measure final"
@@ -173,6 +174,22 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
     session.wrote(folder / "sweep.png")
     if left := not_drawn(result, arrays=not is_map(result, over)):
         complain(f"not drawn, but in the tables: {', '.join(left)} (--measure chooses)")
+
+
+def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> float:
+    """The end of all runs, which is refused where it is written over what is swept."""
+    end = values.end_time(model, text)
+    for name, row in axes.items() if text is not None else ():
+        ends = {end}
+        for value in (row[0], row[-1]):
+            with suppress(HybridsimError):  # a value that no model takes fails at its own points
+                ends.add(values.end_time(model.with_(**{name: value}), text))
+        if len(ends) > 1:
+            raise UsageError(
+                f"--t-end {text} depends on {name}, which is swept, and all runs end at one time",
+                remedy="give the time as a number",
+            )
+    return end
 
 
 def values_by_name(model: Model, pairs: list[tuple[str, str]]) -> dict[str, list[Any]]:

@@ -51,7 +51,10 @@ def test_json_lists_expressions_and_ratios(hybridsim: Callable) -> None:
         "omega=0.5*sqrt(k/m),300,(1+2)*100",
         "--list",
         "--json",
-        *FINAL,
+        "--measure",
+        "final.x",
+        "--t-end",
+        "0.03",
     )
     code, out, err = hybridsim(*argv)
     assert code == 0, err
@@ -84,6 +87,8 @@ def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim
         (["F0=1", "--t-end", "3"], "--t-end is for --measure final"),
         (["F0=1", "--measure", "amplitude.y"], "amplitude.x"),
         (["F0=1,2", "N=1", "--list", *FINAL], "different lengths"),
+        (["omega=300,400", *FINAL], "--t-end 2T depends on omega, which is swept"),
+        (["m=0.1:0.3:3", "--measure", "final.x", "--t-end", "m"], "--t-end m depends on m"),
         (["F0=1", "--workers", "0"], "--workers"),
     ],
 )
