@@ -51,9 +51,10 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--keep",
         metavar="WHAT",
-        help="what is kept; the run stays the same. all: everything (the default). events: no states between the events "
-        "(memory grows with them). last-period, or a number: the end of the run alone, so many units of t. nothing: the "
-        "state at the end. --plot, --csv and --npz are refused with events and nothing, --explain with all but all",
+        help="what is kept; the run stays the same. all: everything (the default). events: no states between the "
+        "events (memory grows with them). last-period, or a number: the end of the run alone, so many units of t. "
+        "nothing: the state at the end. --plot, --csv and --npz are refused with events and nothing, --explain with "
+        "all but all",
     )
     outcome.add_arguments(parser)
     parser.set_defaults(
