@@ -74,6 +74,7 @@ class CostsTooMuch(SimulationError):
         )
 
 
+_TELLING = 100
 _CARRIED = 1e-3  # seconds, roughly, of a step through which derivatives are carried
 _WITHOUT_BOUND = 1e100  # in any unit: squares of it, and of products of a few such, are no numbers
 
@@ -158,7 +159,8 @@ class Motion:
                 **(given | self.options | options),
             )
         spent = float(_cost_of(solution))
-        self._pace = spent / max(float(solution.t_end - begin), 1e-300)
+        is_long = solution.stats["steps"] >= _TELLING  # a few steps tell nothing of how a longer run would be
+        self._pace = spent / float(solution.t_end - begin) if is_long else 0.0
         self._spend(spent)
         if solution.status == "interrupted":  # half of a search is no result
             raise KeyboardInterrupt
