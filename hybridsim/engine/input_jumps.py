@@ -5,6 +5,7 @@ A closed gap has its rate as well: a floor that changes its speed at once strike
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,14 +14,21 @@ from hybridsim.engine.outcome import Situation
 from hybridsim.engine.system import Series, System
 from hybridsim.engine.timepair import Instant
 
+_JOINED = 3.0  # ulps within which times are due together: `hybridsim.engine.timetable`
+
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Whether surfaces, or rates of closed gaps, differ beyond rounding before and after the inputs' pieces change."""
+    """Whether surfaces, or rates of closed gaps, differ beyond rounding before and after the inputs' pieces change.
+
+    Times that are due within rounding come together, at the last of them. The pieces before are those before them all.
+    """
     if not (system.signals and system.surface_of):
         return False
-    before = system.vector(instant, system.discrete(at.p), not forward)
+    joined = _JOINED * math.ulp(max(abs(float(instant)), math.ulp(1.0)))
+    earlier = instant.plus(-joined if forward else joined)
+    before = system.vector(earlier, system.discrete(at.p), not forward)
     z = np.maximum(at.z, 0)
-    return _differ(system, at, ((before, z), (at.p.copy(), z)))
+    return _differ(system, at, ((before, z), (at.p.copy(), z)), joined)
 
 
 def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:
@@ -31,12 +39,14 @@ def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarr
     return closed and _differ(system, at, ((at.p.copy(), before), (at.p.copy(), after)))
 
 
-def _differ(system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
+def _differ(
+    system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
+) -> bool:
     """Whether surfaces or rates of closed gaps differ between two vectors and modes, the states as they are."""
     values, bounds = [], []
     for p, z in sides:
         p[system.layout.pin_at] = 0.0
-        series = system.series(at.s, at.x, p, z, np.zeros(system.n), 0.0)
+        series = system.series(at.s, at.x, p, z, np.zeros(system.n), s_error)
         assert isinstance(series, Series)  # models with surfaces are made from expressions
         values.append(series.surfaces[:, :2])
         bounds.append(series.surface_bounds[:, :2])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -58,3 +61,22 @@ def test_a_derivative_by_what_moves_the_time_is_refused() -> None:
     sol = hs.simulate(model, (0.0, 3.0), integrator="dop853")
     with pytest.raises(hs.UsageError, match="depends on c, and its derivative by that is not known"):
         hs.sensitivities(sol, ["c"])
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p"])
+@pytest.mark.parametrize("other", [math.nextafter(1.0, 0.0), 1.0, math.nextafter(1.0, 2.0), 0.7])
+@pytest.mark.parametrize("belt", ["0.5 if t >= 1 else -0.45", "u"])
+def test_a_belt_that_jumps_beside_another_known_time_does_not_carry_the_body_along(integrator, other, belt):
+    """Friction of 0.392 turns the body round: v = 0.8 - 0.392 t, and 0.408 + 0.392 (t - 1) up to the belt's speed."""
+    inputs = [hs.Input("w", "table", times=(-1.0, other, 9.0), values=(0.0, 1.0, 0.0))]
+    if belt == "u":
+        inputs.append(hs.Input("u", "table", times=(-1.0, 1.0, 1.0, 9.0), values=(-0.45, -0.45, 0.5, 0.5)))
+    model = hs.Model(
+        "belt",
+        states=[hs.State("v", 0.8, "-f")],
+        contacts=[hs.Contact("f", f"v - ({belt})", "0.7", "coulomb", {"mu": 0.56})],
+        inputs=inputs,
+    )
+    sol = hs.simulate(model, (0.0, 2.0), integrator=integrator)
+    times = np.array([0.5, 1.1, 1.2, 1.5])
+    np.testing.assert_allclose(sol(times)[0], [0.604, 0.4472, 0.4864, 0.5], atol=1e-9)
