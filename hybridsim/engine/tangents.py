@@ -163,25 +163,15 @@ class TangentTape:
 
     Parameters
     ----------
-    guards, monitors, surfaces : numbers of those that are wanted behind the rates of the n states.
+    guards, monitors : numbers of those that are wanted behind the rates of the n states.
     """
 
     def __init__(
-        self,
-        system: System,
-        z: np.ndarray,
-        guards: tuple[int, ...] = (),
-        monitors: tuple[int, ...] = (),
-        surfaces: tuple[int, ...] = (),
+        self, system: System, z: np.ndarray, guards: tuple[int, ...] = (), monitors: tuple[int, ...] = ()
     ) -> None:
         tape = system.lean_tape(z)
         self._wanted = np.concatenate(
-            [
-                tape.derivatives,
-                tape.guards[list(guards)],
-                tape.monitors[list(monitors)],
-                tape.surfaces[list(surfaces)],
-            ]
+            [tape.derivatives, tape.guards[list(guards)], tape.monitors[list(monitors)]]
         ).astype(np.int64)
         rows = [tuple(row) for row in np.concatenate([tape.constant_rows, tape.rows]).tolist()]
         self._rows = np.array(needed_rows(rows, set(self._wanted.tolist())), dtype=np.int64).reshape(-1, 5)

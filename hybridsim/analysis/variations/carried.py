@@ -18,14 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.event_times import EventTimes
-from hybridsim.analysis.variations.off_zero import OffZero, differ, off_zero, rates_of
 from hybridsim.analysis.variations.rounds import Rounds, batches, component_of, is_knot, lifted_vector
 from hybridsim.analysis.variations.seeds import rate_slopes, seeds
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
-from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.errors import UsageError
 
@@ -51,14 +49,12 @@ class Directions:
 class Carried:
     """Derivatives at the end of a run, and of the time of each event on the way.
 
-    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,);
-    off: guards and surfaces at their zero, from which some directions lead to two sides that differ.
+    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,).
     """
 
     x: np.ndarray
     discrete: np.ndarray
     times: list[tuple[float, np.ndarray]]
-    off: list[OffZero]
 
 
 @dataclass(frozen=True)
@@ -97,9 +93,7 @@ class Carrier:
         G = directions.parameters
         self._refuse_inputs(G)
         Y, Yd = directions.x.copy(), directions.discrete.copy()
-        self._changes = Changes(self.system, self._scale, self._own_sizes(directions), G, self._rates)
-        self._off: list[OffZero] = []
-        event_times = EventTimes(self._changes)
+        event_times = EventTimes(self.system, self._scale, self._own_sizes(directions), G, self._rates)
         times: list[tuple[float, np.ndarray]] = []
         stretches = list(self._stretches())
         Y, Yd = self._started(stretches[0].segment, Y, Yd, G, event_times)
@@ -116,7 +110,7 @@ class Carrier:
             Y, Yd, shift = self._through(stretch, following.segment, Y, Yd, G, event_times)
             if any(one.kind != "corner" for one in stretch.happened):
                 times.append((float(following.segment.start), shift))
-        return Carried(Y, Yd, times, self._off)
+        return Carried(Y, Yd, times)
 
     def _own_sizes(self, directions: Directions) -> np.ndarray:
         """The change along each direction (M,) that is as large as the first of what it changes."""
@@ -157,30 +151,28 @@ class Carrier:
                     f"{one.component} happens at the start of the run, and its time depends on what is changed",
                     remedy="begin the run a little earlier or later",
                 )
-        z = segment.z.copy()
-        for one in reversed(happened):
-            if one.kind not in ("monitor", "scheduled"):
-                c, automaton = component_of(self.system, one)
-                z[c] = automaton.modes.index(one.source)
-        x = happened[0].x_minus if happened else segment.x[0]
-        d = self.system.discrete_start if happened else self.system.discrete(segment.p)
-        rounds = self._rounds((x, d, z), Y, Yd, np.zeros(Y.shape[1]), np.abs(Y), is_start=True)
-        for batch in batches(happened):
-            rounds.at_appointment(segment.start, batch)
-        before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
-        Y = self._settled(rounds, segment, x, before)
-        return self._projected(segment, Y, rounds.Yd, G), rounds.Yd
+        if happened:
+            z = segment.z.copy()
+            for one in reversed(happened):
+                if one.kind not in ("monitor", "scheduled"):
+                    c, automaton = component_of(self.system, one)
+                    z[c] = automaton.modes.index(one.source)
+            before = happened[0].x_minus, self.system.discrete_start, z
+            rounds = self._rounds(before, Y, Yd, G, np.zeros(Y.shape[1]))
+            for batch in batches(happened):
+                rounds.at_appointment(segment.start, batch)
+            Y, Yd = rounds.Y, rounds.Yd
+        return self._projected(segment, Y, Yd, G), Yd
 
     def _rounds(
         self,
         before: tuple[np.ndarray, np.ndarray, np.ndarray],
         Y: np.ndarray,
         Yd: np.ndarray,
+        G: np.ndarray,
         shift: np.ndarray,
-        large: np.ndarray,
-        is_start: bool = False,
     ) -> Rounds:
-        return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, is_start)
+        return Rounds(self.system, *before, Y, Yd, G, self._rates @ G, shift, self._scale)
 
     def _refuse_inputs(self, G: np.ndarray) -> None:
         """Derivatives of an input's shape by its parameters are not known."""
@@ -205,10 +197,7 @@ class Carrier:
         """Over a segment from one local time to another."""
         if end <= begin or not self.system.n:
             return Y
-        tape, directions = (
-            TangentTape(self.system, segment.z),
-            seeds(self.system, float(segment.origin), self._rates),
-        )
+        tape, directions = TangentTape(self.system, segment.z), seeds(self.system, segment, self._rates)
         n = self.system.n
         constant = np.concatenate([Yd, G])
         moving = [k for k in range(len(constant)) if constant[k].any()]
@@ -239,9 +228,8 @@ class Carrier:
         x = segment.x[-1]
         shift = event_times.of(segment, happened, s, x, Y, Yd)
         before = rates_of(system, s, x, segment.p, segment.z)
-        moved = np.outer(before, shift)
-        large = np.maximum(np.abs(Y), np.abs(moved))
-        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y + moved, Yd, shift, large)
+        Y = Y + np.outer(before, shift)
+        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y, Yd, G, shift)
         groups = batches(happened)
         for k, batch in enumerate(groups):
             is_due = (
@@ -253,28 +241,10 @@ class Carrier:
                 rounds.at_appointment(following.start, batch)
             else:
                 rounds.at_end(segment, batch)
-        Y = rounds.Y
-        if rounds.has_jumped or is_knot(system, following.start):
-            Y = self._settled(rounds, following, x, before)
+        Y, Yd = rounds.Y, rounds.Yd
         after = rates_of(system, float(following.s[0]), following.x[0], following.p, following.z)
         Y = Y - np.outer(after, shift)
-        return self._projected(following, Y, rounds.Yd, G), rounds.Yd, shift
-
-    def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Derivatives of the states where those that hold do so again, noting what leads to two sides that differ.
-
-        x, before : states and rates (n,) before the instant.
-        """
-        after = Place(
-            float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
-            rounds.Y, rounds.Yd, rounds.shift, rounds.large,
-        )  # fmt: skip
-        Y, off = off_zero(self._changes, after)
-        rates = rates_of(self.system, after.s, after.x, after.p, after.z)
-        if rounds.has_reset or (after.x != x).any() or differ(before, rates):
-            self._off += rounds.off
-        self._off += off
-        return Y
+        return self._projected(following, Y, Yd, G), Yd, shift
 
     def _projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
@@ -301,3 +271,15 @@ def at_start(solution: Solution) -> list[Occurrence]:
             break
         found.append(one)
     return found
+
+
+def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
+    rates = system.flow(s, x, p, z)
+    if not system.holds(z):
+        return rates
+    out: list[Any] = [0.0] * system.n
+    module: Any = system.code.module
+    lifted = with_slopes(x, rates[:, None])
+    differentiated(module.project)(Dual(s, np.ones(1)), lifted, [float(v) for v in p], z, out)
+    return values_and_slopes(out, 1)[1][:, 0]

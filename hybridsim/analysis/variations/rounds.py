@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.changes import Changes, Place
-from hybridsim.analysis.variations.off_zero import OffZero
 from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.engine.reset_keys import added
+from hybridsim.engine.tangents import TangentTape
 from hybridsim.engine.timepair import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
+
+_AT_ZERO = 1e-9  # of what a guard's terms are: it is at its zero, and so has fired by itself
 
 
 def is_knot(system: System, instant: Instant) -> bool:
@@ -52,10 +53,9 @@ class Rounds:
     ----------
     x, d, z : values (n,), (d,) and modes before.
     Y, Yd : derivatives (n, M), (d, M).
-    changes : of guards and monitors, with the derivatives of the parameters.
+    G, by_rates : derivatives of the parameters (P, M), and of the forcing's angular rates (R, M).
     shift : derivatives (M,) of the time of the instant.
-    large : sizes (n, M) of the terms whose sums Y are.
-    is_start : whether what has fired was at its zero before anything moved.
+    scale : (n,) sizes of the states.
     """
 
     def __init__(
@@ -66,17 +66,13 @@ class Rounds:
         z: np.ndarray,
         Y: np.ndarray,
         Yd: np.ndarray,
-        changes: Changes,
+        G: np.ndarray,
+        by_rates: np.ndarray,
         shift: np.ndarray,
-        large: np.ndarray,
-        is_start: bool,
+        scale: np.ndarray,
     ) -> None:
         self.system, self.x, self.d, self.z, self.Y, self.Yd = system, x.copy(), d.copy(), z.copy(), Y, Yd
-        self._changes, self.shift, self.large = changes, shift, large
-        self._G, self._by_rates = changes.G, changes.rates @ changes.G
-        self._has_moved = is_start
-        self.has_reset = self.has_jumped = False
-        self.off: list[OffZero] = []
+        self._G, self._by_rates, self._shift, self._scale = G, by_rates, shift, scale
         self._reset = differentiated(system.code.module.reset)
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
@@ -95,14 +91,14 @@ class Rounds:
         if scheduled:
             self._apply(scheduled, p, s, origin)
         while pending:
-            fired = [one for one in pending if self._has_fired(one, p, s, origin)]
+            fired = [one for one in pending if self._has_fired(one, p, s)]
             fired = fired or pending
             self._apply(fired, p, s, origin)
             pending = [one for one in pending if not any(one is other for other in fired)]
 
-    def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
+    def _has_fired(self, one: Occurrence, p: np.ndarray, s: float) -> bool:
         """Whether a guard or monitor is at its zero, or beyond: what is not follows from another reset."""
-        system = self.system
+        system, n = self.system, self.system.n
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
                 (),
@@ -117,17 +113,10 @@ class Rounds:
                 return True
             chosen = ((number,), ())
         values = self._with_discrete(p)
-        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
-        (found,) = self._changes.of(at, *chosen)
-        has_fired = found.is_near or (one.kind != "monitor" and found.value <= 0.0)
-        if has_fired and self._has_moved and found.is_zero and found.moves.any():
-            name = (
-                f"monitor {one.component}"
-                if one.kind == "monitor"
-                else f"guard {one.guard} of {one.component}"
-            )
-            self.off.append(OffZero(origin + s, name, found.moves))
-        return has_fired
+        tape = TangentTape(system, self.z, *chosen)
+        found = tape(np.array([s]), self.x[None, :], values, np.eye(n + 1 + len(p), n))
+        value, size = float(found.values[0, n]), float(np.abs(found.slopes[0, n]) @ self._scale)
+        return abs(value) <= _AT_ZERO * size or (one.kind != "monitor" and value <= 0.0)
 
     def _with_discrete(self, p: np.ndarray) -> np.ndarray:
         values = p.copy()
@@ -147,22 +136,19 @@ class Rounds:
             if one.kind not in ("monitor", "scheduled"):
                 c, automaton = component_of(system, one)
                 modes[c] = automaton.modes.index(one.target)
-                self.has_jumped |= not (automaton.has_surface or automaton.is_corner)
             if key not in system.resets:
                 continue
-            self.has_reset = self.has_jumped = True
             amounts = set(system.resets[added(key)][1]) if added(key) in system.resets else set()
             for part, names in ((key, set(system.resets[key][1]) - amounts), (added(key), amounts)):
                 if not names:
                     continue
                 out = list(before)
                 z = np.array([*self.z, system.resets[part][0]])
-                self._reset(Dual(s, self.shift), x, lifted, z, out)
+                self._reset(Dual(s, self._shift), x, lifted, z, out)
                 for name in names:
                     k = self._names.index(name)
                     after[k] = out[k] if part is key else after[k] + out[k]
         found, slopes = values_and_slopes(after, width)
-        self._has_moved = True
         self.x, self.d, self.Y, self.Yd = found[:n], found[n:], slopes[:n], slopes[n:]
         self.z = modes
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
-from hybridsim.analysis.variations.off_zero import OffZero
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused_limits import refuse_limits
 from hybridsim.analysis.wanted import words
@@ -30,8 +29,7 @@ class Sensitivities:
     states, parameters : tuple of str
         Names: of the n states and d discrete states, of the P chosen parameters.
     by_start : array
-        (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix. NaN by a state
-        that moves the run off a guard or surface on which it starts exactly, if its two sides differ.
+        (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix.
     by_parameter : array
         (n + d, P), d(state at the end)/d(parameter); starts that are declared over parameters move along, and
         so do parameters that are declared over others.
@@ -86,8 +84,8 @@ def sensitivities(
     Raises
     ------
     UsageError
-        For a run that is not whole, a model of Python functions, an unknown parameter, an event whose guard only
-        touches zero, and a parameter that moves the run off a guard on which it starts, or a jump ends, exactly.
+        For a run that is not whole, a model of Python functions, an unknown parameter, and an event whose
+        guard only touches zero.
 
     Examples
     --------
@@ -96,26 +94,6 @@ def sensitivities(
     >>> hs.sensitivities(sol, ["mu"]).by_parameter.shape
     (2, 1)
     """
-    found, off = derivatives(solution, parameters, starts_follow=starts_follow)
-    known = len(found.states)
-    for one in off:
-        for name in (
-            name for name, moves in zip(found.parameters, one.directions[known:], strict=True) if moves
-        ):
-            raise UsageError(
-                f"at t = {one.t:.9g} {one.name} is exactly at its zero, and {name} moves it off: to either side the "
-                "run goes another way, and there is no derivative",
-                remedy=f"leave {name} out, or take another value of it",
-            )
-        found.by_start[:, one.directions[:known]] = np.nan
-        found.times_by_start[np.ix_(found.times > one.t, one.directions[:known])] = np.nan
-    return found
-
-
-def derivatives(
-    solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
-) -> tuple[Sensitivities, list[OffZero]]:
-    """Of a run, on one side where it begins at a zero or a jump leads to one; and what is at such a zero."""
     if not hasattr(solution, "_segments"):
         raise UsageError(f"solution is {solution!r}", remedy="give what hs.simulate returns")
     model, system = solution.model, solution._system
@@ -147,7 +125,7 @@ def derivatives(
     carried = Carrier(solution).carry(directions)
     end = np.concatenate([carried.x, carried.discrete])
     shifts = np.array([shift for _, shift in carried.times]).reshape(len(carried.times), n + d + P)
-    found = Sensitivities(
+    return Sensitivities(
         (*solution.names, *(q.name for q in model.discrete)),
         chosen,
         end[:, : n + d],
@@ -156,7 +134,6 @@ def derivatives(
         shifts[:, : n + d],
         shifts[:, n + d :],
     )
-    return found, carried.off
 
 
 def _refuse(solution: Solution) -> None:
