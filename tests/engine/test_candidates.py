@@ -41,7 +41,9 @@ def _chosen(current: tuple[int, ...], verdicts: tuple[int, ...], thorough: bool)
     candidates, holds = joint_candidates([3] * n), np.full(n, HOLD)
     table = {tuple(row): verdict for row, verdict in zip(candidates.tolist(), verdicts, strict=True)}
     settling = _settling(current, table, thorough=thorough)
-    found, is_whole = verdicts_on(settling, list(range(n)), candidates, holds, tuple(range(n)))
+    found, is_whole = verdicts_on(
+        settling, list(range(n)), candidates, np.array(current), holds, tuple(range(n))
+    )
     assert is_whole == (len(settling.asked) == len(candidates))
     return int(choose(candidates, found, np.array(current), holds)), len(settling.asked)
 
@@ -67,5 +69,5 @@ def test_random_verdicts_on_two_components() -> None:
 def test_where_a_motion_has_to_be_the_only_one_all_are_judged() -> None:
     candidates = joint_candidates([3])
     settling = _settling((1,), {(0,): FINE, (1,): FINE, (2,): FINE}, thorough=False, unique=True)
-    verdicts_on(settling, [0], candidates, np.array([HOLD]), (0,))
+    verdicts_on(settling, [0], candidates, np.array([1]), np.array([HOLD]), (0,))
     assert len(settling.asked) == 3

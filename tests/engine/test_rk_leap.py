@@ -24,7 +24,9 @@ METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 # How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of
 # v alone, which have no scale. Both are judged by their truths, as all scenes are.
-SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in ("twisting", "long-swing")]
+# rounding decides late events of these, or grows without bound; their closed forms are in tests/conformance
+APART = ("twisting", "long-swing", "touch-beside-a-sample", "exponential-neuron")
+SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in APART]
 WEIGHTS = bernstein_weights(4)
 
 

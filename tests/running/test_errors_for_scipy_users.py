@@ -80,7 +80,7 @@ def test_what_is_no_model_is_told_what_to_make_of_it() -> None:
         assert "system.to_model()" in str(fault.value)
     with pytest.raises(hs.UsageError) as fault:
         hs.simulate("dfcs", [0.1 * k for k in range(50)])
-    assert "50 times" in str(fault.value) and "t_eval" in str(fault.value)
+    assert "50 numbers" in str(fault.value) and "t_eval" in str(fault.value)
 
 
 def test_a_force_without_a_contact_is_told_where_it_comes_from() -> None:

@@ -239,13 +239,19 @@ def test_two_sweeps_into_one_folder(command: Callable, tmp_path: Path) -> None:
     assert command(*SWEEP)[0] == 0
 
 
+GATES = threading.Event(), threading.Event()
+
+
 @needs_posix
 def test_two_sweeps_with_one_journal(tmp_path: Path) -> None:
-    path, inside, go_on = tmp_path / "sweep.journal", threading.Event(), threading.Event()
+    path, (inside, go_on) = tmp_path / "sweep.journal", GATES
 
     def slow(model: hs.Model) -> float:
-        inside.set()
-        assert go_on.wait(60)
+        gates = sys.modules[
+            __name__
+        ].GATES  # not read by its name: a journal serves a measure with what it reads
+        gates[0].set()
+        assert gates[1].wait(60)
         return 1.0
 
     first = threading.Thread(target=lambda: hs.sweep(DECAY, {"x": [1, 2]}, slow, journal=path, workers=1))
