@@ -1,4 +1,4 @@
-"""Whether random trials find the faults that were mended, if each of them is put back by itself.
+"""Tests whether random trials find each mended fault when it is put back alone.
 
     python studies/faults_put_back.py [journal] [fault ...]      (without a name: all)
 

@@ -40,7 +40,7 @@ from hybridsim.engine.surface_event import decide_surface
 
 @inlined
 def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, work: Any) -> bool:
-    """Whether no other guard may leave together with the one that fired, but for the rounding of the steps."""
+    """Whether no other guard can be zero together with the one that fired, given the rounding of the steps."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if g == fired:

@@ -52,7 +52,7 @@ _ROOM = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events that one call has room for, beside those of one node
 _WORK = (
     1 << 20
-)  # coordinates times steps and events of one call: some 0.1 s, after which limits are looked at
+)  # coordinates times steps and events of one call: about 0.1 s, after which limits are looked at
 _TIGHTEST = 1e-15
 _RADIUS = 2  # of the first patch; it adapts
 _RANGE = 280  # decades of a double, some left for what the powers are multiplied with

@@ -238,7 +238,7 @@ _FEW = 3  # last passings at which events are looked for
 
 
 def _goes_on(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
-    """Which states (n,), whose ranges are given, move on as much in each quarter of a run, but for a steady share."""
+    """Which states (n,), whose ranges are given, move on by the same amount in each quarter of a run, up to a share."""
     steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
     is_steady = np.ptp(steps, axis=1) <= steady * np.abs(steps[:, 0])
     return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))

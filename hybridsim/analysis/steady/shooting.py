@@ -132,7 +132,7 @@ def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
 
 
 def _beside(matrix: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """What a matrix makes of changes across a direction, but for what it adds along that."""
+    """The part of a matrix that acts across a direction; what it adds along the direction is left out."""
     direction = np.zeros((len(matrix), 1))
     direction[: len(rates), 0] = rates
     across = np.linalg.qr(direction, mode="complete")[0][:, 1:]
