@@ -194,7 +194,9 @@ def two_clocks(b: Builder) -> None:
     p, q, period = b.num("0.1", 1), b.num("0.1", "0.7", 6), b.num("0.3", 1)
     y = b.state("y", 0, b.num(-1, 1))
     b.m.schedules[b.name("clock")] = Schedule([period], {y.args[0]: p}, period=period)
-    b.m.schedules[b.name("clock")] = Schedule([period], {y.args[0]: (p + q) - q}, period=period)
+    other = b.name("held")
+    b.m.discrete[other] = p + q
+    b.m.schedules[b.name("clock")] = Schedule([period], {y.args[0]: var(other) - q}, period=period)
 
 
 def monitor_at_reset(b: Builder) -> None:

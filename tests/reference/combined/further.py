@@ -12,19 +12,21 @@ from .steady import steady_states
 from .stepped import time_stepping
 from .structures import mechanical_systems, repeated_runs
 
-QUIET = ("agrees", "names refused", "unclear", "cannot", "no model")
+QUIET = ("agrees", "names refused", "unclear", "cannot", "no model", "warned of")
+
+DRAWS = 5  # sets of numbers of a structure
 
 Trial = Callable[[int], Iterator[dict[str, Any]]]
 
 
 def whole_models(number: int) -> Iterator[dict[str, Any]]:
-    """A structure of the generator with one set of numbers; a run that takes its time is no finding."""
+    """A structure of the generator with a few sets of numbers; a run that takes its time is no finding."""
     from . import compare
     from .trial import trials
 
     compare.LIMITS = {"steps": 4000, "events": 500}
 
-    for record in trials(number, 1):
+    for record in trials(number, DRAWS):
         if record["kind"] not in QUIET and record.get("status") != "limit":
             yield record
 
@@ -39,4 +41,3 @@ TRIALS: dict[str, Trial] = {
     "repeated runs": repeated_runs,
     "time stepping": time_stepping,
 }
-COMPILED = {"reactions", "repeated runs"}

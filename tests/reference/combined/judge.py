@@ -62,9 +62,12 @@ class Judge(Configurations):
         """All transitions of a round, each from the values before."""
         changes: list[tuple[str, Any, bool]] = []
         went: dict[str, str] = {}
+        before = dict(self.modes)
         for a, g in fired:
-            if a in went:
-                self.doubt("two guards of one mode at once")
+            if a in went:  # of guards that are negative already the order of declaration decides
+                guards = self.m.automata[a].modes[before[a]].guards
+                if any(self.value(guards[name].expr) >= -self.tol for owner, name in fired if owner == a):
+                    self.doubt("two guards of one mode at once")
                 continue
             for choice in self.m.automata[a].modes[self.modes[a]].guards[g].choices:
                 if choice.when is not None:

@@ -41,7 +41,7 @@ def faults() -> list[Fault]:
         Fault(
             name,
             one["words"],
-            one["test"],
+            one.get("test", ""),
             tuple(Edit(**e) for e in one["edit"]),
             one.get("trial", "whole models"),
         )
