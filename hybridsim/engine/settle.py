@@ -77,6 +77,8 @@ class Settling:
         self.changes: list[Change] = []
         self.warnings: list[str] = []
         self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        self.rounds = 0
+        self.most_rounds = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in system.automata))
         self.is_kinked = False  # a corner has changed its side: the field goes on, its slope does not
         # guards in the order in which they came to zero
         self.rank: dict[int, int] = {}
@@ -104,8 +106,7 @@ class Settling:
         open_ = self._at_surfaces(open_ & surfaces)
         if surfaces and (self.jumped or (self.at.z < 0).any()):
             open_ |= self.take_sides()
-        limit = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in self.system.automata))
-        for _ in range(limit):
+        while self._begins_round():
             failure = strike(self, open_) or self._decide(open_)
             if failure:
                 return self._stop(*(("inconsistent", lost) if lost else failure))
@@ -127,15 +128,24 @@ class Settling:
             open_ = leaving & surfaces
             if surfaces and self.jumped:
                 open_ |= self.take_sides()
+        return self._stop(*self._cascade())
+
+    def _begins_round(self) -> bool:
+        """Count a round of transitions or decisions; False where no more of them are allowed at one instant."""
+        self.rounds += 1
+        return self.rounds <= self.most_rounds
+
+    def _cascade(self) -> tuple[str, str]:
+        """Status and message where transitions follow each other without end."""
         names = ", ".join(
             f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
         )
         guards = ", ".join(
             sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]})
         )
-        return self._stop(
+        return (
             "cascade",
-            f"transitions follow each other over and over, {limit} rounds without rest ({names}); "
+            f"transitions follow each other over and over, {self.most_rounds} rounds without rest ({names}); "
             f"guards that fire: {guards}{words_on_cascade(self)}",
         )
 
@@ -163,10 +173,9 @@ class Settling:
         take_corners(self)
         if not surfaces or not (self.jumped or (self.at.z < 0).any()):
             return None
-        for _ in range(_ROUNDS_PER_MODE * len(self.system.automata)):
-            leaving = certainly_leaving(self)
-            failure = self._transitions(leaving, []) if leaving else None
-            if failure or not leaving:
+        while leaving := certainly_leaving(self):
+            failure = self._transitions(leaving, []) if self._begins_round() else self._cascade()
+            if failure:
                 return failure
             take_corners(self)
         return None

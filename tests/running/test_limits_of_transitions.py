@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from math import sqrt
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
+from hybridsim.engine import settle
 
 ALL = ["exact", "taylor", "dop853", "tsit5", "scipy-rk45"]
 
@@ -146,3 +148,30 @@ def test_derivatives_are_carried_through_a_reset_at_a_limit() -> None:
     assert doubled.by_start[2, 2] == pytest.approx(
         2.0, abs=1e-9
     )  # the time of the limit does not depend on age
+
+
+def test_a_cascade_beside_a_body_at_rest_is_counted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rounds in which automata leave before the contact is decided are rounds of the instant as well."""
+    model = hs.Model(
+        "to-and-fro",
+        states=[hs.State("v", 0, "-f"), hs.State("x", 0, 1)],
+        contacts=[hs.Contact("f", velocity="v", normal=1, law="coulomb", arguments={"mu": 1})],
+        components=[
+            hs.Component(
+                "c",
+                [
+                    hs.Mode("wait", hs.Guard("g", "1 - x", "one")),
+                    hs.Mode("one", hs.Guard("h", "-1 - x", "two")),
+                    hs.Mode("two", hs.Guard("k", "-1 - x", "one")),
+                ],
+                initial="wait",
+            )
+        ],
+    )
+    rounds = []
+    transitions = settle.Settling._transitions
+    monkeypatch.setattr(settle.Settling, "_transitions", lambda *args: rounds.append(1) or transitions(*args))
+    sol = hs.simulate(model, (0, 2))
+    assert sol.status == "cascade" and sol.t_end == pytest.approx(1.0)
+    said = int(re.search(r"(\d+) rounds without rest", sol.message)[1])
+    assert len(rounds) <= said + 10
