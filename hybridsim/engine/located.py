@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.monitor_sides import MonitorSides
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.segment import Arrival, SegmentRun
 from hybridsim.engine.segment_end import spread
@@ -62,16 +63,14 @@ class Located:
     ----------
     at : the state just before it.
     fired : guards that are zero and leave, with the order of their times.
-    stopping : monitors that are zero and whose resets are due, or one that ends the run and is alone.
-    sides : sides of the monitors just before it.
+    monitors : their sides just before it, and those to which the motion leads them.
     is_met : whether what is due beforehand falls on it.
     inputs : the run-time vector with the inputs as they were before a jump; None where `at` has them so.
     """
 
     at: Situation
     fired: dict[int, int]
-    stopping: tuple[int, ...]
-    sides: np.ndarray
+    monitors: MonitorSides
     is_met: bool
     inputs: np.ndarray | None = None
 
@@ -128,17 +127,8 @@ def located(
         for grazing in segment.grazings
         if grazing[0] not in fired or not _is_near(series, arrival, *grazing[:2])
     ]
-    stopping, monitors = set(arrival.stopping), system.model.monitors
-    for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
-        if monitors[k].action != "reset" or sides[k] == 0:
-            continue
-        wanted = {"up": 1, "down": -1, "both": -int(sides[k])}[monitors[k].direction]
-        if abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] == wanted == -sides[k]:
-            stopping.add(k)
-    resetting = {k for k in stopping if monitors[k].action == "reset"}
-    if fired or resetting or is_met:  # what ends a run by itself is judged when all of this has been settled
-        stopping = resetting
-    return Located(at, fired, tuple(sorted(stopping)), sides, is_met)
+    monitors = MonitorSides.located(system.model.monitors, sides, series, arrival.stopping)
+    return Located(at, fired, monitors, is_met)
 
 
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
@@ -169,10 +159,10 @@ def together(
 
 
 def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
-    """How many guards leave at an event, and how many monitors with a reset are zero there."""
-    monitors = zip(system.model.monitors, series.monitors, series.monitor_bounds, strict=True)
-    resetting = sum(m.action == "reset" and abs(value[0]) <= bound[0] for m, value, bound in monitors)
-    return len(coincident(system, origin, at, arrival.fired, series)) + resetting
+    """How many guards leave at an event, and how many monitors are zero there."""
+    watched = zip(series.monitors, series.monitor_bounds, strict=True)
+    monitors = sum(abs(value[0]) <= bound[0] for value, bound in watched)
+    return len(coincident(system, origin, at, arrival.fired, series)) + monitors
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
@@ -187,7 +177,10 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
     """
     sides, watch = segment.locator.monitor_sides.copy(), segment.watch
     for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
-        before = side_before(value, bound, 1)[0] if abs(value[0]) <= bound[0] else 0
+        is_zero = abs(value[0]) <= bound[0]
+        before = side_before(value, bound, 1)[0] if is_zero else 0
+        if is_zero and before == 0 and watch.monitor_sides[k] == 0:  # it has stayed at zero
+            sides[k] = 0
         near = 2.0 * time_error(value, bound)
         if before == 0 or (
             watch.monitor_orders[k] > 0 and abs(arrival.s) <= near
@@ -204,7 +197,10 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
     """The same backward in time, where an instant has no further changes."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
-    return Located(at, fired, arrival.stopping, segment.locator.monitor_sides, True)
+    sides = segment.locator.monitor_sides
+    monitors = MonitorSides.of(system.model.monitors, sides)
+    monitors.leads[list(arrival.stopping)] = -sides[list(arrival.stopping)]
+    return Located(at, fired, monitors, True)
 
 
 def before_appointment(

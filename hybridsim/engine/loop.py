@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_h
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
 from hybridsim.engine.located import Located, before_appointment, located, located_backward
+from hybridsim.engine.monitor_sides import MonitorSides
 from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.notices import Notices
 from hybridsim.engine.outcome import Outcome, Situation
@@ -51,8 +53,6 @@ class ModeLoop:
         self.plan = plan = plan_of(system, method, task)
         self.origin, self.end, self.renewal = plan.origin, plan.end, plan.renewal
         self.timetable = Timetable(system, self.end)
-        # monitors whose resets an event set off, and their direction
-        self.crossed_by_reset: dict[int, int] = {}
         self.adopted: Instant | None = None  # the last instant at which an event was settled
         self.standing: Standing  # what holds at the origin
         self.accumulation = Accumulation(forward=self.forward)
@@ -139,7 +139,7 @@ class ModeLoop:
             self.timetable.kept(self.origin)
             self.standing, self.adopted, stop = self.plan.start(task, due), self.origin, False
             if not self.plan.begins_silently:
-                stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due, ())
+                stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due)
             step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             self._mark(step_size)
@@ -264,14 +264,16 @@ class ModeLoop:
         at, steps = self._at_target(target), self.record.counters.steps - steps
         error = self.outcome.x_error
         if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
-            found = Located(at, fired, (), self.outcome.monitor_sides, True)
+            monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
+            found = Located(at, fired, monitors, True)
             found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
-            if found.fired and self._adopt(target, self._settle_located(target, found), x, (), ()):
+            fired = found.fired
+            if fired and self._adopt(target, self._settle_located(target, found, fired, []), x, ()):
                 return True, True
             error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
         x = self.outcome.x
-        settled = self._settle_appointment(target, x, appointment.schedules, error)
-        return True, self._adopt(target, settled, x, appointment.schedules, ())
+        settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
+        return True, self._adopt(target, settled, x, appointment.schedules)
 
     def _at_target(self, target: Instant) -> Situation:
         """The state just before an instant that a compiled loop has reached."""
@@ -345,84 +347,91 @@ class ModeLoop:
                 self.record.status, self.record.message = "backward-nonunique", refused
                 return True
             found = located_backward(self.system, self.origin, arrival, segment)
-        sides, x_minus, error, s_error = found.sides, arrival.x, segment.rounding(), 0.0
-        if appointment and not appointment.is_renewal and (found.fired or found.stopping):
+        monitors, x_minus, error, s_error = found.monitors, arrival.x, segment.rounding(), 0.0
+        if appointment and not appointment.is_renewal and (found.fired or monitors.leads.any()):
             found = on_new_pieces(self.system, instant, found, schedules, self.forward)
-            s_error = math.ulp(float(instant))
+            monitors, s_error = found.monitors, math.ulp(float(instant))
         # corners decide nothing: where something is due at their instant they take their sides with it
         has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
         if has_only_corners:  # or nothing, where what was located only touches zero
             error = np.maximum(error, found.at.x_error)
-        if found.stopping or (found.fired and not has_only_corners):
-            outcome = self._settle_located(instant, found)
+        fired = {} if has_only_corners else found.fired
+        resets = self._resets_of_monitors(instant, found, fired, appointment, error, s_error)
+        if fired or resets or appointment is None:
+            outcome = self._settle_located(instant, found, fired, resets)
             # surfaces that are taken together, within rounding, short of where their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
             stop = None if limit is None else self._gathered(limit)
             if stop is not None:
                 return stop
-            outcome = self._apply_crossed(outcome, found.at.s, sides, found.stopping)
-            settled = [*found.stopping, *self.crossed_by_reset]
-            if self._adopt(instant, outcome, x_minus, (), found.stopping, sides, appointment is None):
+            if appointment is None:
+                outcome = self._apply_crossed(outcome, arrival.s, monitors)
+            if self._adopt(instant, outcome, x_minus, (), monitors, appointment is None):
                 return True
-            sides, x_minus, error = sides.copy(), outcome.x, outcome.x_error
-            sides[settled] = outcome.monitor_sides[settled]
+            x_minus, error = outcome.x, outcome.x_error
         if appointment:
             if not appointment.is_renewal:
                 self.timetable.kept(instant)
             # what is located at the same instant comes first: it belongs to the signals as they were before it
-            outcome = self._settle_appointment(instant, x_minus, schedules, error, s_error)
-            outcome = self._apply_crossed(outcome, 0.0, sides, ())
-            return self._adopt(instant, outcome, x_minus, schedules, (), sides)
+            outcome = self._settle_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
+            outcome = self._apply_crossed(outcome, 0.0, monitors)
+            return self._adopt(instant, outcome, x_minus, schedules, monitors)
         return self._accumulated(instant, arrival.x, arrival.fired)
 
-    def _settle_located(self, instant: Instant, found: Located) -> Outcome:
-        """Settle the guards and stopping monitors that were located."""
-        resets = [("monitor", k) for k in found.stopping if self.system.model.monitors[k].action == "reset"]
-        if found.fired and not self.forward:
-            return cross_backward(self.system, found.at, tuple(found.fired))
-        settling = Settling(self.system, found.at, found.at.z.copy(), self.forward, inputs=found.inputs)
-        settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, found.at, True)
-        return settling.run(found.fired, resets)
+    def _resets_of_monitors(
+        self,
+        instant: Instant,
+        found: Located,
+        fired: dict[int, int],
+        appointment: Appointment | None,
+        error: np.ndarray,
+        s_error: float,
+    ) -> list[tuple[object, ...]]:
+        """Resets of the monitors that fire as they come to zero: they read what guards that are zero with them read.
 
-    def _apply_crossed(self, outcome: Outcome, s: float, sides: np.ndarray, done: tuple[int, ...]) -> Outcome:
-        """Apply the resets of the monitors that an event carried to their other side, each once."""
-        applied = set(done)
-        first_changes = list(outcome.changes)
-        while not outcome.status and self.forward:
-            due = [
-                k
-                for k, m in enumerate(self.system.model.monitors)
-                if m.action == "reset" and k not in applied and self._crossed(k, int(sides[k]), outcome)
-            ]
-            if not due:
-                break
-            applied |= set(due)
+        What guards, schedules and inputs make of the instant decides which fire; the resets of monitors do not.
+        """
+        monitors, outcome = found.monitors, None
+        acting = [k for k, m in enumerate(monitors.monitors) if m.action == "reset" and monitors.leads[k]]
+        if self.forward and (fired or appointment):
+            if not acting:
+                return []
+            outcome = self._settle_located(instant, found, fired, []) if fired else self.outcome
+            if appointment and not outcome.status:
+                x, error = (outcome.x, outcome.x_error) if fired else (found.at.x, error)
+                outcome = self._settle_appointment(instant, outcome, x, appointment.schedules, error, s_error)
+        firing = monitors.fire(outcome)
+        return [("monitor", k) for k in firing if k in acting]
+
+    def _settle_located(
+        self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
+    ) -> Outcome:
+        """Settle the guards that were located and resets of monitors, at a state of which nothing is changed."""
+        at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
+        if fired and not self.forward:
+            return cross_backward(self.system, at, tuple(fired))
+        settling = Settling(self.system, at, at.z.copy(), self.forward, inputs=found.inputs)
+        settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
+        return settling.run(fired, resets)
+
+    def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
+        """Apply the resets of the monitors that an event carried off their sides, and what these carry in turn."""
+        changes = list(outcome.changes)
+        while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
+            monitors.fire(outcome)
             at = Situation(s, outcome.x.copy(), outcome.p, outcome.z.copy(), outcome.x_error, math.ulp(s))
-            crossed_sides = outcome.monitor_sides
             resets = [("monitor", k) for k in due]
             outcome = Settling(self.system, at, at.z.copy(), self.forward).run((), resets)
-            first_changes += outcome.changes
-            # what is recorded is the side to which the event carried a monitor, not that after its reset
-            outcome.monitor_sides[due] = np.where(
-                outcome.monitor_sides[due] == 0, crossed_sides[due], outcome.monitor_sides[due]
-            )
-            self.crossed_by_reset.update({k: int(crossed_sides[k]) for k in due})
+            changes += outcome.changes
             outcome.continuous = False
-        outcome.changes = first_changes
+        outcome.changes = changes
         return outcome
-
-    def _crossed(self, monitor: int, before: int, outcome: Outcome) -> int:
-        """Direction in which an event carried a monitor across, as far as it asks for it; else 0."""
-        after = int(outcome.monitor_sides[monitor])
-        if before == 0 or after in (0, before):
-            return 0
-        wanted = {"up": 1, "down": -1, "both": after}[self.system.model.monitors[monitor].direction]
-        return after if wanted == after else 0
 
     def _settle_appointment(
         self,
         instant: Instant,
+        before: Outcome,
         x_minus: np.ndarray,
         schedules: tuple[int, ...],
         error: np.ndarray,
@@ -430,10 +439,10 @@ class ModeLoop:
     ) -> Outcome:
         """Settle a scheduled instant, inputs as they are from then on.
 
-        s_error: how well the zeros of what was located there are known.
+        before: what holds until then. s_error: how well the zeros of what was located there are known.
         """
-        system, z = self.system, self.outcome.z
-        p = system.vector(instant, system.discrete(self.outcome.p), self.forward)
+        system, z = self.system, before.z
+        p = system.vector(instant, system.discrete(before.p), self.forward)
         error = error.copy()
         error[system.evaluated(z)] = 0.0
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
@@ -487,15 +496,17 @@ class ModeLoop:
         ended = {*limit.components, *(c.component for c in found.changes)}
         self.accumulation.forget(tuple(ended))
         self.last_limits.update(dict.fromkeys(ended, limit.time))
-        found = self._apply_crossed(found, ahead, before.monitor_sides, ())
+        monitors = MonitorSides.of(self.system.model.monitors, before.monitor_sides)
+        found = self._apply_crossed(found, ahead, monitors)
         instant = target if ahead == room else self.origin.plus(ahead)
-        stop = self._adopt(instant, found, before.x, (), (), before.monitor_sides)
+        stop = self._adopt(instant, found, before.x, (), monitors)
         if stop or appointment is None or ahead < room:
             return stop
         self.timetable.kept(target)
-        x, sides = self.outcome.x, self.outcome.monitor_sides
-        settled = self._settle_appointment(target, x, appointment.schedules, self.outcome.x_error)
-        return self._adopt(target, settled, x, appointment.schedules, (), sides)
+        x, schedules = self.outcome.x, appointment.schedules
+        monitors = replace(monitors, before=self.outcome.monitor_sides)
+        settled = self._settle_appointment(target, self.outcome, x, schedules, self.outcome.x_error)
+        return self._adopt(target, settled, x, schedules, monitors)
 
     def _adopt(
         self,
@@ -503,13 +514,12 @@ class ModeLoop:
         outcome: Outcome,
         x_minus: np.ndarray,
         schedules: tuple[int, ...],
-        stopping: tuple[int, ...],
-        monitor_sides: np.ndarray | None = None,
+        monitors: MonitorSides | None = None,
         is_last: bool = True,
     ) -> bool:
         """Make the state after an event the start of the next segment and record the event; True to stop.
 
-        is_last: nothing follows at this instant; else only the monitors that stopped it are recorded yet.
+        is_last: nothing follows at this instant; else only the monitors whose resets are applied are recorded yet.
         """
         system, record = self.system, self.record
         self.origin = self.adopted = instant
@@ -535,14 +545,16 @@ class ModeLoop:
             schedule = system.model.schedules[k]
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
-        terminated += self._crossed_monitors(instant, outcome, x_minus, stopping, monitor_sides, is_last)
-        if outcome.status:
+        ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
+        if (
+            outcome.status and not ended
+        ):  # a run that ends here by a monitor needs nothing that holds behind it
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
-        if terminated:
+        if terminated or ended:
             record.status, record.message = (
                 "terminated",
-                f"ended by {terminated[0]} at t = {float(instant)!r}",
+                f"ended by {(terminated + ended)[0]} at t = {float(instant)!r}",
             )
             return True
         if not self.forward and held(system, outcome.z):
@@ -551,29 +563,25 @@ class ModeLoop:
             return True
         return False
 
-    def _crossed_monitors(
+    def _fired_monitors(
         self,
         instant: Instant,
         outcome: Outcome,
         x_minus: np.ndarray,
-        stopping: tuple[int, ...],
-        monitor_sides: np.ndarray | None,
+        monitors: MonitorSides,
         is_last: bool,
     ) -> list[str]:
-        """Record the monitors whose side differs across the event; return those that end the run."""
+        """Record the monitors that fire at an instant; return those that end the run."""
+        is_last = is_last or bool(outcome.status)
+        if is_last:
+            monitors.fire(outcome)
+            monitors.keep_open(outcome)
         ended = []
-        for k, monitor in enumerate(self.system.model.monitors):
-            before = 0 if monitor_sides is None else int(monitor_sides[k])
-            if k in self.crossed_by_reset:
-                direction = self.crossed_by_reset.pop(k)
-                self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
+        for k, direction in sorted(monitors.fired.items()):
+            monitor = monitors.monitors[k]
+            if k in monitors.told or not (is_last or monitor.action == "reset"):
                 continue
-            after = int(outcome.monitor_sides[k])
-            if k not in stopping and (not is_last or before == 0 or after in (0, before)):
-                continue
-            direction = after if after and after != before else -before
-            if {"up": 1, "down": -1, "both": direction}[monitor.direction] != direction:
-                continue
+            monitors.told.add(k)
             self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
             ended += [monitor.name] if monitor.action == "terminate" else []
         return ended

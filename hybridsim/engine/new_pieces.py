@@ -46,12 +46,10 @@ def on_new_pieces(
         for g, place in found.fired.items()
         if is_open[g] or side_of(series.guards[g], series.guard_bounds[g], 0)[0] < 0
     }
-    stopping = tuple(
-        k
-        for k in found.stopping
-        if found.sides[k] in (0, -side_of(series.monitors[k], series.monitor_bounds[k], 0)[0])
-    )
-    return replace(found, at=at, fired=fired, stopping=stopping, inputs=before)
+    for k in np.flatnonzero(found.monitors.leads):
+        if side_of(series.monitors[k], series.monitor_bounds[k], 0)[0] == found.monitors.before[k]:
+            found.monitors.leads[k] = 0  # it turns back
+    return replace(found, at=at, fired=fired, inputs=before)
 
 
 def _loads_at_zero(system: System, found: Located) -> set[int]:

@@ -26,6 +26,7 @@ from hybridsim.engine.diagnosis import rates_without_value
 from hybridsim.engine.differences import DifferenceSeries
 from hybridsim.engine.fatal_guards import said_by_leaving, said_by_located
 from hybridsim.engine.first_modes import as_given, certainly_leaving
+from hybridsim.engine.guards_at_once import taken_at_once
 from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
 from hybridsim.engine.meeting import (
@@ -275,23 +276,13 @@ class Settling:
             guards = automaton.guards[mode]
             leaving = [j for j, g in enumerate(guards) if self.fired[g] or self.sides[g] < 0]
             leaving.sort(key=lambda j: (self.rank.get(guards[j], len(self.rank)), j))
-            apart = self._apart(c, mode, leaving)
-            if apart:
-                return "nonunique", apart
-            for j in leaving[:1]:
-                if automaton.fatal[mode][j]:
-                    return "inconsistent", str(automaton.fatal[mode][j])
-                number = system.choose(c, mode, j, at.s, at.x, given.p, given.z)
-                name = automaton.guard_names[mode][j]
-                if number < 0:
-                    return "inconsistent", (
-                        f"guard {name} of mode {automaton.modes[mode]} ({automaton.name}) would go negative and none "
-                        f"of the conditions of its transitions holds"
-                    )
-                target = automaton.targets[mode][j][number]
+            choices, failure = taken_at_once(self, given, c, leaving)
+            if failure:
+                return failure
+            for j, number in choices:
+                z_plus[c] = automaton.targets[mode][j][number]
                 resets.append(("choice", c, mode, j, number))
-                taken.append((c, name, mode, target))
-                z_plus[c] = target
+                taken.append((c, automaton.guard_names[mode][j], mode, int(z_plus[c])))
             self.fired[list(guards)] = False
             for g in guards:  # modes share the numbers of their guards, and the next mode's were not located
                 self.rank.pop(g, None)
@@ -304,25 +295,6 @@ class Settling:
         self.jumped = self.jumped or bool(taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
         return None
-
-    def _apart(self, component: int, mode: int, leaving: list[int]) -> str:
-        """Two guards of one mode that come to zero at once and lead to different things; empty if none do."""
-        at, system = self.at, self.system
-        automaton = system.automata[component]
-        guards = automaton.guards[mode]
-        place = self.rank.get(guards[leaving[0]]) if leaving else None
-        first = [j for j in leaving if self.fired[guards[j]] and self.rank.get(guards[j]) == place]
-        declared = system.model.all_components()[component].modes[mode].guards
-        ways = {}
-        for j in first:
-            number = system.choose(component, mode, j, at.s, at.x, at.p, at.z)
-            if number >= 0:
-                choice = declared[j].then[number]
-                ways[(choice.to, tuple((n, e.text) for n, e in choice.reset.items()))] = declared[j].name
-        if len(ways) < 2:
-            return ""
-        names = " and ".join(ways.values())
-        return f"guards {names} of mode {automaton.modes[mode]} come to zero at once and lead apart"
 
     def _place(self, component: int) -> int:
         """When the first of a component's guards came to zero, as a place in the order of all."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.checkpoint import Checkpoint, damaged
+from hybridsim.engine.decide import side_after
 from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.first_modes import as_given
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
@@ -22,7 +23,7 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
-from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTITUTION
+from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTED, RESTITUTION
 from hybridsim.integrators.fixed_step_length import refuse_endless
 from hybridsim.integrators.gaps import gaps
 
@@ -72,6 +73,11 @@ class March(Protocol):
     def warnings(self) -> list[str]:
         """What a user should know of the run."""
         ...
+
+
+def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """See `hybridsim.integrators.fixed_step_kernels.leaves_side`; of all monitors."""
+    return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
 
 
 def surface_table(system: System) -> np.ndarray:
@@ -186,6 +192,7 @@ class FixedStepRun:
         self.turned = False
         here = self.x.copy(), z  # moved on as it goes; events hold what was there
         count, why = self.march.run(numbers, bound, p, here, self.fresh, rows)
+        rested = np.flatnonzero(self.fresh) if why == RESTED else None
         self.fresh[:] = False
         if count < _ROWS:  # a short stretch does not hold on to room for a long one
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
@@ -209,6 +216,10 @@ class FixedStepRun:
         if why == FULL:
             self.origin = instant
             return False
+        if rested is not None:
+            self.origin = instant
+            sides = np.sign(self._monitors(float(times[count - 2]), states[count - 2], p))
+            return self._monitor_events(instant, rested, -sides.astype(np.int64), self.x)
         if why == BOUND:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
@@ -263,8 +274,7 @@ class FixedStepRun:
             tau = 0.5 * (low + high)
             trial = self._trial(s, tau, p)
             if why == MONITOR:
-                after = self._monitors(s + tau, trial, p)
-                beyond = bool(((before != 0.0) & ((before > 0.0) != (after > 0.0))).any())
+                beyond = bool(_left(before, self._monitors(s + tau, trial, p)).any())
             else:
                 guards = self._guards(s + tau, trial, p)
                 beyond = bool((guards[watched] < 0.0).any())
@@ -279,9 +289,10 @@ class FixedStepRun:
         if why == MONITOR:
             self.x, self.origin = best, instant
             after = self._monitors(s + tau, best, p)
-            crossed = np.flatnonzero((before != 0.0) & ((before > 0.0) != (after > 0.0)))
-            self.fresh[crossed] = True
-            return self._monitor_events(instant, crossed, np.where(after > 0.0, 1, -1), best)
+            left = _left(before, after)
+            self.fresh[left] = True
+            crossed = np.flatnonzero(left & ~self._turning_back(before, after))
+            return self._monitor_events(instant, crossed, -np.sign(before).astype(np.int64), best)
         first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
         self.x = best
         shares = {
@@ -303,9 +314,20 @@ class FixedStepRun:
         return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        return self.system.rows(
-            "monitors", len(self.system.monitor_names), np.array([s]), x[None, :], p, self.z
-        )[0]
+        """Their values at states as they are, not as the modes would hold them."""
+        free = p.copy()
+        free[self.system.layout.pin_at] = 0.0
+        names = self.system.monitor_names
+        return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
+
+    def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Which of the monitors are zero here to the last bit, and go back to the side on which they were."""
+        back = np.zeros(len(after), dtype=np.bool_)
+        if (after == 0.0).any():  # inputs as they are from here on
+            series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)
+            for k in np.flatnonzero(after == 0.0):
+                back[k] = side_after(series.monitors[k], series.monitor_bounds[k], 1)[0] == np.sign(before[k])
+        return back
 
     def _monitor_events(
         self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray

@@ -11,7 +11,16 @@ from hybridsim.engine.few import put
 from hybridsim.engine.jit import call, inlined, kernel
 from hybridsim.engine.packs import packed
 from hybridsim.engine.rosenbrock_step import factor, solve
-from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, NOT_FINITE, RESTITUTION, passed
+from hybridsim.integrators.fixed_step_kernels import (
+    BOUND,
+    FULL,
+    GOES_ON,
+    NOT_FINITE,
+    RESTED,
+    RESTITUTION,
+    brought_to_zero,
+    passed,
+)
 from hybridsim.integrators.moreau_impacts import (
     DOWN,
     LEAST,
@@ -375,6 +384,8 @@ def moreau_steps(
         put(x, states[row])
         put(z, modes[row])
         row += 1
+        if brought_to_zero(functions[5], s, x, p, z, fresh, row == 1, room.monitors, room.monitors_after):
+            return row, RESTED
         if s == bound:
             return row, BOUND
         if row >= times.shape[0]:
@@ -391,7 +402,7 @@ def moreau_steps(
             counts[2] += 1
         put(z, modes[row - 1])
         why = passed(
-            (functions[1], functions[5]), s, x, s + h, out, p, z, watched, fresh, row == 1, room.guards, room.monitors,
+            (functions[1], functions[5]), s + h, out, p, z, watched, fresh, row == 1, room.guards, room.monitors,
             room.monitors_after, counts,
         )  # fmt: skip
         if why != GOES_ON:

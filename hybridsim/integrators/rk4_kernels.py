@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.jit import call, inlined, kernel
-from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, passed
+from hybridsim.integrators.fixed_step_kernels import BOUND, FULL, GOES_ON, RESTED, brought_to_zero, passed
 
 # rules that choose the modes of surface components
 ZONE, SIGN = 0, 1
@@ -256,6 +256,8 @@ def run_steps(
         for i in range(z.shape[0]):
             modes[row, i] = z[i]
         row += 1
+        if brought_to_zero(addresses[3], s, x, p, z, fresh, row == 1, monitors, monitors_after):
+            return row, RESTED
         if s == bound:
             return row, BOUND
         if row >= times.shape[0]:
@@ -266,7 +268,7 @@ def run_steps(
         _step(addresses, law, table, s, h, x, p, z, trial, work)
         counters[0] += 4
         why = passed(
-            (addresses[2], addresses[3]), s, x, s + h, trial, p, z, watched, fresh, row == 1, guards, monitors,
+            (addresses[2], addresses[3]), s + h, trial, p, z, watched, fresh, row == 1, guards, monitors,
             monitors_after, counters,
         )  # fmt: skip
         if why != GOES_ON:

@@ -173,9 +173,8 @@ def _of_signs(model: Model) -> Iterator[Caution]:
             yield Caution(f"{item.what} is constant {so}", item.place, remedy)
         elif found := item.reading.one_sided(item.expr):
             sign, reason = found
-            fires = (
-                "fires as soon as it is not zero" if item.is_guard and sign == "positive" else "never fires"
-            )
+            fires = "never fires" if item.is_guard else "never fires unless it stays at zero"
+            fires = "fires as soon as it is not zero" if item.is_guard and sign == "positive" else fires
             yield Caution(f"{item.what} is {reason}, never {sign}, so it {fires}", item.place, remedy)
 
 

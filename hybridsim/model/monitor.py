@@ -15,7 +15,9 @@ ACTIONS = ("record", "terminate", "reset")
 
 @dataclass(frozen=True)
 class Monitor(Declared):
-    """Fires where ``expr`` changes its side over (t0, t1]; a zero at t0 does not fire.
+    """Fires where ``expr`` leaves its side of zero over (t0, t1], whatever the action; a zero at t0 does not fire.
+
+    So it fires where its value changes its sign, or comes to zero and stays there, as a velocity does at a stop.
 
     Parameters
     ----------
@@ -24,7 +26,7 @@ class Monitor(Declared):
     expr : str or float
         What is watched.
     direction : str, optional
-        "up" (negative to positive), "down" or "both".
+        "up" (from below zero), "down" (from above) or "both".
     action : str, optional
         "record", "terminate", or "reset" with ``reset`` evaluated at x-.
     reset : mapping of str to str or float, optional

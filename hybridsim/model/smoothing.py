@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hybridsim.expr import Expression, of_tree, parse
+from hybridsim.expr import Expression, of_tree
 from hybridsim.model.component import Component, Corner, Guard, Mode, Surface
 from hybridsim.model.frozen_map import FrozenMap
 from hybridsim.model.jumps import not_linear
@@ -115,7 +115,7 @@ class _Smoothing:
         monitors = tuple(
             replace(
                 monitor,
-                expr=self._watched(monitor.expr, Here(f"monitor {monitor.name}", monitor.place, jumps="")),
+                expr=self._rewritten(monitor.expr, Here(f"monitor {monitor.name}", monitor.place, jumps="")),
             )
             for monitor in model.monitors
         )
@@ -227,18 +227,6 @@ class _Smoothing:
                 self.work.count += 1
                 continue
             yield replace(guard, expr=self._rewritten(guard.expr, here))
-
-    def _watched(self, expr: Expression, here: Here) -> Expression:
-        if self._has_corner(expr.tree):
-            minus = isinstance(expr.tree, ast.UnaryOp) and isinstance(expr.tree.op, ast.USub)
-            # mypy does not see that minus means a UnaryOp
-            if self.work.never_negative(expr.tree.operand if minus else expr.tree):  # type: ignore[attr-defined]  # a minus has one
-                self.work.note(
-                    expr.tree, MODE, "it never changes its sign, so that the monitor never fires", here
-                )
-                self.work.count += 1
-                return parse(-1 if minus else 1, expr.place)
-        return self._rewritten(expr, here)
 
     def _has_corner(self, node: ast.expr) -> bool:
         tree = self.meanings.written_out(node)

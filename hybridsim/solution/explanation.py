@@ -20,6 +20,7 @@ from hybridsim.solution.blow import errors_beside, is_struck
 from hybridsim.solution.candidate import candidate, views
 from hybridsim.solution.event import Event
 from hybridsim.solution.grazing import grazed
+from hybridsim.solution.monitor_way import way_of_monitor
 from hybridsim.solution.one_instant import BY_RESET, changes_in_words, fired_guards
 from hybridsim.solution.reason import reason
 from hybridsim.solution.remarks import change_of_side, remarks
@@ -130,9 +131,11 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
     """The explanation without the remarks; `happened`: what the events stand for, in their order."""
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
-        return Explanation(event, near, (), _of_another_kind(solution, event), _state(solution, event))
+        return Explanation(
+            event, near, (), _of_another_kind(solution, event, happened[number]), _state(solution, event)
+        )
     if event.kind != "transition":
-        return Explanation(event, (), (), _of_another_kind(solution, event))
+        return Explanation(event, (), (), _of_another_kind(solution, event, happened[number]))
     occurrence = happened[number]
     together = [o for o in happened if o.instant == occurrence.instant]
     segment = _segment_before(solution, occurrence)
@@ -285,11 +288,11 @@ def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]
     return tuple(lines)
 
 
-def _of_another_kind(solution: Solution, event: Event) -> str:
+def _of_another_kind(solution: Solution, event: Event, occurrence: Occurrence) -> str:
     if event.kind == "monitor":
-        way = "rose" if event.direction > 0 else "fell"
+        way = way_of_monitor(solution, event, occurrence)
         sets = _sets(event, solution.model.monitors)
-        return f"the monitor {event.component} {way} through zero; it changes no mode" + sets
+        return f"the monitor {event.component} {way}; it changes no mode" + sets
     if event.kind == "scheduled":
         sets = _sets(event, solution.model.schedules)
         return f"the schedule {event.component} was due; it was stepped to, not searched for" + sets

@@ -84,7 +84,7 @@ class Run:
         appointment = self.appointments.next(point.t)
         bound = appointment.t - point.t
         fired, s = self._first_departure(expansion, self._length(expansion, bound))
-        acting, s = self._pass_monitors(expansion, point.t, s, arriving=bool(fired))
+        acting, s = self._pass_monitors(expansion, point.t, s, arriving=bool(fired) or s == bound)
         self.motion.pieces.append(Piece(point.t, s, tuple(state.c for state in expansion.states)))
         x = tuple(value_at(state.c, s) for state in expansion.states)
         self.sizes = [max(size, abs(value)) for size, value in zip(self.sizes, x, strict=True)]
@@ -95,7 +95,7 @@ class Run:
             self._act(acting, point)
         elif fired and (self.rules.sides.others(fired) or not arrived):
             self._crowd(point.t)
-            self._adopt(self.rules.settle(point, self.now.modes, fired))
+            self._adopt(self.rules.settle(point, self.now.modes, fired), is_last=not arrived)
         else:
             self._go_on(point, arrived)
         if arrived:
@@ -111,9 +111,10 @@ class Run:
         leaving = self.programs.leaving(expansion)
         if self.rules.sides.others(leaving) or (leaving and not arrived):
             self._crowd(point.t)
-            self._adopt(self.rules.settle(point, self.now.modes, leaving))
+            settled = self.rules.settle(point, self.now.modes, leaving)
         else:
-            self._adopt(Settled(point, self.now.modes, expansion))
+            settled = Settled(point, self.now.modes, expansion)
+        self._adopt(settled, is_last=not arrived)
 
     def _length(self, expansion: Expansion, bound: Number) -> Number:
         """A step at whose end the equations are satisfied, and guards and monitors have their values."""
@@ -162,17 +163,19 @@ class Run:
 
     # -- events ---------------------------------------------------------------------------------------------
 
-    def _adopt(self, settled: Settled) -> None:
-        """Go on from what an event left; monitors that it carried to their other side fire."""
+    def _adopt(self, settled: Settled, is_last: bool = True) -> None:
+        """Go on from what an event left; monitors that have left their sides fire where nothing follows at once."""
         self.now = settled
         for move in settled.moves:
             name = self.rules.components[move.component].name
             self.events.append(ExactEvent(float(settled.point.t), name, move.source, move.target, move.guard))
+        if not is_last:
+            return
         before, self.sides = self.sides, self._sides(settled.expansion)
         crossed = [
             k
             for k, (side, after) in enumerate(zip(before, self.sides, strict=True))
-            if side * after < 0 and after in _WANTED[self.model.monitors[k].direction]
+            if side not in (0, after) and -side in _WANTED[self.model.monitors[k].direction]
         ]
         resets = self._record_monitors(crossed, settled.point.t)
         if resets:

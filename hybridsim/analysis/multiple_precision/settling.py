@@ -28,8 +28,8 @@ is tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits
 says in advance what is zero at an event.
 
 A monitor has the side of zero on which it is just after an event, or none where it stays zero for a while. It fires
-where it goes from one side to the other: between events where its series changes its sign; at an event that changes a
-mode, or that a schedule sets off, where its sides just before and just after are opposite. Its reset is made at once.
+where it leaves its side: between events where its series changes its sign; at an event that changes a mode, or that a
+schedule sets off, where its side just after is another one or none. Its reset is made at once.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ class Transitions:
         is_located: the guards came to zero together, so that none of one component is before another.
         """
         after, modes = list(modes), self.programs.given(point, modes)
-        ways: dict[int, tuple[str, Mapping[str, Expression]]] = {}
+        ways: dict[int, list[tuple[str, Mapping[str, Expression]]]] = {}
         for c, j in sorted(fired):
             component = self.programs.components[c]
             guard = component.mode(modes[c]).guards[j]
@@ -69,14 +69,19 @@ class Transitions:
                     f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "
                     "the conditions of its choices holds"
                 )
-            if c not in ways:
-                moves.append(Move(c, modes[c], choice.to, guard.name))
-            if ways.setdefault(c, (choice.to, choice.reset)) != (choice.to, choice.reset) and is_located:
+            way, known = (choice.to, choice.reset), ways.setdefault(c, [])
+            if known and not is_located:
+                continue
+            if known and known[0][0] != choice.to:
                 raise SimulationError(
                     f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
                 )
-            after[c] = ways[c][0]
-        values = self._reset_values(point, modes, [*(reset for _, reset in ways.values()), *resets])
+            if way not in known or any(isinstance(expr, Increment) for expr in choice.reset.values()):
+                moves.append(Move(c, modes[c], choice.to, guard.name))
+                known.append(way)
+            after[c] = choice.to
+        made = [reset for known in ways.values() for _, reset in known]
+        values = self._reset_values(point, modes, [*made, *resets])
         x = tuple(values.get(name, value) for name, value in zip(self.states, point.x, strict=True))
         discrete = tuple(
             values.get(name, value) for name, value in zip(self.discrete, point.discrete, strict=True)

@@ -109,14 +109,17 @@ class Judge(Configurations):
             if kind != "monitor":
                 continue
             sign, old, monitor = lead(c[slot], self.tol), self.signs.get(w, 0), self.m.monitors[w]
-            if not sign or sign == old:
+            if sign == old:
                 continue
             self.signs[w] = sign
-            if not old or (monitor.direction, sign) in (("up", -1), ("down", 1)):
+            if not old or (monitor.direction, old) in (
+                ("up", 1),
+                ("down", -1),
+            ):  # it leaves the side that it had
                 continue
             if abs(self.before.get(w, 0)) > 1e-6:
                 self.doubt(f"monitor {w} is jumped across")
-            self.note(w, "up" if sign > 0 else "down")
+            self.note(w, "up" if old < 0 else "down")
             if monitor.action == "terminate":
                 raise Stop("terminated")
             changes += [(k, self.value(e), False) for k, e in monitor.reset.items()]

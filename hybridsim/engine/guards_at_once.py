@@ -1,0 +1,64 @@
+"""Guards of one mode that come to zero at once: all of them are taken where they lead to one mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.reset_keys import amounts_of
+from hybridsim.engine.resets import merged_resets
+
+if TYPE_CHECKING:
+    from hybridsim.engine.outcome import Situation
+    from hybridsim.engine.settle import Settling
+
+Failure = tuple[str, str]  # status and message
+
+
+def taken_at_once(
+    settling: Settling, given: Situation, component: int, leaving: Sequence[int]
+) -> tuple[list[tuple[int, int]], Failure | None]:
+    """The guards of a mode that are taken, each with the number of its choice; or why none can be.
+
+    leaving: places of the guards that are about to be negative, in the order in which they came to zero. given: what
+    conditions and resets read. Of guards that are negative as the mode begins the first that is declared is taken.
+    """
+    system, mode = settling.system, int(settling.at.z[component])
+    automaton = system.automata[component]
+    guards = automaton.guards[mode]
+    place = settling.rank.get(guards[leaving[0]]) if leaving else None
+    first = [j for j in leaving if settling.fired[guards[j]] and settling.rank.get(guards[j]) == place]
+    first = first or list(leaving[:1])
+    if fatal := next((automaton.fatal[mode][j] for j in first if automaton.fatal[mode][j]), ""):
+        return [], ("inconsistent", str(fatal))
+    numbers = {j: system.choose(component, mode, j, given.s, given.x, given.p, given.z) for j in first}
+    if first and max(numbers.values()) < 0:
+        return [], (
+            "inconsistent",
+            f"guard {automaton.guard_names[mode][first[0]]} of mode {automaton.modes[mode]} ({automaton.name}) would "
+            f"go negative and none of the conditions of its transitions holds",
+        )
+    declared = system.model.all_components()[component].modes[mode].guards
+    found: dict[object, tuple[int, int]] = {}
+    for j, number in numbers.items():
+        if number >= 0:
+            choice = declared[j].then[number]
+            what = (choice.to, tuple((n, e.text) for n, e in choice.reset.items()))
+            # what only sets does the same once more
+            found.setdefault((what, j if amounts_of(choice.reset) else -1), (j, number))
+    taken = list(found.values())
+    apart = _apart(settling, given, component, taken) if len(taken) > 1 else ""
+    return ([], ("nonunique", apart)) if apart else (taken, None)
+
+
+def _apart(settling: Settling, given: Situation, component: int, taken: Sequence[tuple[int, int]]) -> str:
+    """Why several guards cannot be taken at once; empty if they can."""
+    system, at, mode = settling.system, settling.at, int(settling.at.z[component])
+    automaton = system.automata[component]
+    names = " and ".join(automaton.guard_names[mode][j] for j, _ in taken)
+    said = f"guards {names} of mode {automaton.modes[mode]} ({automaton.name}) come to zero at once and "
+    if len({automaton.targets[mode][j][number] for j, number in taken}) > 1:
+        return f"{said}lead apart"
+    keys: list[tuple[object, ...]] = [("choice", component, mode, j, number) for j, number in taken]
+    clash = merged_resets(system, given, keys, at.x.copy(), at.p.copy(), at.x_error.copy())
+    return f"{said}their resets differ: put them into two components ({clash})" if clash else ""
