@@ -163,19 +163,33 @@ class TangentTape:
 
     Parameters
     ----------
-    guards, monitors : numbers of those that are wanted behind the rates of the n states.
+    guards, monitors, surfaces : numbers of those that are wanted behind the rates of the n states.
     """
 
     def __init__(
-        self, system: System, z: np.ndarray, guards: tuple[int, ...] = (), monitors: tuple[int, ...] = ()
+        self,
+        system: System,
+        z: np.ndarray,
+        guards: tuple[int, ...] = (),
+        monitors: tuple[int, ...] = (),
+        surfaces: tuple[int, ...] = (),
     ) -> None:
         tape = system.lean_tape(z)
         self._wanted = np.concatenate(
-            [tape.derivatives, tape.guards[list(guards)], tape.monitors[list(monitors)]]
+            [
+                tape.derivatives,
+                tape.guards[list(guards)],
+                tape.monitors[list(monitors)],
+                tape.surfaces[list(surfaces)],
+            ]
         ).astype(np.int64)
         rows = [tuple(row) for row in np.concatenate([tape.constant_rows, tape.rows]).tolist()]
         self._rows = np.array(needed_rows(rows, set(self._wanted.tolist())), dtype=np.int64).reshape(-1, 5)
         self._registers = system.registers
+
+    def is_same(self, other: TangentTape) -> bool:
+        """Whether another tape computes the same quantities by the same operations."""
+        return np.array_equal(self._rows, other._rows) and np.array_equal(self._wanted, other._wanted)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
         """At local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""

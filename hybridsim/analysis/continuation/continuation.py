@@ -17,8 +17,8 @@ from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.steady.steady_state import steady_state
-from hybridsim.analysis.variations import sensitivities
-from hybridsim.analysis.variations.carried import rates_of
+from hybridsim.analysis.variations.off_zero import rates_of
+from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.wanted import whole
 from hybridsim.calls import refusing
@@ -272,7 +272,7 @@ class _Follower:
             end = point_at_end(solution)
             if end.z != start.z:
                 return None
-            found = sensitivities(solution, (self.parameter,), starts_follow=False)
+            found = derivatives(solution, (self.parameter,), starts_follow=False)
         except HybridsimError as fault:
             self.fault = fault.message
             return None

@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.settling import RESTS
 from hybridsim.analysis.steady.shooting import Orbit
-from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges, sizes
 from hybridsim.errors import UsageError
 
@@ -46,7 +46,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
             )
             return Followed(rest, True, count, f"{message}; {_NO_PERIOD}")
         try:
-            matrix = sensitivities(solution, ()).by_start
+            matrix = derivatives(solution, ()).by_start
         except UsageError as reason:
             return Followed(None, False, count, f"not settled: {_NO_PERIOD}; {reason.message}")
         unit = np.where(largest > 0.0, largest, 1.0)

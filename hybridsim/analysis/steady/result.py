@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
-from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
 
@@ -126,7 +126,7 @@ class SteadyState(Measures):
         if not self.success:
             raise UsageError(f"the motion is {self.kind}: it has no multipliers", remedy="see lyapunov")
         rates = rates_at_end(self.solution) if self._is_free else None
-        return multipliers(sensitivities(self.solution, ()).by_start, rates)
+        return multipliers(derivatives(self.solution, ()).by_start, rates)
 
     @property
     def stable(self) -> bool:

@@ -18,7 +18,7 @@ from hybridsim.analysis.steady.quiet import (
 )
 from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.steady.scales import rounding_of
-from hybridsim.analysis.variations.carried import rates_of
+from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sizes import ranges
 
 if TYPE_CHECKING:

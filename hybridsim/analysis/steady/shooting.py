@@ -9,8 +9,8 @@ import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.settling import relative
-from hybridsim.analysis.variations import sensitivities
-from hybridsim.analysis.variations.carried import rates_of
+from hybridsim.analysis.variations.off_zero import rates_of
+from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.errors import HybridsimError
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def shoot(
             if not residual <= (_LESS * best.residual if count else np.inf) and residual > _ROUNDING:
                 break
             motion.carry(solution)
-            matrix = sensitivities(solution, ()).by_start
+            matrix = derivatives(solution, ()).by_start
         except HybridsimError:
             break
         rates = None

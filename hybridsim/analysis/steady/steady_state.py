@@ -26,7 +26,7 @@ from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
 from hybridsim.analysis.steady.shooting import Orbit, shoot
 from hybridsim.analysis.sweep.given import refuse_unknown
-from hybridsim.analysis.variations import sensitivities
+from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.calls import refusing
 from hybridsim.engine.recent import system_of
@@ -234,7 +234,7 @@ class _Search:
     def _over_a_period(self, start: Point) -> np.ndarray:
         """What a period of the forcing makes of changes of the start (n + d, n + d); zeros where that is unknown."""
         try:
-            return sensitivities(self.motion.run(start, self.period or 0.0), ()).by_start
+            return derivatives(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
             return np.zeros((len(start.values), len(start.values)))
 

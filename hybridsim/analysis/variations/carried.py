@@ -11,26 +11,38 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.event_times import EventTimes
-from hybridsim.analysis.variations.rounds import Rounds, batches, component_of, is_knot, lifted_vector
+from hybridsim.analysis.variations.off_zero import OffZero, beyond, differ, off_zero, rates_of
+from hybridsim.analysis.variations.refused import refuse_inputs
+from hybridsim.analysis.variations.rounds import (
+    Rounds,
+    batches,
+    component_of,
+    is_knot,
+    is_recorded,
+    lifted_vector,
+)
 from hybridsim.analysis.variations.seeds import rate_slopes, seeds
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
-from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of
+from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
-    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.pieces import Segment
     from hybridsim.engine.system import System
     from hybridsim.solution import Solution
+
+_ROUNDING = 1e-11  # of a run's length, by a change of its own size: a time that moves by less does not move
+_SAME = 1e-9  # of its size: a state that changes by less at an event does not jump
 
 
 @dataclass(frozen=True)
@@ -44,26 +56,26 @@ class Directions:
     discrete: np.ndarray
     parameters: np.ndarray
 
+    def both_ways(self, chosen: np.ndarray) -> Directions:
+        """Some of them, and then the same backward."""
+        rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
+        return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
+
 
 @dataclass(frozen=True)
 class Carried:
     """Derivatives at the end of a run, and of the time of each event on the way.
 
-    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,).
+    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,);
+    off: what is exactly at its zero and is moved off it by some directions;
+    lost: times (M,) from which on directions lead to another run, or infinity.
     """
 
     x: np.ndarray
     discrete: np.ndarray
     times: list[tuple[float, np.ndarray]]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A segment, the monitors that were recorded along it, and what happened between its end and the next one."""
-
-    segment: Segment
-    recorded: tuple[Occurrence, ...]
-    happened: tuple[Occurrence, ...]
+    off: list[OffZero]
+    lost: np.ndarray
 
 
 class Carrier:
@@ -88,14 +100,20 @@ class Carrier:
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
 
-    def carry(self, directions: Directions) -> Carried:
-        """From the first segment to the end of the last."""
+    def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
+        """From the first segment to the end of the last.
+
+        sided : whether what a direction moves off its zero is followed on that side, and not on the side of the run.
+        """
         G = directions.parameters
-        self._refuse_inputs(G)
+        self._sided, self._lost = sided, np.full(G.shape[1], np.inf)
+        refuse_inputs(self.system.model, G)
         Y, Yd = directions.x.copy(), directions.discrete.copy()
-        event_times = EventTimes(self.system, self._scale, self._own_sizes(directions), G, self._rates)
+        self._changes = Changes(self.system, self._scale, self.own_sizes(directions), G, self._rates)
+        self._off: list[OffZero] = []
+        event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
-        stretches = list(self._stretches())
+        stretches = list(stretches_of(self.solution))
         Y, Yd = self._started(stretches[0].segment, Y, Yd, G, event_times)
         for stretch, following in zip(stretches, [*stretches[1:], None], strict=True):
             segment, s = stretch.segment, float(stretch.segment.s[0])
@@ -103,16 +121,56 @@ class Carrier:
                 here = one.instant.minus(segment.origin)
                 Y, s = self._over(segment, Y, Yd, G, s, here), here
                 x = segment.dense(np.array([here]))[0]
-                times.append((float(one.instant), event_times.of(segment, (one,), here, x, Y, Yd)))
+                times.append((float(one.instant), event_times.recorded(segment, one, here, x, Y, Yd)))
             Y = self._over(segment, Y, Yd, G, s, float(segment.s[-1]))
             if following is None:
                 break
-            Y, Yd, shift = self._through(stretch, following.segment, Y, Yd, G, event_times)
+            behind = self._through(stretch, following.segment, Y, Yd, G, event_times)
+            if following.segment.start.minus(stretches[-1].segment.end) >= 0.0 and last is None:
+                last = Last(segment, Y, Yd, behind[2], stretch.happened)
+            Y, Yd, shift = behind
             if any(one.kind != "corner" for one in stretch.happened):
                 times.append((float(following.segment.start), shift))
-        return Carried(Y, Yd, times)
+        if last is not None:
+            Y, Yd = self._at_end(last, stretches[-1].segment, Y, Yd)
+        return Carried(Y, Yd, times, self._off, self._lost)
 
-    def _own_sizes(self, directions: Directions) -> np.ndarray:
+    def _at_end(
+        self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where something happens exactly at the end: a change may move it beyond the end, where it is not seen."""
+        before, system = last.segment, self.system
+        length = float(behind.end) - self.solution.t_start
+        moves = np.abs(last.shift) * self._changes.own > _ROUNDING * length
+        jumps = bool(
+            (np.abs(before.x[-1] - behind.x[0]) > _SAME * self._scale).any()
+            or (system.discrete(before.p) != system.discrete(behind.p)).any()
+        )
+        if not moves.any() or not (jumps or differ(Y, last.Y)):
+            return Y, Yd
+        names = " and ".join(sorted({one.component for one in last.happened}))
+        lost = moves & jumps
+        self._note([OffZero(float(behind.end), f"the event of {names}", moves, lost, np.zeros(Y.shape))])
+        if not self._sided:
+            return Y, Yd
+        is_later = last.shift > 0.0
+        return np.where(is_later, last.Y, Y), np.where(is_later, last.Yd, Yd)
+
+    def _note(self, off: list[OffZero]) -> np.ndarray | float:
+        """Keep what is at its zero; what is to be added to the derivatives of the states, if sides are followed."""
+        self._off += off
+        if not self._sided:
+            return 0.0
+        lost, more = beyond(off, len(self._lost))
+        self._lost[lost] = np.minimum(self._lost[lost], off[0].t if off else np.inf)
+        return more
+
+    def sizes(self) -> np.ndarray:
+        """Of the states and discrete states (n + d, 1): all above zero."""
+        discrete = np.abs(self.system.discrete_start)
+        return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
+
+    def own_sizes(self, directions: Directions) -> np.ndarray:
         """The change along each direction (M,) that is as large as the first of what it changes."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
@@ -120,25 +178,6 @@ class Carrier:
         changes = np.concatenate([directions.x, directions.discrete, directions.parameters])
         relative = (np.abs(changes) / scale[:, None]).max(axis=0)
         return 1.0 / np.where(relative > 0.0, relative, 1.0)
-
-    def _stretches(self) -> Iterator[Stretch]:
-        """Segments, each with what happened until the next one begins and changed modes or states."""
-        waiting = [o for o in self.solution._trajectory.occurrences if o.kind != "near-grazing"]
-        at, segments = 0, list(self.solution._segments)
-        for segment, following in zip(segments, [*segments[1:], None], strict=True):
-            # an event and the end of its segment are one instant but for that
-            rounding = 4.0 * math.ulp(float(segment.end))
-            # where events accumulate, the next segment begins at their limit
-            until = segment.end if following is None else following.start
-            recorded = []
-            while at < len(waiting) and waiting[at].instant.minus(segment.end) < -rounding:
-                if waiting[at].kind == "monitor" and waiting[at].instant.minus(segment.start) > 0.0:
-                    recorded.append(waiting[at])
-                at += 1
-            first = at
-            while at < len(waiting) and waiting[at].instant.minus(until) <= rounding:
-                at += 1
-            yield Stretch(segment, tuple(recorded), tuple(waiting[first:at]))
 
     def _started(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, event_times: EventTimes
@@ -151,43 +190,30 @@ class Carrier:
                     f"{one.component} happens at the start of the run, and its time depends on what is changed",
                     remedy="begin the run a little earlier or later",
                 )
-        if happened:
-            z = segment.z.copy()
-            for one in reversed(happened):
-                if one.kind not in ("monitor", "scheduled"):
-                    c, automaton = component_of(self.system, one)
-                    z[c] = automaton.modes.index(one.source)
-            before = happened[0].x_minus, self.system.discrete_start, z
-            rounds = self._rounds(before, Y, Yd, G, np.zeros(Y.shape[1]))
-            for batch in batches(happened):
-                rounds.at_appointment(segment.start, batch)
-            Y, Yd = rounds.Y, rounds.Yd
-        return self._projected(segment, Y, Yd, G), Yd
+        z = segment.z.copy()
+        for one in reversed(happened):
+            if one.kind not in ("monitor", "scheduled"):
+                c, automaton = component_of(self.system, one)
+                z[c] = automaton.modes.index(one.source)
+        x = happened[0].x_minus if happened else segment.x[0]
+        d = self.system.discrete_start if happened else self.system.discrete(segment.p)
+        rounds = self._rounds((x, d, z), Y, Yd, np.zeros(Y.shape[1]), np.abs(Y), is_start=True)
+        for batch in batches(happened):
+            rounds.at_appointment(segment.start, batch)
+        before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
+        Y = self._settled(rounds, segment, x, before)
+        return self._projected(segment, Y, rounds.Yd, G), rounds.Yd
 
     def _rounds(
         self,
         before: tuple[np.ndarray, np.ndarray, np.ndarray],
         Y: np.ndarray,
         Yd: np.ndarray,
-        G: np.ndarray,
         shift: np.ndarray,
+        large: np.ndarray,
+        is_start: bool = False,
     ) -> Rounds:
-        return Rounds(self.system, *before, Y, Yd, G, self._rates @ G, shift, self._scale)
-
-    def _refuse_inputs(self, G: np.ndarray) -> None:
-        """Derivatives of an input's shape by its parameters are not known."""
-        moving = {p.name for p, row in zip(self.system.model.parameters, G, strict=True) if row.any()}
-        starts = {part.name: part.start.names for part in self.system.model.discrete}
-        for declared in self.system.model.inputs:
-            names = {n for e in declared.expressions.values() for n in e.names}
-            used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
-            if used:
-                raise UsageError(
-                    f"{declared.subject} depends on {used[0]}, and its derivative by that is not known",
-                    remedy=f"leave {used[0]} out, or write the input as an expression of t"
-                    if declared.kind != "step"
-                    else f"leave {used[0]} out, or let a schedule at that time reset a discrete state",
-                )
+        return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, is_start, self._sided)
 
     # -- between events -------------------------------------------------------------------------------------
 
@@ -197,7 +223,10 @@ class Carrier:
         """Over a segment from one local time to another."""
         if end <= begin or not self.system.n:
             return Y
-        tape, directions = TangentTape(self.system, segment.z), seeds(self.system, segment, self._rates)
+        tape, directions = (
+            TangentTape(self.system, segment.z),
+            seeds(self.system, float(segment.origin), self._rates),
+        )
         n = self.system.n
         constant = np.concatenate([Yd, G])
         moving = [k for k in range(len(constant)) if constant[k].any()]
@@ -223,13 +252,17 @@ class Carrier:
         G: np.ndarray,
         event_times: EventTimes,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        segment, happened = stretch.segment, stretch.happened
+        segment = stretch.segment
         system, s = self.system, float(segment.s[-1])
         x = segment.x[-1]
+        happened = [one for one in stretch.happened if not is_recorded(system, one)]
+        if not happened and stretch.happened:
+            return Y, Yd, event_times.recorded(segment, stretch.happened[0], s, x, Y, Yd)
         shift = event_times.of(segment, happened, s, x, Y, Yd)
         before = rates_of(system, s, x, segment.p, segment.z)
-        Y = Y + np.outer(before, shift)
-        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y, Yd, G, shift)
+        moved = np.outer(before, shift)
+        large = np.maximum(np.abs(Y), np.abs(moved))
+        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y + moved, Yd, shift, large)
         groups = batches(happened)
         for k, batch in enumerate(groups):
             is_due = (
@@ -241,10 +274,29 @@ class Carrier:
                 rounds.at_appointment(following.start, batch)
             else:
                 rounds.at_end(segment, batch)
-        Y, Yd = rounds.Y, rounds.Yd
-        after = rates_of(system, float(following.s[0]), following.x[0], following.p, following.z)
-        Y = Y - np.outer(after, shift)
-        return self._projected(following, Y, Yd, G), Yd, shift
+        if rounds.has_jumped or is_knot(system, following.start):
+            Y = self._settled(rounds, following, x, before)
+        else:
+            Y = rounds.Y - np.outer(self._rates_at_start(following), rounds.shift)
+        return self._projected(following, Y, rounds.Yd, G), rounds.Yd, shift
+
+    def _rates_at_start(self, segment: Segment) -> np.ndarray:
+        return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)
+
+    def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Derivatives of the states behind an instant, where those that hold do so again; notes what is at its zero.
+
+        x, before : states and rates (n,) before the instant.
+        """
+        after = Place(
+            float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
+            rounds.Y, rounds.Yd, rounds.shift, rounds.large,
+        )  # fmt: skip
+        Y, off = off_zero(self._changes, after)
+        rates = self._rates_at_start(following)
+        if rounds.has_reset or (after.x != x).any() or differ(before, rates):
+            off = [*rounds.off, *off]
+        return Y + self._note(off) - np.outer(rates, rounds.shift)
 
     def _projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
@@ -260,26 +312,3 @@ class Carrier:
         out: list[Any] = [0.0] * system.n
         self._project(here, with_slopes(at, Y), p, segment.z, out)
         return values_and_slopes(out, Y.shape[1])[1]
-
-
-def at_start(solution: Solution) -> list[Occurrence]:
-    """What happened at the first instant of a run."""
-    first = solution._segments[0].start
-    found = []
-    for one in solution._trajectory.occurrences:
-        if one.instant.minus(first) > 0.0:
-            break
-        found.append(one)
-    return found
-
-
-def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
-    rates = system.flow(s, x, p, z)
-    if not system.holds(z):
-        return rates
-    out: list[Any] = [0.0] * system.n
-    module: Any = system.code.module
-    lifted = with_slopes(x, rates[:, None])
-    differentiated(module.project)(Dual(s, np.ones(1)), lifted, [float(v) for v in p], z, out)
-    return values_and_slopes(out, 1)[1][:, 0]

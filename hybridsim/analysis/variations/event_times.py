@@ -8,23 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.parameters import expression_slope
 from hybridsim.analysis.variations.rounds import component_of, guard_number, is_knot
-from hybridsim.analysis.variations.seeds import seeds
-from hybridsim.engine.tangents import TangentTape
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
 
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
-    from hybridsim.engine.system import System
 
 _ALIKE = 1e-7  # events at one instant are one event if their times change alike to that part
-_ROUNDING = 1e-11  # of what a change of everything by its own size does to a time: below it is rounding
-_AT_ZERO = 1e-9  # of a guard's terms
-_TANGENTIAL = (
-    1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
-)
 
 
 @dataclass(frozen=True)
@@ -36,22 +29,12 @@ class Shift:
 
 
 class EventTimes:
-    """Derivatives of event times in M directions.
+    """Derivatives of event times in M directions."""
 
-    Parameters
-    ----------
-    scale : (n,) sizes of the states.
-    own : (M,) the change along each direction that is as large as what it changes.
-    G : derivatives of the parameters (P, M).
-    rates : derivatives of the forcing's angular rates by the parameters.
-    """
-
-    def __init__(
-        self, system: System, scale: np.ndarray, own: np.ndarray, G: np.ndarray, rates: np.ndarray
-    ) -> None:
-        self.system = system
-        self._scale, self._own, self._G, self._rates = scale, own, G, rates
-        self._slopes = {p.name: row for p, row in zip(system.model.parameters, G, strict=True)}
+    def __init__(self, changes: Changes) -> None:
+        self.system, self._changes = changes.system, changes
+        parameters = self.system.model.parameters
+        self._slopes = {p.name: row for p, row in zip(parameters, changes.G, strict=True)}
 
     def of(
         self,
@@ -63,7 +46,7 @@ class EventTimes:
         Yd: np.ndarray,
     ) -> np.ndarray:
         """Of what happened at local time s of a segment (M,): of everything that came about by itself, the same."""
-        width = self._G.shape[1]
+        width = self._changes.G.shape[1]
         if not happened:
             return np.zeros(width)
         at = segment.origin.plus(s)
@@ -97,6 +80,13 @@ class EventTimes:
             )
         return first.values
 
+    def recorded(
+        self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
+    ) -> np.ndarray:
+        """Of a monitor that changes nothing (M,); NaN where it only touches its zero."""
+        shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
+        return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
+
     def _located(
         self,
         segment: Segment,
@@ -108,7 +98,7 @@ class EventTimes:
         is_first: bool,
     ) -> Shift | None:
         """Of an event at a zero of a guard or monitor; None for one that followed from another."""
-        system, n = self.system, self.system.n
+        system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:
             number = system.monitor_names.index(one.component)
@@ -117,15 +107,13 @@ class EventTimes:
             number = guard_number(system, one)
             if number < 0 or automaton.modes[segment.z[c]] != one.source:
                 return None
-        tape = TangentTape(system, segment.z, *(((), (number,)) if is_monitor else ((number,), ())))
-        found = tape(np.array([s]), x[None, :], segment.p, seeds(system, segment, self._rates))
-        row = found.slopes[0, n]
-        terms = np.append(row[:n] * found.values[0, :n], row[n])
-        size = np.abs(row[:n]) @ self._scale
-        if not is_first and abs(found.values[0, n]) > _AT_ZERO * size:
+        fixed = np.zeros(Y.shape[1])
+        at = Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, fixed, np.abs(Y))
+        (found,) = self._changes.of(at, *(((), (number,)) if is_monitor else ((number,), ())))
+        if not is_first and not found.is_near:
             return None
-        rate = terms.sum()
-        if not abs(rate) > _TANGENTIAL * np.abs(terms).sum():
+        rate = found.along(self.system.flow(s, x, segment.p, segment.z))
+        if rate == 0.0:
             if not is_first:
                 return None
             raise UsageError(
@@ -133,16 +121,11 @@ class EventTimes:
                 "not fall: the time of such an event has no derivatives",
                 remedy="take other parameters, or a run that ends before",
             )
-        changes = np.concatenate([Y, Yd, self._G])
-        by = np.concatenate([row[:n], row[n + 1 :]])
-        constants = np.abs(np.concatenate([system.discrete(segment.p), segment.p[: len(self._G)]]))
-        whole = size + np.abs(row[n + 1 :]) @ constants
-        sizes = np.abs(by) @ np.abs(changes) + _ROUNDING / _ALIKE * whole / self._own
-        return Shift(-(by @ changes) / rate, sizes / abs(rate))
+        return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
         """Of a scheduled event (M,): of each time of its schedule that it may be."""
-        width = self._G.shape[1]
+        width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:
             return [np.zeros(width)]

@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.analysis.variations.changes import Changes, Place
+from hybridsim.analysis.variations.off_zero import OffZero, rates_of
 from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.engine.reset_keys import added
-from hybridsim.engine.tangents import TangentTape
 from hybridsim.engine.timepair import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
 
-_AT_ZERO = 1e-9  # of what a guard's terms are: it is at its zero, and so has fired by itself
+_ALIKE = 1e-7  # guards fire together if their delays are alike to that part
 
 
 def is_knot(system: System, instant: Instant) -> bool:
@@ -53,9 +54,11 @@ class Rounds:
     ----------
     x, d, z : values (n,), (d,) and modes before.
     Y, Yd : derivatives (n, M), (d, M).
-    G, by_rates : derivatives of the parameters (P, M), and of the forcing's angular rates (R, M).
+    changes : of guards and monitors, with the derivatives of the parameters.
     shift : derivatives (M,) of the time of the instant.
-    scale : (n,) sizes of the states.
+    large : sizes (n, M) of the terms whose sums Y are.
+    is_start : whether what has fired was at its zero before anything moved.
+    sided : whether directions that move off a zero are followed on their own side of it.
     """
 
     def __init__(
@@ -66,13 +69,19 @@ class Rounds:
         z: np.ndarray,
         Y: np.ndarray,
         Yd: np.ndarray,
-        G: np.ndarray,
-        by_rates: np.ndarray,
+        changes: Changes,
         shift: np.ndarray,
-        scale: np.ndarray,
+        large: np.ndarray,
+        is_start: bool,
+        sided: bool,
     ) -> None:
         self.system, self.x, self.d, self.z, self.Y, self.Yd = system, x.copy(), d.copy(), z.copy(), Y, Yd
-        self._G, self._by_rates, self._shift, self._scale = G, by_rates, shift, scale
+        self._changes, self.shift, self.large, self._sided = changes, shift, large, sided
+        self._G, self._by_rates = changes.G, changes.rates @ changes.G
+        self._has_moved = is_start
+        self.has_reset = self.has_jumped = False
+        self.off: list[OffZero] = []
+        self._later: list[np.ndarray] = []
         self._reset = differentiated(system.code.module.reset)
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
@@ -86,19 +95,22 @@ class Rounds:
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
         scheduled = [one for one in happened if one.kind == "scheduled"]
-        pending = [one for one in happened if one.kind != "scheduled"]
+        pending = [one for one in happened if one.kind != "scheduled" and not is_recorded(self.system, one)]
         self.x = happened[0].x_minus.copy()
         if scheduled:
             self._apply(scheduled, p, s, origin)
         while pending:
-            fired = [one for one in pending if self._has_fired(one, p, s)]
+            self._later = []
+            fired = [one for one in pending if self._has_fired(one, p, s, origin)]
             fired = fired or pending
+            if self._sided and self._later:
+                self._delay(p, s)
             self._apply(fired, p, s, origin)
             pending = [one for one in pending if not any(one is other for other in fired)]
 
-    def _has_fired(self, one: Occurrence, p: np.ndarray, s: float) -> bool:
+    def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
         """Whether a guard or monitor is at its zero, or beyond: what is not follows from another reset."""
-        system, n = self.system, self.system.n
+        system = self.system
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
                 (),
@@ -113,10 +125,33 @@ class Rounds:
                 return True
             chosen = ((number,), ())
         values = self._with_discrete(p)
-        tape = TangentTape(system, self.z, *chosen)
-        found = tape(np.array([s]), self.x[None, :], values, np.eye(n + 1 + len(p), n))
-        value, size = float(found.values[0, n]), float(np.abs(found.slopes[0, n]) @ self._scale)
-        return abs(value) <= _AT_ZERO * size or (one.kind != "monitor" and value <= 0.0)
+        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
+        (found,) = self._changes.of(at, *chosen)
+        has_fired = found.is_near or (one.kind != "monitor" and found.value <= 0.0)
+        later = np.zeros(self.Y.shape[1])
+        if has_fired and self._has_moved and found.is_zero and found.moves.any():
+            is_guard = one.kind != "monitor"
+            name = f"guard {one.guard} of {one.component}" if is_guard else f"monitor {one.component}"
+            speed = found.along(rates_of(system, s, self.x, values, self.z))
+            other = found.moves & (found.by > 0.0) if is_guard else found.moves
+            is_lost = speed >= 0.0 or not is_guard
+            later = later if is_lost else np.where(other, -found.by / speed, 0.0)
+            lost = other if is_lost else np.zeros_like(other)
+            self.off.append(OffZero(origin + s, name, found.moves, lost, np.zeros(self.Y.shape)))
+        if has_fired:
+            self._later.append(later)
+        return has_fired
+
+    def _delay(self, p: np.ndarray, s: float) -> None:
+        """To when the guards of a round fire, where a change has moved them off their zero; if they do so together."""
+        later = self._later[0]
+        apart = np.any(
+            [np.abs(other - later) > _ALIKE * (np.abs(other) + np.abs(later)) for other in self._later], 0
+        )
+        if apart.any():
+            self.off.append(self.off[-1]._replace(lost=apart))
+        self.Y = self.Y + np.outer(rates_of(self.system, s, self.x, self._with_discrete(p), self.z), later)
+        self.shift = self.shift + later
 
     def _with_discrete(self, p: np.ndarray) -> np.ndarray:
         values = p.copy()
@@ -136,19 +171,22 @@ class Rounds:
             if one.kind not in ("monitor", "scheduled"):
                 c, automaton = component_of(system, one)
                 modes[c] = automaton.modes.index(one.target)
+                self.has_jumped |= not (automaton.has_surface or automaton.is_corner)
             if key not in system.resets:
                 continue
+            self.has_reset = self.has_jumped = True
             amounts = set(system.resets[added(key)][1]) if added(key) in system.resets else set()
             for part, names in ((key, set(system.resets[key][1]) - amounts), (added(key), amounts)):
                 if not names:
                     continue
                 out = list(before)
                 z = np.array([*self.z, system.resets[part][0]])
-                self._reset(Dual(s, self._shift), x, lifted, z, out)
+                self._reset(Dual(s, self.shift), x, lifted, z, out)
                 for name in names:
                     k = self._names.index(name)
                     after[k] = out[k] if part is key else after[k] + out[k]
         found, slopes = values_and_slopes(after, width)
+        self._has_moved = True
         self.x, self.d, self.Y, self.Yd = found[:n], found[n:], slopes[:n], slopes[n:]
         self.z = modes
 
@@ -186,6 +224,14 @@ def lifted_vector(
     found[layout.discrete_slice] = with_slopes(d, Yd)
     found[at : at + layout.phases] = with_slopes(p[at : at + layout.phases], by_angles)
     return found
+
+
+def is_recorded(system: System, one: Occurrence) -> bool:
+    """Whether something is a monitor that changes nothing."""
+    if one.kind != "monitor":
+        return False
+    key = "monitor", system.monitor_names.index(one.component)
+    return key not in system.resets and added(key) not in system.resets
 
 
 def component_of(system: System, one: Occurrence) -> tuple[int, Any]:

@@ -9,7 +9,6 @@ import numpy as np
 from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
 
 if TYPE_CHECKING:
-    from hybridsim.engine.pieces import Segment
     from hybridsim.engine.system import System
     from hybridsim.engine.timepair import Instant
 
@@ -25,7 +24,7 @@ def rate_slopes(system: System, at: Instant) -> np.ndarray:
     return values_and_slopes(out, P)[1]
 
 
-def seeds(system: System, segment: Segment, rates: np.ndarray) -> np.ndarray:
+def seeds(system: System, origin: float, rates: np.ndarray) -> np.ndarray:
     """Of the states, local time, discrete states and parameters, (n + 1 + layout.size, n + 1 + d + P).
 
     rates: what `rate_slopes` returns.
@@ -37,5 +36,5 @@ def seeds(system: System, segment: Segment, rates: np.ndarray) -> np.ndarray:
     found[n + 1 + layout.discrete_at : n + 1 + layout.discrete_at + d, n + 1 : n + 1 + d] = np.eye(d)
     found[n + 1 : n + 1 + P, n + 1 + d :] = np.eye(P)
     for k, row in enumerate(rates):  # an angle rate*origin
-        found[n + 1 + layout.phases_at + k, n + 1 + d :] = float(segment.origin) * row
+        found[n + 1 + layout.phases_at + k, n + 1 + d :] = origin * row
     return found

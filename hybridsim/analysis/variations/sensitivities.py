@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.analysis.variations.carried import Carrier, Directions, at_start
+from hybridsim.analysis.variations.both_sides import agreed
+from hybridsim.analysis.variations.carried import Carried, Carrier, Directions
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
-from hybridsim.analysis.variations.refused_limits import refuse_limits
+from hybridsim.analysis.variations.refused import refuse_limits
+from hybridsim.analysis.variations.stretches import at_start
 from hybridsim.analysis.wanted import words
 from hybridsim.arguments import flag
 from hybridsim.calls import refusing
@@ -37,6 +39,9 @@ class Sensitivities:
         (E,) of the instants inside the run at which modes or states changed; several events may share one.
     times_by_start, times_by_parameter : array
         (E, n + d), (E, P), derivatives of these times.
+    warnings : tuple of str
+        What the run lies exactly on, at its start, behind a jump or at its end, and what moves it off, if one side's
+        derivatives differ from those of the other: they are NaN then.
 
     Examples
     --------
@@ -53,6 +58,7 @@ class Sensitivities:
     times: np.ndarray
     times_by_start: np.ndarray
     times_by_parameter: np.ndarray
+    warnings: tuple[str, ...] = ()
 
 
 @refusing
@@ -94,6 +100,32 @@ def sensitivities(
     >>> hs.sensitivities(sol, ["mu"]).by_parameter.shape
     (2, 1)
     """
+    return _found(solution, parameters, starts_follow, agreed)
+
+
+def derivatives(
+    solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
+) -> Sensitivities:
+    """Of a run, on its own side where it lies exactly on a guard, a surface or the end."""
+    return _found(solution, parameters, starts_follow, _own_side)
+
+
+def _own_side(
+    _: Carrier, __: Directions, carried: Carried
+) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
+    end = np.concatenate([carried.x, carried.discrete])
+    shifts = np.array([shift for _, shift in carried.times])
+    return end, shifts.reshape(len(carried.times), end.shape[1]), []
+
+
+def _found(
+    solution: Solution,
+    parameters: Sequence[str] | None,
+    starts_follow: bool,
+    decide: Callable[
+        [Carrier, Directions, Carried], tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]
+    ],
+) -> Sensitivities:
     if not hasattr(solution, "_segments"):
         raise UsageError(f"solution is {solution!r}", remedy="give what hs.simulate returns")
     model, system = solution.model, solution._system
@@ -107,7 +139,7 @@ def sensitivities(
                 remedy=model.remedy_for_parameter(name),
             )
     _refuse(solution)
-    n, d, P = system.n, system.layout.discrete, len(chosen)
+    n, d = system.n, system.layout.discrete
     by_parameter = value_slopes(model, chosen)
     starts = start_slopes([s.start for s in model.states], model, by_parameter)
     happened = at_start(solution)
@@ -122,17 +154,24 @@ def sensitivities(
         np.concatenate([np.zeros((d, n)), np.eye(d), discrete_starts], axis=1),
         np.concatenate([np.zeros((len(names), n + d)), by_parameter], axis=1),
     )
-    carried = Carrier(solution).carry(directions)
-    end = np.concatenate([carried.x, carried.discrete])
-    shifts = np.array([shift for _, shift in carried.times]).reshape(len(carried.times), n + d + P)
+    carrier = Carrier(solution)
+    carried = carrier.carry(directions)
+    end, shifts, parted = decide(carrier, directions, carried)
+    states = (*solution.names, *(q.name for q in model.discrete))
+    changed = [*(f"the start of {name}" for name in states), *chosen]
     return Sensitivities(
-        (*solution.names, *(q.name for q in model.discrete)),
+        states,
         chosen,
         end[:, : n + d],
         end[:, n + d :],
         np.array([t for t, _ in carried.times]),
         shifts[:, : n + d],
         shifts[:, n + d :],
+        tuple(
+            f"{name}, and a change of {' or '.join(np.array(changed)[mask])} moves it off: derivatives are NaN where "
+            "those to both sides differ"
+            for name, mask in parted
+        ),
     )
 
 

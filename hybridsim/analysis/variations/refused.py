@@ -1,12 +1,18 @@
-"""Limits of series of events that derivatives are not carried through."""
+"""Limits of series of events that derivatives are not carried through, and inputs that they are not known by."""
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.errors import UsageError
 from hybridsim.solution.solution import Solution
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from hybridsim.model import Model
 
 # A series that was followed to its last thousand roundings of the time has all its derivatives in the events passed.
 _ROUNDINGS = 4096.0
@@ -36,3 +42,19 @@ def refuse_limits(solution: Solution) -> None:
                 )
         elif event.t > before:
             before = event.t
+
+
+def refuse_inputs(model: Model, G: np.ndarray) -> None:
+    """Refuse parameters that change an input's shape: the derivatives G (P, M) by them are not known."""
+    moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
+    starts = {part.name: part.start.names for part in model.discrete}
+    for declared in model.inputs:
+        names = {n for e in declared.expressions.values() for n in e.names}
+        used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
+        if used:
+            raise UsageError(
+                f"{declared.subject} depends on {used[0]}, and its derivative by that is not known",
+                remedy=f"leave {used[0]} out, or write the input as an expression of t"
+                if declared.kind != "step"
+                else f"leave {used[0]} out, or let a schedule at that time reset a discrete state",
+            )

@@ -1,0 +1,59 @@
+"""Whether the derivatives on both sides of a run agree where it lies exactly on a guard, a surface or the end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.errors import UsageError
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.variations.carried import Carried, Carrier, Directions
+
+_AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less agree
+_ROUNDING = 1e-11  # of the states' sizes, by a change of everything by its own size
+
+
+def agreed(
+    carrier: Carrier, directions: Directions, carried: Carried
+) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
+    """Derivatives (n + d, M) of the end and (E, M) of the times, NaN where two sides differ; and what parts them.
+
+    carried : on the side of the run, with what is at its zero. Each direction that moves that off is carried forward
+    and backward, each on its own side. The result's last part names what is at its zero, with a mask (M,) of the
+    directions along which something differs.
+    """
+    end = np.concatenate([carried.x, carried.discrete])
+    width = end.shape[1]
+    times = np.array([shift for _, shift in carried.times]).reshape(len(carried.times), width)
+    moves = np.any([one.moves for one in carried.off], axis=0) if carried.off else np.zeros(width, dtype=bool)
+    chosen = np.flatnonzero(moves)
+    if not len(chosen):
+        return end, times, []
+    count = len(chosen)
+    try:
+        both = carrier.carry(directions.both_ways(chosen), sided=True)
+    except UsageError:  # what is one event on the side of the run falls apart on the other
+        end[:, chosen], times[:, chosen] = np.nan, np.nan
+    else:
+        lost = np.minimum(both.lost[:count], both.lost[count:])
+        ends = np.concatenate([both.x, both.discrete])
+        shifts = np.array([shift for _, shift in both.times]).reshape(len(times), 2 * count)
+        sizes = carrier.sizes() / carrier.own_sizes(directions)[chosen]
+        end[:, chosen] = _meeting(ends[:, :count], -ends[:, count:], _ROUNDING * sizes, lost < np.inf)
+        length = carrier.solution.t_end - carrier.solution.t_start
+        at = np.array([t for t, _ in carried.times])
+        least = _ROUNDING * length / carrier.own_sizes(directions)[chosen]
+        times[:, chosen] = _meeting(shifts[:, :count], -shifts[:, count:], least, at[:, None] > lost)
+    differs = np.isnan(end).any(axis=0) | np.isnan(times).any(axis=0)
+    parted = [
+        (f"at t = {one.t:.9g} {one.name} is exactly at its zero", one.moves & differs) for one in carried.off
+    ]
+    return end, times, [(name, mask) for name, mask in parted if mask.any()]
+
+
+def _meeting(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    """What both sides agree on; NaN elsewhere, and of the directions that are lost."""
+    apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
+    return np.where(apart | lost, np.nan, 0.5 * (one + other))

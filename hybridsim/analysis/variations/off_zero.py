@@ -1,0 +1,218 @@
+"""States exactly on a guard or surface: what a change that moves them off makes of the run on the other side.
+
+A change to the side of the run leaves it as it is. One to the other side is followed for the time tau that it takes to
+come back, which is of first order: there the rates are others, and the states change by (f_there - f_here) tau.
+Where it does not come back, or a reset waits, the run on the other side is another one, and there is no derivative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.analysis.variations.changes import Changed, Changes, Place
+from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.reset_keys import added
+from hybridsim.engine.system import System
+from hybridsim.engine.tangents import TangentTape
+
+_SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less are the same
+
+
+class OffZero(NamedTuple):
+    """What is at its zero at time t, and what becomes of the directions (M,) that move it off.
+
+    moves : mask (M,) of these directions. lost : mask (M,) of those whose side the run does not come back from.
+    more : what is added to the derivatives (n, M) of the states on the side that the run is not on; elsewhere zero.
+    """
+
+    t: float
+    name: str
+    moves: np.ndarray
+    lost: np.ndarray
+    more: np.ndarray
+
+
+def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
+    rates = system.flow(s, x, p, z)
+    if not system.holds(z):
+        return rates
+    out: list[object] = [0.0] * system.n
+    project = differentiated(system.code.module.project)
+    project(Dual(s, np.ones(1)), with_slopes(x, rates[:, None]), [float(v) for v in p], z, out)
+    return values_and_slopes(out, 1)[1][:, 0]
+
+
+def differ(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether rates (n,) are not the same."""
+    return bool((np.abs(one - other) > _SAME * (np.abs(one) + np.abs(other))).any())
+
+
+def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
+    """Derivatives (n, M) of the states when all that hold do so again, and what is left at its zero."""
+    sides = _Sides(changes, at)
+    off = sides.surfaces()
+    return sides.at.Y, off + sides.guards()
+
+
+class _Sides:
+    """Both sides of what is at its zero at one place."""
+
+    def __init__(self, changes: Changes, at: Place) -> None:
+        self.changes, self.system, self.at = changes, changes.system, at
+        self.here = self._rates(at.z)
+
+    def guards(self) -> list[OffZero]:
+        """Guards that are at their zero without firing, and would on one side only, with an effect."""
+        places = [
+            (c, i, g)
+            for c, automaton in enumerate(self.system.automata)
+            if not automaton.has_surface
+            for i, g in enumerate(automaton.guards[self.at.z[c]])
+        ]
+        if not places:
+            return []
+        found = self.changes.of(self.at, tuple(g for _, _, g in places))
+        off = []
+        for (c, i, _), one in zip(places, found, strict=True):
+            if one.is_zero and one.moves.any():
+                off += self._guard(c, i, one)
+        return off
+
+    def surfaces(self) -> list[OffZero]:
+        """Surfaces from which the sides differ.
+
+        What moves off a surface that holds it comes back at once, by an impulse of the force that drives it there.
+        """
+        chosen = [
+            (k, c)
+            for k, c in enumerate(self.system.surface_of)
+            if min(self.system.automata[c].above, self.system.automata[c].below) >= 0
+        ]
+        if not chosen:
+            return []
+        free = self.at.z.copy()  # what holds a state replaces it in formulas
+        for _, c in chosen:
+            free[c] = self.system.automata[c].above
+        found = self.changes.of(replace(self.at, z=free), surfaces=tuple(k for k, _ in chosen))
+        off, rows, pushes, moved, at_limit = list[OffZero](), [], [], [], []
+        for (_, c), one in zip(chosen, found, strict=True):
+            automaton = self.system.automata[c]
+            above, below = (self._rates(self._with(c, mode)) for mode in (automaton.above, automaton.below))
+            if self.at.z[c] != automaton.hold:
+                if one.is_zero and one.moves.any() and differ(above, below):
+                    is_above = bool(self.at.z[c] == automaton.above)
+                    other, there = (one.by < 0.0, below) if is_above else (one.by > 0.0, above)
+                    speed = one.along(there)
+                    comes_back = speed > 0.0 if is_above else speed < 0.0
+                    off.append(self._off(automaton.name, one, other, there, speed if comes_back else 0.0))
+                if one.is_zero:
+                    at_limit.append(c)
+                continue
+            at_limit.append(c)
+            comes_back = one.row @ (above - self.here) < 0.0 < one.row @ (below - self.here)
+            if one.moves.any() and not (comes_back and _are_opposite(above - self.here, below - self.here)):
+                off.append(self._off(automaton.name, one, one.moves, self.here, 0.0))
+            else:
+                rows.append(one.row)
+                pushes.append(above - self.here)
+                moved.append(np.where(one.moves, one.by, 0.0))
+        if np.any(moved):
+            W, B = np.array(rows), np.array(pushes).T
+            Y = self.at.Y - B @ np.linalg.lstsq(W @ B, np.array(moved), rcond=None)[0]
+            self.at = replace(self.at, Y=Y)
+        for c in at_limit:
+            off += self._limits(c)
+        return off
+
+    def _guard(self, c: int, i: int, one: Changed) -> list[OffZero]:
+        automaton, m = self.system.automata[c], int(self.at.z[c])
+        choice = self.system.choose(c, m, i, self.at.s, self.at.x, self.at.p, self.at.z)
+        if choice < 0:
+            return []
+        name = f"guard {automaton.guard_names[m][i]} of {automaton.name}"
+        z, other = self._with(c, automaton.targets[m][i][choice]), one.moves & (one.by < 0.0)
+        there = self._rates(z)
+        if self._resets(c, m, i, choice):
+            return [self._off(name, one, other, there, 0.0)]
+        numbers = automaton.guards[z[c]]
+        for k, back in enumerate(self.changes.of(replace(self.at, z=z), numbers) if numbers else ()):
+            onward = self.system.choose(c, int(z[c]), k, self.at.s, self.at.x, self.at.p, z)
+            if onward < 0 or not back.is_zero or automaton.targets[z[c]][k][onward] != m:
+                continue
+            speed = back.along(there)
+            if speed < 0.0 and not self._resets(c, int(z[c]), k, onward) and (back.by >= 0.0)[other].all():
+                return [self._off(name, back, other, there, speed)] if differ(there, self.here) else []
+            if speed == 0.0 and automaton.is_corner and self._is_smooth(z):
+                return []
+        if not numbers and TangentTape(self.system, z).is_same(TangentTape(self.system, self.at.z)):
+            return []
+        return [self._off(name, one, other, there, 0.0)]
+
+    def _limits(self, c: int) -> list[OffZero]:
+        """Limits of what a surface holds, or would hold, that are exactly reached."""
+        automaton, off = self.system.automata[c], []
+        z = self._with(c, automaton.hold)
+        numbers = automaton.guards[automaton.hold]
+        held = self._rates(z)
+        for i, one in enumerate(self.changes.of(replace(self.at, z=z), numbers) if numbers else ()):
+            if not one.is_zero or not one.moves.any():
+                continue
+            speed = one.along(held)
+            name = f"guard {automaton.guard_names[automaton.hold][i]} of {automaton.name}"
+            if self.at.z[c] != automaton.hold:  # beyond its zero it holds for a while
+                if speed >= 0.0 or differ(held, self.here):
+                    off.append(self._off(name, one, one.moves & (one.by > 0.0), held, min(speed, 0.0)))
+                continue
+            slipping = (self._rates(self._with(c, mode)) for mode in (automaton.above, automaton.below))
+            if not (speed > 0.0 and any(not differ(rates, held) for rates in slipping)):
+                off.append(self._off(name, one, one.moves & (one.by < 0.0), held, 0.0))
+        return off
+
+    def _off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
+        """At its zero; on the other side of it a function that changes at a speed, or does not come back (0)."""
+        other = other & one.moves
+        t = self.at.origin + self.at.s
+        if speed == 0.0:
+            return OffZero(t, name, one.moves, other, np.zeros(self.at.Y.shape))
+        away = np.where(other, -one.by / speed, 0.0)
+        return OffZero(t, name, one.moves, other & False, np.outer(there - self.here, away))
+
+    def _resets(self, c: int, m: int, i: int, choice: int) -> bool:
+        key = ("choice", c, m, i, choice)
+        return key in self.system.resets or added(key) in self.system.resets
+
+    def _rates(self, z: np.ndarray) -> np.ndarray:
+        return rates_of(self.system, self.at.s, self.at.x, self.at.p, z)
+
+    def _with(self, c: int, mode: int) -> np.ndarray:
+        z = self.at.z.copy()
+        z[c] = mode
+        return z
+
+    def _is_smooth(self, z: np.ndarray) -> bool:
+        """Whether rates and their derivatives are the same in modes z: a corner as of x abs(x), of higher order."""
+        one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
+        return not any(differ(a, b) for a, b in zip(one, other, strict=True))
+
+
+def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
+    lengths = np.linalg.norm(one) * np.linalg.norm(other)
+    return bool(one @ other <= -(1.0 - _SAME) * lengths)
+
+
+def beyond(off: Sequence[OffZero], width: int) -> tuple[np.ndarray, np.ndarray | float]:
+    """Of what is at its zero at one place: the mask (M,) of directions that are lost, and what is added to the states.
+
+    A direction to the other side of several at once is lost: which comes back first changes what the others do.
+    """
+    lost, more, count = np.zeros(width, dtype=bool), np.zeros(1), np.zeros(width)
+    for one in off:
+        lost = lost | one.lost
+        more = more + one.more
+        count += one.more.any(axis=0)
+    return lost | (count > 1), more

@@ -1,0 +1,64 @@
+"""A run as derivatives are carried along it: its segments, and what happened between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.solution import Solution
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A segment, the monitors that were recorded along it, and what happened between its end and the next one."""
+
+    segment: Segment
+    recorded: tuple[Occurrence, ...]
+    happened: tuple[Occurrence, ...]
+
+
+class Last(NamedTuple):
+    """What happened exactly at the end of a run: the segment and derivatives before it, and those of its time."""
+
+    segment: Segment
+    Y: np.ndarray
+    Yd: np.ndarray
+    shift: np.ndarray
+    happened: tuple[Occurrence, ...]
+
+
+def stretches_of(solution: Solution) -> Iterator[Stretch]:
+    """Segments, each with what happened until the next one begins and changed modes or states."""
+    waiting = [o for o in solution._trajectory.occurrences if o.kind != "near-grazing"]
+    at, segments = 0, list(solution._segments)
+    for segment, following in zip(segments, [*segments[1:], None], strict=True):
+        # an event and the end of its segment are one instant but for that
+        rounding = 4.0 * math.ulp(float(segment.end))
+        # where events accumulate, the next segment begins at their limit
+        until = segment.end if following is None else following.start
+        recorded = []
+        while at < len(waiting) and waiting[at].instant.minus(segment.end) < -rounding:
+            if waiting[at].kind == "monitor" and waiting[at].instant.minus(segment.start) > 0.0:
+                recorded.append(waiting[at])
+            at += 1
+        first = at
+        while at < len(waiting) and waiting[at].instant.minus(until) <= rounding:
+            at += 1
+        yield Stretch(segment, tuple(recorded), tuple(waiting[first:at]))
+
+
+def at_start(solution: Solution) -> list[Occurrence]:
+    """What happened at the first instant of a run."""
+    first = solution._segments[0].start
+    found = []
+    for one in solution._trajectory.occurrences:
+        if one.instant.minus(first) > 0.0:
+            break
+        found.append(one)
+    return found
