@@ -44,16 +44,8 @@ def strike(settling: Settling, open_: set[int]) -> Failure | None:
             has_collided = has_collided or struck
     if has_collided:
         settling.jumped = True
-        open_ -= _set_off(settling)
-        open_ |= settling.take_sides()
+        settling.take_sides(open_)
     return None
-
-
-def _set_off(settling: Settling) -> set[int]:
-    """Friction contacts that have a velocity: an impact on their body may have given it to them."""
-    system, (values, bounds) = settling.system, _surfaces(settling)
-    moving = np.abs(values[:, 0]) > bounds[:, 0]
-    return {c for k, c in enumerate(system.surface_of) if moving[k] and not system.automata[c].is_unilateral}
 
 
 def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:

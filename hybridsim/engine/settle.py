@@ -29,6 +29,7 @@ from hybridsim.engine.first_modes import as_given, certainly_leaving
 from hybridsim.engine.guards_at_once import taken_at_once
 from hybridsim.engine.impact import strike
 from hybridsim.engine.jets import ORDER, UNIT
+from hybridsim.engine.kept_guards import kept
 from hybridsim.engine.meeting import (
     can_hold,
     is_one_motion,
@@ -101,14 +102,17 @@ class Settling:
         self.releases.locate(located)
         surfaces = self._surface_components()
         open_ = self._past_corners({c for c, _, _ in self._fired_guards()})
-        failure = self._transitions(open_ - surfaces, list(resets)) or self._first_modes(surfaces)
+        at_surfaces, leaving = self._at_surfaces(open_ & surfaces), open_ - surfaces
+        if leaving and at_surfaces:
+            leaving -= kept(self, leaving, at_surfaces)
+        failure = self._transitions(leaving, list(resets)) or self._first_modes(surfaces)
         if failure:
             return self._stop(*failure)
-        open_ = self._at_surfaces(open_ & surfaces)
+        open_ = at_surfaces
         if surfaces and (self.jumped or (self.at.z < 0).any()):
-            open_ |= self.take_sides()
+            self.take_sides(open_)
         while self._begins_round():
-            failure = strike(self, open_) or self._decide(open_)
+            failure = strike(self, open_) or self.decide(open_)
             if failure:
                 return self._stop(*(("inconsistent", lost) if lost else failure))
             take_corners(self)
@@ -128,7 +132,7 @@ class Settling:
                 return self._stop(*failure)
             open_ = leaving & surfaces
             if surfaces and self.jumped:
-                open_ |= self.take_sides()
+                self.take_sides(open_)
         return self._stop(*self._cascade())
 
     def _begins_round(self) -> bool:
@@ -181,28 +185,32 @@ class Settling:
             take_corners(self)
         return None
 
-    def take_sides(self) -> set[int]:
-        """Give every surface component the mode of the side it is on; return those that are on the surface."""
+    def take_sides(self, open_: set[int]) -> None:
+        """Give every surface component the mode of the side it is on.
+
+        open_: those to be decided on their surfaces. What a reset has moved off its surface leaves them, and what has
+        come to its surface joins them.
+        """
         at, system = self.at, self.system
         free = at.p.copy()
         free[system.layout.pin_at] = 0.0  # the states as they are, not as a holding mode would have them
         series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
-        found = set()
         for k, c in enumerate(system.surface_of):
             automaton, value = system.automata[c], series.surfaces[k, 0]
             if abs(value) <= series.surface_bounds[k, 0]:
                 if at.z[c] in (-1, automaton.hold) or self.on_surface[c] or automaton.is_unique:
-                    found.add(c)
+                    open_.add(c)
                 continue
             if value < 0.0 and automaton.is_unilateral:
-                found.add(c)
+                open_.add(c)
                 continue
+            open_.discard(c)
             self.on_surface[c] = False
             side = automaton.above if value > 0.0 else automaton.below
+            self.fired[automaton.guards[side][0]] = False  # it was located at its surface, before the reset
             if at.z[c] not in (-1, side):
                 self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
             at.z[c] = side
-        return found
 
     def _surface_components(self) -> set[int]:
         return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
@@ -303,7 +311,7 @@ class Settling:
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 
-    def _decide(self, open_: set[int]) -> tuple[str, str] | None:
+    def decide(self, open_: set[int]) -> tuple[str, str] | None:
         """Decide the clusters in which a component is open: it fired, leaves, or has no mode yet."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):

@@ -51,6 +51,8 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "moving-floor": ("", {"scipy-bdf": CLOSED, "scipy-lsoda": CLOSED}),
     "stepped-guard": (CLOSED, {}),
     "elastic-floor": (CLOSED, {}),
+    "guards-on-speeds": (CLOSED, {}),
+    "guards-on-gaps": (CLOSED, {}),
     "starts-at-zeros": (CLOSED, {}),
     "touch-beside-a-sample": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
     "sizes-of-sizes": ("", {"scipy-radau": TWO_VALUES}),

@@ -10,7 +10,8 @@ The rules, in words:
     choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors
     among them, are evaluated at x- and made at once; two that set one variable to different values are an error. Of
     guards that a reset has made negative, or that are so at a start, the first that is declared is taken. Automata
-    whose guard is negative in every combination of modes of the contacts at rest leave before these are decided. A
+    whose guard is negative in every combination of modes of the contacts at rest leave before these are decided, and so
+    do those that would if the contacts were decided first; a located guard that would not has only touched zero. A
     contact that has no mode yet is read on the side on which it is.
 2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
 3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
@@ -86,6 +87,7 @@ class Rules:
         if fired:
             leaving = self._leaving(point, now)
             fired = leaving if now != modes else self.sides.others(fired) | leaving
+            fired -= self._kept(point, now, fired)
         modes, due, is_located = now, list(resets), bool(fired)
         for _ in range(_MOST_ROUNDS):
             names = {
@@ -111,6 +113,18 @@ class Rules:
     def _leaving(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
         """The guards that are negative just after, those of corners and loads left out: these have their sides."""
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
+
+    def _kept(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
+        """Those of the located guards that are not negative just after if contacts are decided first."""
+        open_ = {c for c, _ in fired if self.components[c].surface}
+        if not open_ or all(c in open_ for c, _ in fired):
+            return set()
+        try:
+            point, modes = self._decide(point, modes, set(open_), {}, [])
+        except SimulationError:
+            return set()
+        leaving = self._leaving(point, self.sides.taken(point, modes, []))
+        return {(c, j) for c, j in fired - leaving if c not in open_}
 
     def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
         """Let automata leave whose guards are negative and free of the forces that are still to be decided."""

@@ -23,6 +23,7 @@ from hybridsim.testing.catalogue import (
     starts,
     stiffness,
     stops,
+    surface_guards,
     thresholds,
     timed,
 )
@@ -55,6 +56,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             oscillators,
             contacts,
             thresholds,
+            surface_guards,
             sliding,
             accumulation,
             impacts,

@@ -1,0 +1,60 @@
+"""Scenes of guards that come to zero together with the velocity of a contact, or with a gap."""
+
+from __future__ import annotations
+
+import math
+
+from hybridsim.testing.checks import exact_stick
+from hybridsim.testing.scene import Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Guards on speeds and at a release, and guards on gaps."""
+    return _speeds(), _gaps()
+
+
+def _speeds() -> Scene:
+    """v' = -1.5 from 1.2 and, at 0.8, from 0.5, then -0.5; w' = -0.8; u' = y + 1 in slip-, y - 1 in slip+."""
+    back = math.sqrt(5.4) - 2.0  # after its kick the third body moves by -0.7 + 2 s + s**2/2
+    turn = 0.8 + 1 / 3
+    events = (
+        (0.8, "thrown:after"),
+        (1.0, "kicked:after"),
+        (1.0, "h:slip-"),
+        (turn, "f:slip-"),
+        (1.25, "g:stick"),
+        (1.0 + back, "h:slip+"),
+    )
+    states = (
+        (0.9, (0.35, 0.28, 0.9, 0.0)),
+        (1.1, (0.05, 0.12, 1.1, -0.7 + 0.2 + 0.005)),
+        (2.0, (-0.5 * (2.0 - turn), 0.0, 2.0, (1.0 - back**2) / 2)),
+    )
+    checks = (("exact-stick", exact_stick("g", {"w": 0.0})),)
+    return Scene(
+        "guards-on-speeds",
+        "guards-on-speeds",
+        (0.0, 2.0),
+        Truth(events, states, checks=checks),
+        # the first speed comes to zero and is thrown back within one step
+        needs("contacts", "transitions", "exact-stick", "multiple-roots"),
+        start_is_event=False,
+    )
+
+
+def _gaps() -> Scene:
+    """h = 1 - t**2 until 1, then s - s**2; k = 2 - t**2 until the square root of 2, then rest."""
+    rest = math.sqrt(2.0)
+    states = (
+        (0.5, (0.75, -1.0, 1.75, -1.0, 0.0)),
+        (1.25, (0.1875, 0.5, 2 - 1.25**2, -2.5, 0.0)),
+        (1.75, (0.1875, -0.5, 0.0, 0.0, 0.0)),
+    )
+    return Scene(
+        "guards-on-gaps",
+        "guards-on-gaps",
+        (0.0, 1.75),
+        Truth(((1.0, "p:open"), (rest, "q:closed")), states),
+        needs("impacts", "transitions", "located"),
+        start_is_event=False,
+    )
