@@ -1,6 +1,7 @@
 """What happens at one instant in exact arithmetic is settled together, however the steps to it were rounded."""
 
 import random
+from decimal import Decimal
 
 import pytest
 
@@ -79,3 +80,58 @@ def test_a_bounce_at_a_time_known_beforehand_comes_before_what_is_due_then(integ
             0.8 * g + 2.0 - g * (end - 1.0), abs=1e-5 if "cvode" in integrator else 1e-9
         )
         assert sol.output("n", end) == (111.0 if more else 11.0)
+
+
+HELD = """
+[parameters]
+start = 0
+speed = 1
+floor = 1
+belt = 1
+level = 1
+period = 1
+[states]
+x = { start = "start", der = "speed" }
+h = { start = 0, der = "w" }
+w = { start = "floor", der = "p - 3" }
+v = { start = "belt", der = "2 - f" }
+y = { start = 0, der = "v" }
+[impacts.p]
+gap = "h - floor*t"
+restitution = 0.2
+[contacts.f]
+velocity = "v - belt - floor*t"
+normal = 1
+law = { name = "coulomb", mu = 3 }
+[components.a]
+initial = "on"
+[components.a.modes.on]
+guards.g = { expr = "level - x", then = [{ to = "off" }] }
+[components.a.modes.off]
+[clocks.c]
+period = "period"
+set = {}
+"""
+
+
+@pytest.mark.parametrize("integrator", ["rodas5p", "tsit5", "dop853", "taylor", "exact"])
+def test_what_is_held_stays_held_where_a_guard_meets_a_tick(integrator: str) -> None:
+    rng, model = random.Random(integrator), hs.Model.from_toml(HELD)
+    for _ in range(12):
+        number = {
+            name: Decimal(rng.randint(*of)) / 100
+            for name, of in {
+                "start": (-100, 100), "speed": (30, 150), "floor": (5, 90), "belt": (5, 90), "period": (20, 100),
+            }.items()
+        }  # fmt: skip
+        number["level"] = number["start"] + number["speed"] * 3 * number["period"]
+        end = 4 * number["period"]
+        numbers = {name: float(value) for name, value in number.items()}
+        run = hs.simulate(model, (0, float(end)), params=numbers, integrator=integrator)
+        assert run.status == "finished"
+        assert {name: parts[-1].mode for name, parts in run.modes.items()} == {
+            "a": "off", "p": "closed", "f": "stick",
+        }  # fmt: skip
+        values = dict(zip(run.names, run(run.t_end), strict=True))
+        assert values["h"] == pytest.approx(float(number["floor"] * end), rel=1e-14)
+        assert values["v"] == pytest.approx(float(number["belt"] + number["floor"] * end), rel=1e-14)
