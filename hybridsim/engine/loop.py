@@ -148,6 +148,11 @@ class ModeLoop:
             if self.leaper is not None and not self.accumulation.is_closing_in(float(self.origin)):
                 before = self.origin
                 arrived, stop = self._leap(self.leaper, target, appointment)
+                if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
+                    # a segment longer than that is none for compiled code: it may be that only this was in the way
+                    nearer, renewal = self._no_farther(target, appointment)
+                    if nearer != target:
+                        arrived, stop = self._leap(self.leaper, nearer, renewal)
                 if stop:
                     continue
                 if self.origin != before:
@@ -159,10 +164,7 @@ class ModeLoop:
                     self._take_over()
                 if arrived:
                     continue
-            reach = min(self.renewal, self.accumulation.reach(float(self.origin)))
-            if abs(target.minus(self.origin)) > reach:
-                target = self.origin.plus(reach if self.forward else -reach)
-                appointment = Appointment(target, (), is_renewal=True)
+            target, appointment = self._no_farther(target, appointment)
             segment = self._segment_run()
             bound = target.minus(self.origin)
             found: Located | None = None
@@ -184,6 +186,20 @@ class ModeLoop:
             step_size = segment.last_step if self.outcome.continuous else None
             if self.notices.takes_over:
                 self._take_over()
+
+    def _reach(self) -> float:
+        """How long a segment may be from here on."""
+        return min(self.renewal, self.accumulation.reach(float(self.origin)))
+
+    def _no_farther(
+        self, target: Instant, appointment: Appointment | None
+    ) -> tuple[Instant, Appointment | None]:
+        """A target and what is due there; where a segment to it would be too long, the end of a shorter one."""
+        reach = self._reach()
+        if abs(target.minus(self.origin)) <= reach:
+            return target, appointment
+        target = self.origin.plus(reach if self.forward else -reach)
+        return target, Appointment(target, (), is_renewal=True)
 
     def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
         """Where a segment ends, or is broken off for another method to go on."""
@@ -260,17 +276,18 @@ class ModeLoop:
         if appointment is None:
             self._tell(self.origin)
             return True, True
-        self.timetable.kept(target)
-        at, steps = self._at_target(target), self.record.counters.steps - steps
         error = self.outcome.x_error
-        if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
-            monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
-            found = Located(at, fired, monitors, True)
-            found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
-            fired = found.fired
-            if fired and self._adopt(target, self._settle_located(target, found, fired, []), x, ()):
-                return True, True
-            error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
+        if not appointment.is_renewal:
+            self.timetable.kept(target)
+            at, steps = self._at_target(target), self.record.counters.steps - steps
+            if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
+                monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
+                found = Located(at, fired, monitors, True)
+                found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
+                fired = found.fired
+                if fired and self._adopt(target, self._settle_located(target, found, fired, []), x, ()):
+                    return True, True
+                error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
         x = self.outcome.x
         settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
