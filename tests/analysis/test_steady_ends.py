@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 
 import pytest
@@ -30,3 +31,44 @@ def test_a_search_that_costs_too_much_ends(monkeypatch: pytest.MonkeyPatch) -> N
 def test_counts_of_periods_that_would_never_end_are_refused(name: str, count: float) -> None:
     with pytest.raises(hs.UsageError, match=f"{name} is .*\n?.*from 1 to 1000000"):
         hs.steady_state("dfcs", **{name: count})
+
+
+def two_tones(fast: float, further: str = "") -> hs.Model:
+    """A relaxation that is driven by two forcings, one of them by so much the faster."""
+    return hs.Model("tones", [hs.State("x", 0.0, f"-x{further} + sin(t) + sin({fast}*t)")])
+
+
+@pytest.fixture
+def most_steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The steps of the longest run of a search, whose allowance is a second."""
+    most, module = [0], import_module("hybridsim.analysis.steady.motion")
+    cost = module._cost_of
+
+    def counted(solution: hs.Solution) -> float:
+        most[0] = max(most[0], solution.stats["steps"])
+        return float(cost(solution))
+
+    monkeypatch.setattr(module, "_cost_of", counted)
+    monkeypatch.setattr(import_module("hybridsim.analysis.steady.steady_state"), "_ALLOWANCE", 1.0)
+    return most
+
+
+@pytest.mark.parametrize(
+    "model",
+    [two_tones(1e6 + 3), two_tones(1e6 * 2**0.5), two_tones(1e6 * 2**0.5, " - x**3")],
+    ids=["common", "none", "none-cubic"],
+)
+def test_a_run_that_would_cost_too_much_is_not_made(model: hs.Model, most_steps: list[int]) -> None:
+    """32 periods of the slow forcing are 3.2e7 of the fast one: some 1e8 steps, of which 1 in 1000 is taken."""
+    found = hs.steady_state(model, integrator="taylor")
+    assert found.kind == "not settled" and "a smaller settle" in found.message
+    assert most_steps[0] <= 100_000
+
+
+def test_a_smaller_settle_is_a_remedy(most_steps: list[int]) -> None:
+    """sin t and sin 1000 t drive x with amplitudes 1/sqrt(2) and 1e-3, whose maxima all but coincide."""
+    model = two_tones(1000.0)
+    assert hs.steady_state(model, integrator="tsit5", settle=64).kind == "not settled"
+    found = hs.steady_state(model, integrator="tsit5", settle=4)
+    assert found.kind == "periodic" and found.period == pytest.approx(2.0 * math.pi, rel=1e-12)
+    assert found.amplitude["x"] == pytest.approx(2**-0.5 + 1e-3, abs=2e-5)

@@ -36,7 +36,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
     """
     count = settle
     while True:
-        solution = motion.run(None, count * longest)
+        solution = motion.run(None, count * longest, is_carried=True)
         low, high = ranges(solution, 0.5 * solution.t_end)
         largest = sizes(solution)
         if (high - low <= RESTS * largest).all() and not solution._system.layout.discrete:
@@ -45,6 +45,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
                 f"equilibrium: nothing moves in the later half of {count} periods of the slowest forcing"
             )
             return Followed(rest, True, count, f"{message}; {_NO_PERIOD}")
+        motion.carry(solution)
         try:
             matrix = derivatives(solution, ()).by_start
         except UsageError as reason:

@@ -70,12 +70,18 @@ class CostsTooMuch(SimulationError):
     def __init__(self) -> None:
         super().__init__(
             "no motion was found with as much work as a search may take; declare the `duration` of some periods of the "
-            "motion, pass period=, a larger tol or a stiff integrator (rodas5p), or more max_periods, which allow more"
+            "motion, pass period=, a smaller settle, a larger tol or a stiff integrator (rodas5p), or more "
+            "max_periods, which allow more"
         )
 
 
 _TELLING = 100
-_CARRIED = 1e-3  # seconds, roughly, of a step through which derivatives are carried
+# A run is looked at after so many steps or events, then after twice as many, and so on: one that has taken that share
+# of the allowance, and at its pace would take more than all of it, is not gone on with.
+_LOOK, _SHARE = {"steps": 20000, "events": 20000}, 0.05
+# Seconds, roughly: of a step through which the derivative by one state is carried, of all of them over a segment's end,
+# and of a segment's end without derivatives.
+_CARRIED, _CARRIED_OVER, _RENEWED = 1e-5, 5e-4, 2e-4
 _WITHOUT_BOUND = 1e100  # in any unit: squares of it, and of products of a few such, are no numbers
 
 
@@ -142,8 +148,11 @@ class Motion:
         x = system.project(0.0, point.x, system.vector(Instant(0.0), point.discrete), point.numbers)
         return replace(point, x=x)
 
-    def run(self, start: Point | None, duration: float, **options: Any) -> Solution:
-        """From the time of a point on; None starts at time 0 where the model is declared to start."""
+    def run(self, start: Point | None, duration: float, is_carried: bool = False, **options: Any) -> Solution:
+        """From the time of a point on; None starts at time 0 where the model is declared to start.
+
+        is_carried: derivatives will be carried along the run, which has to be worth it.
+        """
         given: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
             given |= self._tolerances(start)
@@ -151,13 +160,14 @@ class Motion:
             given["z0"] = start.z or None
         begin = 0.0 if start is None else start.at
         self._spend(0.0, self._pace * float(duration))
+        given |= self.options | options
+        is_watched = "limits" not in given and self.allowance < math.inf
+        if is_watched:
+            given["limits"] = _LOOK
         with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
-            solution = simulate(
-                self.model,
-                (begin, begin + duration),
-                progress=self.progress,
-                **(given | self.options | options),
-            )
+            solution = simulate(self.model, (begin, begin + duration), progress=self.progress, **given)
+            while is_watched and solution.status == "limit":
+                solution = self._longer(solution, duration, is_carried)
         spent = float(_cost_of(solution))
         is_long = solution.stats["steps"] >= _TELLING  # a few steps tell nothing of how a longer run would be
         self._pace = spent / float(solution.t_end - begin) if is_long else 0.0
@@ -173,9 +183,20 @@ class Motion:
             )
         return solution
 
+    def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
+        """A run that has reached its limits, gone on with for as many steps again if it may come to its end."""
+        spent, reached = _cost_of(solution), solution.t_end - solution.t_start
+        spent += _cost_of_carrying(solution) if is_carried else 0.0
+        if spent >= _SHARE * self.allowance and spent * duration > (self.allowance - self._spent) * reached:
+            raise CostsTooMuch
+        return solution.resume(
+            limits={name: max(most, solution.stats[name]) for name, most in _LOOK.items()},
+            progress=self.progress,
+        )
+
     def carry(self, solution: Solution) -> None:
         """Count what it costs to carry derivatives along a run."""
-        self._spend(_CARRIED * solution.stats["steps"])
+        self._spend(_cost_of_carrying(solution))
 
     def _spend(self, seconds: float, ahead: float = 0.0) -> None:
         self._spent += seconds
@@ -193,7 +214,13 @@ class Motion:
 def _cost_of(solution: Solution) -> float:
     steps, events = solution.stats["steps"], solution.stats["events"]
     is_compiled = solution.stats["kernel_time"] > 0.0 and solution._trajectory.taken_over is None
-    return cost(0 if is_compiled else steps, steps if is_compiled else 0, events)
+    ends = max(solution.stats["restarts"] - events, 0)
+    return cost(0 if is_compiled else steps, steps if is_compiled else 0, events) + _RENEWED * ends
+
+
+def _cost_of_carrying(solution: Solution) -> float:
+    steps, ends = solution.stats["steps"], solution.stats["restarts"]
+    return _CARRIED * (1 + solution._system.n) * steps + _CARRIED_OVER * ends
 
 
 def point_at_end(solution: Solution) -> Point:
