@@ -2,14 +2,20 @@
 
 Eight Gauss points a piece are of order 16 at its end (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
 Differential Equations I, 2nd ed., 1993, section II.7); the equation is linear, so that each piece is one linear system.
+Where changes die out within a step, the pieces are carried one after the other by the formula of Radau IIA instead
+(E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, section IV.5).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+
+from hybridsim.errors import UsageError
 
 _STAGES = 8
 _RESOLVED = (
@@ -17,18 +23,43 @@ _RESOLVED = (
 )
 _TAIL = 2
 _NOISE = 1e-5  # below that, what halving does not make smaller is rounding
+_STIFF_RESOLVED = 1e-11  # there the end of a piece is no better than the last coefficients
+_STIFF_NOISE = 1e-9
 _HALVINGS = 30
 _CANCELS = (
     1e-5  # times _RESOLVED: a change of the states, in units of their sizes, of a few hundred roundings
 )
 
-_X, _W = legendre.leggauss(_STAGES)
-NODES, _B = 0.5 * (1.0 + _X), 0.5 * _W
-_COEFFICIENTS = np.linalg.inv(legendre.legvander(_X, _STAGES - 1))
-# a_ij: integral from 0 to c_i of the j-th Lagrange polynomial
-_A = np.array(
-    [0.5 * (legendre.legval(_X, legendre.legint(column, lbnd=-1.0))) for column in _COEFFICIENTS.T]
-).T
+_FADES = 32  # decays by a factor e a step of the run: explicit methods stay below that, stiff ones do not
+_AT_ONCE = 2**22  # entries of the linear systems that are solved together
+_TURNS = 2**17  # radians that are followed beside that: more take minutes
+
+
+class Collocation(NamedTuple):
+    """Nodes c_i on (0, 1), a_ij: the integral from 0 to c_i of the j-th Lagrange polynomial, b_j: that from 0 to 1.
+
+    coefficients : the Legendre coefficients of what has given values at the nodes.
+    """
+
+    nodes: np.ndarray
+    A: np.ndarray
+    b: np.ndarray
+    coefficients: np.ndarray
+
+    @classmethod
+    def at(cls, x: np.ndarray) -> Collocation:
+        """With nodes x on [-1, 1]."""
+        coefficients = np.linalg.inv(legendre.legvander(x, len(x) - 1))
+        integrals = [legendre.legint(column, lbnd=-1.0) for column in coefficients.T]
+        A = np.array([0.5 * legendre.legval(x, c) for c in integrals]).T
+        return cls(
+            0.5 * (1.0 + x), A, np.array([0.5 * legendre.legval(1.0, c) for c in integrals]), coefficients
+        )
+
+
+GAUSS = Collocation.at(legendre.leggauss(_STAGES)[0])
+# the zeros of P_s - P_(s-1), of which the last is the end of the piece
+RADAU = Collocation.at(np.sort(legendre.legroots([*[0.0] * (_STAGES - 1), -1.0, 1.0]).real))
 
 Slopes = Callable[[np.ndarray], np.ndarray]
 """Derivatives (m, n, n + q) of the rates at local times (m,): by the states, then by q things that stay constant."""
@@ -41,10 +72,22 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
     of what stays constant, all above zero.
     """
     begins, ends = knots[:-1], knots[1:]
+    fades, turns = _work(slopes, begins, ends)
+    if fades > _FADES * len(begins) + 2**12:
+        return stiff_transition(slopes, knots, scale, constants)
+    if turns > _FADES * len(begins) + _TURNS:
+        raise UsageError(
+            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) turn through some "
+            f"{turns:.1g} radians: following that takes minutes or longer",
+            remedy="take a shorter run, or slower parameters",
+        )
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
-        found, tails = _pieces(slopes, begins, ends, scale, constants)
+        count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _AT_ONCE
+        parts = np.array_split(np.arange(len(begins)), count)
+        done = [_pieces(slopes, begins[part], ends[part], scale, constants) for part in parts]
+        found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
         pieces.append((begins[good], found[good]))
@@ -64,23 +107,68 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
     return total
 
 
+def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
+    """By how many factors e the fastest change decays, and through how many radians or factors changes go at most."""
+    middle, lengths = 0.5 * (begins + ends), ends - begins
+    found = slopes(middle)
+    A = found[:, :, : found.shape[1]]
+    finite = np.isfinite(A).all(axis=(1, 2))
+    eigenvalues = np.linalg.eigvals(A[finite])
+    fastest = (
+        np.maximum(-eigenvalues.real, 0.0).max(axis=1, initial=0.0),
+        np.abs(eigenvalues).max(axis=1, initial=0.0),
+    )
+    return float(fastest[0] @ lengths[finite]), float(fastest[1] @ lengths[finite])
+
+
+def stiff_transition(
+    slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray
+) -> np.ndarray:
+    """The same where changes die out much faster than the run goes: one piece after the other, by Radau's formula.
+
+    It damps what it does not resolve, so that only what has not died out has to be resolved.
+    """
+    n = len(scale)
+    Y = np.eye(n, n + len(constants))
+    # in units of the states; the first n columns have the size of the largest, the others each their own
+    units = np.concatenate([scale, np.ones(len(constants))]) / scale[:, None]
+    least = np.concatenate([np.ones(n), _CANCELS / constants])
+    waiting = [(begin, end, np.inf) for begin, end in pairwise(knots)][::-1]
+    most = 16 * len(waiting) + 2**14
+    for _ in range(most):
+        if not waiting:
+            return Y
+        begin, end, before = waiting.pop()
+        length, middle = end - begin, 0.5 * (begin + end)
+        rates = _rates(RADAU, slopes, np.array([begin]), np.array([length]), Y)[0]
+        tails = (
+            length * np.abs(np.einsum("ci,iab->cab", RADAU.coefficients[-_TAIL:], rates)).max(axis=0) * units
+        )
+        sizes = (np.abs(Y) * units).max(axis=0)
+        sizes[:n] = sizes[:n].max()
+        tail = float((tails / np.maximum(sizes, least)).max())
+        is_rounding = 0.7 * before <= tail <= _STIFF_NOISE
+        if tail <= _STIFF_RESOLVED or is_rounding or not begin < middle < end:
+            Y = Y + length * np.einsum("i,iab->ab", RADAU.b, rates)
+        else:
+            waiting += [(middle, end, tail), (begin, middle, tail)]
+    raise UsageError(
+        f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) are not resolved in {most} "
+        "pieces",
+        remedy="take a shorter run, or slower parameters",
+    )
+
+
 def _pieces(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The transition (K, n, n + q) over each piece, and how well the rates are resolved on it (K,)."""
     lengths = ends - begins
-    times = begins[:, None] + lengths[:, None] * NODES
-    D = slopes(times.ravel())
-    count, n, width = len(begins), D.shape[1], D.shape[2]
-    D = D.reshape(count, _STAGES, n, width)
-    A = D[..., :n]
-    # K_i - h sum_j a_ij A_i K_j = A_i Y0 + B_i for the columns of Y
-    system = -lengths[:, None, None, None, None] * np.einsum("ij,kiab->kiajb", _A, A)
-    system = system.reshape(count, _STAGES * n, _STAGES * n) + np.eye(_STAGES * n)
-    rates = np.linalg.solve(system, D.reshape(count, _STAGES * n, width)).reshape(count, _STAGES, n, width)
-    moved = lengths[:, None, None] * np.einsum("i,kiab->kab", _B, rates)
+    rates = _rates(GAUSS, slopes, begins, lengths)
+    moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)
+    n = moved.shape[1]
     moved[:, :, :n] += np.eye(n)
-    tails = np.abs(np.einsum("ci,kiab->kcab", _COEFFICIENTS[-_TAIL:], rates)).max(axis=1)
+    tails = np.abs(np.einsum("ci,kiab->kcab", GAUSS.coefficients[-_TAIL:], rates)).max(axis=1)
     tails *= lengths[:, None, None] / scale[:, None]
     sizes = np.abs(moved) / scale[:, None]
     sizes[:, :, :n] *= scale
@@ -91,3 +179,20 @@ def _pieces(
     # what a change of a constant by its own size does: below that it cancels, and rounding is left
     relative = others / np.maximum(largest, _CANCELS / constants)
     return moved, np.maximum(resolved, relative.max(axis=1, initial=0.0))
+
+
+def _rates(
+    method: Collocation, slopes: Slopes, begins: np.ndarray, lengths: np.ndarray, Y: np.ndarray | None = None
+) -> np.ndarray:
+    """Rates (K, stages, n, n + q) at the nodes of each piece, of derivatives that begin it as Y, or as the identity."""
+    D = slopes((begins[:, None] + lengths[:, None] * method.nodes).ravel())
+    stages, count, n, width = len(method.nodes), len(begins), D.shape[1], D.shape[2]
+    D = D.reshape(count, stages, n, width)
+    A = D[..., :n]
+    if Y is not None:
+        D = A @ Y + np.concatenate([np.zeros_like(A), D[..., n:]], axis=-1)
+    # K_i - h sum_j a_ij A_i K_j = A_i Y0 + B_i for the columns of Y
+    system = -lengths[:, None, None, None, None] * np.einsum("ij,kiab->kiajb", method.A, A)
+    system = system.reshape(count, stages * n, stages * n) + np.eye(stages * n)
+    solved: np.ndarray = np.linalg.solve(system, D.reshape(count, stages * n, width))
+    return solved.reshape(count, stages, n, width)
