@@ -264,3 +264,91 @@ def test_a_monitor_that_passes_at_no_rate_leaves_the_derivatives_of_the_state() 
     assert found.by_parameter[:, 0] == pytest.approx([1.0, 3.0 * math.exp(-3.0)], rel=1e-9)
     assert found.times == pytest.approx([1.5, 2.0], rel=1e-5)
     assert found.times_by_parameter[:, 0] == pytest.approx([-1.0, math.nan], nan_ok=True)
+
+
+def stacked(start: str, pushes: str, law: str) -> hs.Sensitivities:
+    """v rubs on w with a limit of 10, and w on the floor with one of 5; masses are 1."""
+    model = hs.Model.from_toml(
+        f"""schema = 1
+name = "stacked"
+parameters = {{ {start}, {pushes} }}
+states.v = {{ start = "v0", der = "F - f" }}
+states.w = {{ start = "w0", der = "G + f - h" }}
+contacts.f = {{ velocity = "v - w", normal = 10, law = {{ {COULOMB} }} }}
+contacts.h = {{ velocity = "w", normal = 5, law = {{ {law} }} }}
+"""
+    )
+    return hs.sensitivities(hs.simulate(model, (0, 1)), ["v0", "G"])
+
+
+STATIC = 'name = "static-kinetic", mu_s = 1, mu_k = 0.5'
+
+
+def test_an_impulse_of_one_contact_onto_another_that_slips() -> None:
+    """Both are pushed along by 9 against 5. A change of v0 moves w by half of it; backward h turns and adds to that."""
+    found = stacked("v0 = 0.0, w0 = 0.0", "F = 9.0, G = 0.0", COULOMB)
+    assert np.isnan(differ(found, "v0", "h is exactly at its zero")).all()
+    assert found.by_parameter[:, 1] == pytest.approx([0.5, 0.5])
+
+
+def test_an_impulse_of_one_contact_that_sets_another_free() -> None:
+    """Pushed by 4, held by up to 5: forward f adds 10, w is free and kinetic friction of 2.5 does not stop it again."""
+    found = stacked("v0 = 0.0, w0 = 0.0", "F = 0.0, G = 4.0", STATIC)
+    assert np.isnan(differ(found, "v0", "h is exactly at its zero")).all()
+    assert found.by_parameter[:, 1].tolist() == [0.0, 0.0]
+
+
+def test_an_impulse_that_another_contact_withstands() -> None:
+    """With 2 against kinetic friction of 2.5 w comes back, and all rests again."""
+    found = stacked("v0 = 0.0, w0 = 0.0", "F = 0.0, G = 2.0", STATIC)
+    assert found.by_parameter.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert found.by_start.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert not found.warnings
+
+
+def test_a_stop_exactly_at_the_limit() -> None:
+    """v = -1 stops at 1/20, pushed by 10 against 10: it rests if pushed by less, and slips on if by more."""
+    model = hs.Model.from_toml(
+        f"""schema = 1
+name = "stop"
+parameters = {{ F = 10.0, q = 1.0 }}
+states.v = {{ start = -1, der = "F - f" }}
+states.y = {{ start = 0, der = "q" }}
+contacts.f = {{ velocity = "v", normal = 10, law = {{ {COULOMB} }} }}
+"""
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 1)))
+    assert np.isnan(differ(found, "F", "of f is exactly at its zero")[0])
+    assert found.by_parameter[:, 1] == pytest.approx([0.0, 1.0])
+
+
+def test_two_guards_at_the_start() -> None:
+    """From 1 - h on x is slow, x' = 1/2, up to 1, and z = x + t is set where that is 1: x(1) = 2 - 2 h, z(1) = 1.
+
+    From 1 + h on it is set at once: x(1) = 2 + h, z(1) = 1 + h.
+    """
+    slow = hs.Mode("slow", hs.Guard("up", "1 - x", hs.Choice("fast")), der={"x": 0.5})
+    model = hs.Model(
+        "two-guards",
+        states=[hs.State("x", "x0", 1), hs.State("z", 0, 0)],
+        parameters={"x0": 1.0, "q": 1.0},
+        components=[
+            hs.Component(
+                "g", [hs.Mode("fast", hs.Guard("down", "x - 1", hs.Choice("slow"))), slow], initial="fast"
+            ),
+            hs.Component(
+                "h",
+                [
+                    hs.Mode("a", hs.Guard("on", "1 - x - t", hs.Choice("b", reset={"z": "q*(x + t)"}))),
+                    hs.Mode("b"),
+                ],
+                initial="a",
+            ),
+        ],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 1)))
+    assert np.isnan(differ(found, "x0", "is exactly at its zero")).all()
+    assert found.by_parameter[:, 1] == pytest.approx([0.0, 1.0])
+    for x0, expected in ((0.75, [2.0, 0.0]), (1.25, [1.0, 1.0])):
+        beside = hs.sensitivities(hs.simulate(model, (0, 1), params={"x0": x0}))
+        assert beside.by_parameter[:, 0] == pytest.approx(expected)

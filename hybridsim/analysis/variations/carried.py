@@ -18,7 +18,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.event_times import EventTimes
-from hybridsim.analysis.variations.off_zero import OffZero, beyond, differ, off_zero, rates_of
+from hybridsim.analysis.variations.off_zero import OffZero, beyond, differ, limits_at_zero, off_zero, rates_of
 from hybridsim.analysis.variations.refused import refuse_inputs
 from hybridsim.analysis.variations.rounds import (
     Rounds,
@@ -277,7 +277,16 @@ class Carrier:
         if rounds.has_jumped or is_knot(system, following.start):
             Y = self._settled(rounds, following, x, before)
         else:
-            Y = rounds.Y - np.outer(self._rates_at_start(following), rounds.shift)
+            changed = {
+                component_of(system, one)[0] for one in happened if one.kind not in ("monitor", "scheduled")
+            }
+            surfaces = [c for c in sorted(changed) if system.automata[c].has_surface]
+            more = (
+                self._note(limits_at_zero(self._changes, _place(rounds, following), surfaces))
+                if surfaces
+                else 0.0
+            )
+            Y = rounds.Y + more - np.outer(self._rates_at_start(following), rounds.shift)
         return self._projected(following, Y, rounds.Yd, G), rounds.Yd, shift
 
     def _rates_at_start(self, segment: Segment) -> np.ndarray:
@@ -288,10 +297,7 @@ class Carrier:
 
         x, before : states and rates (n,) before the instant.
         """
-        after = Place(
-            float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
-            rounds.Y, rounds.Yd, rounds.shift, rounds.large,
-        )  # fmt: skip
+        after = _place(rounds, following)
         Y, off = off_zero(self._changes, after)
         rates = self._rates_at_start(following)
         if rounds.has_reset or (after.x != x).any() or differ(before, rates):
@@ -312,3 +318,11 @@ class Carrier:
         out: list[Any] = [0.0] * system.n
         self._project(here, with_slopes(at, Y), p, segment.z, out)
         return values_and_slopes(out, Y.shape[1])[1]
+
+
+def _place(rounds: Rounds, following: Segment) -> Place:
+    """Behind an instant."""
+    return Place(
+        float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
+        rounds.Y, rounds.Yd, rounds.shift, rounds.large,
+    )  # fmt: skip

@@ -59,11 +59,18 @@ def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
     return sides.at.Y, off + sides.guards()
 
 
+def limits_at_zero(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
+    """Limits of what has just come to hold, or to pass its surface, that are exactly reached."""
+    sides = _Sides(changes, at)
+    return [one for c in components for one in sides.limits(c)]
+
+
 class _Sides:
     """Both sides of what is at its zero at one place."""
 
     def __init__(self, changes: Changes, at: Place) -> None:
-        self.changes, self.system, self.at = changes, changes.system, at
+        self.changes, self.system, self.at, self.before = changes, changes.system, at, at
+        self.pushed = np.zeros(at.Y.shape[1], dtype=bool)  # directions with impulses of what holds again
         self.here = self._rates(at.z)
 
     def guards(self) -> list[OffZero]:
@@ -76,11 +83,18 @@ class _Sides:
         ]
         if not places:
             return []
-        found = self.changes.of(self.at, tuple(g for _, _, g in places))
+        numbers = tuple(g for _, _, g in places)
+        found, before = self.changes.of(self.at, numbers), self.changes.of(self.before, numbers)
         off = []
-        for (c, i, _), one in zip(places, found, strict=True):
+        for (c, i, _), one, earlier in zip(places, found, before, strict=True):
             if one.is_zero and one.moves.any():
                 off += self._guard(c, i, one)
+            if (
+                one.is_zero and (earlier.moves & self.pushed).any()
+            ):  # it may fire before what holds does so again
+                for other in self._guard(c, i, earlier):
+                    lost = (other.lost | other.more.any(axis=0)) & self.pushed
+                    off.append(other._replace(lost=lost, more=np.zeros_like(other.more)))
         return off
 
     def surfaces(self) -> list[OffZero]:
@@ -99,34 +113,86 @@ class _Sides:
         for _, c in chosen:
             free[c] = self.system.automata[c].above
         found = self.changes.of(replace(self.at, z=free), surfaces=tuple(k for k, _ in chosen))
-        off, rows, pushes, moved, at_limit = list[OffZero](), [], [], [], []
-        for (_, c), one in zip(chosen, found, strict=True):
+        off, rows, pushes, moved, at_limit, passed, holding, loose = (
+            list[OffZero](),
+            [],
+            [],
+            [],
+            [],
+            [],
+            [],
+            [],
+        )
+        for (k, c), one in zip(chosen, found, strict=True):
             automaton = self.system.automata[c]
             above, below = (self._rates(self._with(c, mode)) for mode in (automaton.above, automaton.below))
             if self.at.z[c] != automaton.hold:
-                if one.is_zero and one.moves.any() and differ(above, below):
-                    is_above = bool(self.at.z[c] == automaton.above)
-                    other, there = (one.by < 0.0, below) if is_above else (one.by > 0.0, above)
-                    speed = one.along(there)
-                    comes_back = speed > 0.0 if is_above else speed < 0.0
-                    off.append(self._off(automaton.name, one, other, there, speed if comes_back else 0.0))
                 if one.is_zero:
                     at_limit.append(c)
+                    if differ(above, below):
+                        passed.append((k, c, above, below))
                 continue
             at_limit.append(c)
             comes_back = one.row @ (above - self.here) < 0.0 < one.row @ (below - self.here)
-            if one.moves.any() and not (comes_back and _are_opposite(above - self.here, below - self.here)):
+            comes_back &= _are_opposite(above - self.here, below - self.here)
+            if not comes_back:
+                loose.append(c)
+            if one.moves.any() and not comes_back:
                 off.append(self._off(automaton.name, one, one.moves, self.here, 0.0))
             else:
+                holding.append((c, one))
                 rows.append(one.row)
                 pushes.append(above - self.here)
                 moved.append(np.where(one.moves, one.by, 0.0))
+        before = self.before
         if np.any(moved):
             W, B = np.array(rows), np.array(pushes).T
-            Y = self.at.Y - B @ np.linalg.lstsq(W @ B, np.array(moved), rcond=None)[0]
-            self.at = replace(self.at, Y=Y)
+            Y = before.Y - B @ np.linalg.lstsq(W @ B, np.array(moved), rcond=None)[0]
+            self.at, self.pushed = replace(before, Y=Y), np.any(moved, axis=0)
+            off += [
+                one
+                for c, held in holding
+                for other in loose
+                if c != other
+                for one in self._freed(c, held, other)
+            ]
+        for k, c, above, below in passed:
+            both = [self.changes.of(replace(at, z=free), surfaces=(k,))[0] for at in (before, self.at)]
+            off += self._passed(c, both, above, below)
         for c in at_limit:
-            off += self._limits(c)
+            off += self.limits(c)
+        return off
+
+    def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
+        """A surface that the run leaves to one side, before and behind the impulses of what holds again.
+
+        On the other side, directions with impulses do not come back by themselves.
+        """
+        pushed = self.pushed
+        name, is_above = self.system.automata[c].name, bool(self.at.z[c] == self.system.automata[c].above)
+        there = below if is_above else above
+        off = []
+        for one, mask, is_pushed in (
+            (both[0], pushed, True),
+            (both[1], pushed, True),
+            (both[1], ~pushed, False),
+        ):
+            moves = one.moves & mask
+            if moves.any():
+                other = moves & (one.by < 0.0 if is_above else one.by > 0.0)
+                speed = one.along(there)
+                comes_back = not is_pushed and (speed > 0.0 if is_above else speed < 0.0)
+                off.append(self._off(name, one, other, there, speed if comes_back else 0.0))
+        return off
+
+    def _freed(self, c: int, one: Changed, other: int) -> list[OffZero]:
+        """What holds and would not do so again, where the impulse of another one is more than it takes."""
+        automaton, off = self.system.automata[c], []
+        numbers = self.system.automata[other].guards[self.system.automata[other].hold]
+        for mode, mask in ((automaton.above, one.by > 0.0), (automaton.below, one.by < 0.0)):
+            found = self.changes.of(replace(self.before, z=self._with(c, mode)), numbers) if numbers else []
+            if any(limit.value < 0.0 and not limit.is_zero for limit in found):
+                off.append(self._off(self.system.automata[other].name, one, mask, self.here, 0.0))
         return off
 
     def _guard(self, c: int, i: int, one: Changed) -> list[OffZero]:
@@ -153,7 +219,7 @@ class _Sides:
             return []
         return [self._off(name, one, other, there, 0.0)]
 
-    def _limits(self, c: int) -> list[OffZero]:
+    def limits(self, c: int) -> list[OffZero]:
         """Limits of what a surface holds, or would hold, that are exactly reached."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)

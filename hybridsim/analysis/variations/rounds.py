@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
-from hybridsim.analysis.variations.off_zero import OffZero, rates_of
+from hybridsim.analysis.variations.off_zero import OffZero, off_zero, rates_of
 from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.gathering import LIMIT
 from hybridsim.engine.reset_keys import added
@@ -104,7 +104,7 @@ class Rounds:
             fired = [one for one in pending if self._has_fired(one, p, s, origin)]
             fired = fired or pending
             if self._sided and self._later:
-                self._delay(p, s)
+                self._delay(p, s, origin, fired)
             self._apply(fired, p, s, origin)
             pending = [one for one in pending if not any(one is other for other in fired)]
 
@@ -142,15 +142,21 @@ class Rounds:
             self._later.append(later)
         return has_fired
 
-    def _delay(self, p: np.ndarray, s: float) -> None:
-        """To when the guards of a round fire, where a change has moved them off their zero; if they do so together."""
-        later = self._later[0]
-        apart = np.any(
-            [np.abs(other - later) > _ALIKE * (np.abs(other) + np.abs(later)) for other in self._later], 0
-        )
-        if apart.any():
-            self.off.append(self.off[-1]._replace(lost=apart))
-        self.Y = self.Y + np.outer(rates_of(self.system, s, self.x, self._with_discrete(p), self.z), later)
+    def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
+        """To when the guards of a round fire, where a change has moved them off their zero.
+
+        They have to do so together, and nothing else may happen before that.
+        """
+        later, values = self._later[0], self._with_discrete(p)
+        apart = [np.abs(other - later) > _ALIKE * (np.abs(other) + np.abs(later)) for other in self._later]
+        lost, names = np.any(apart, axis=0), [f"guard {one.guard} of {one.component}" for one in fired]
+        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
+        for one in off_zero(self._changes, at)[1] if later.any() else ():
+            if one.name not in names:
+                lost |= (one.lost | one.more.any(axis=0)) & (later > 0.0)
+        if lost.any():
+            self.off.append(self.off[-1]._replace(lost=lost))
+        self.Y = self.Y + np.outer(rates_of(self.system, s, self.x, values, self.z), later)
         self.shift = self.shift + later
 
     def _with_discrete(self, p: np.ndarray) -> np.ndarray:
