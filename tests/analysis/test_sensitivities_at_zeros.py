@@ -252,6 +252,27 @@ def test_an_event_exactly_at_the_end(then: hs.Choice, rest: dict, expected: list
     assert found.times_by_parameter == pytest.approx(np.array([[-1.0, 0.0]]))
 
 
+@pytest.mark.parametrize("sevenths", [1, 2, 28, 29, 38])
+def test_an_event_at_the_end_but_for_rounding(sevenths: int) -> None:
+    """x' = r from 1/10 is 1/10 + r at the end, or an ulp before it: from then on x' = 3."""
+    r = sevenths / 7
+    model = hs.Model(
+        "near",
+        states=[hs.State("x", "x0", "r"), hs.State("y", 0, "q")],
+        parameters={"x0": 0.1, "q": 2.0, "r": r, "c": 0.1 + r},
+        components=[
+            hs.Component(
+                "g",
+                [hs.Mode("a", hs.Guard("end", "c - x", hs.Choice("b"))), hs.Mode("b", der={"x": 3})],
+                initial="a",
+            )
+        ],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 1)), ["x0"])
+    assert found.by_parameter[:, 0] == pytest.approx([math.nan, 0.0], nan_ok=True)
+    assert "x0" in found.warnings[0]
+
+
 def test_a_monitor_that_passes_at_no_rate_leaves_the_derivatives_of_the_state() -> None:
     """The cube of x - 1 passes zero without a rate: its time has no derivative. All else has one."""
     model = hs.Model(

@@ -11,6 +11,7 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -126,7 +127,8 @@ class Carrier:
             if following is None:
                 break
             behind = self._through(stretch, following.segment, Y, Yd, G, event_times)
-            if following.segment.start.minus(stretches[-1].segment.end) >= 0.0 and last is None:
+            end = stretches[-1].segment.end  # of which an event may be short by rounding
+            if following.segment.start.minus(end) >= -4.0 * math.ulp(float(end)) and last is None:
                 last = Last(segment, Y, Yd, behind[2], stretch.happened)
             Y, Yd, shift = behind
             if any(one.kind != "corner" for one in stretch.happened):
