@@ -66,6 +66,7 @@ class Located:
     monitors : their sides just before it, and those to which the motion leads them.
     is_met : whether what is due beforehand falls on it.
     inputs : the run-time vector with the inputs as they were before a jump; None where `at` has them so.
+    waiting : components whose loads are zero and wait for schedules that are due.
     """
 
     at: Situation
@@ -73,6 +74,11 @@ class Located:
     monitors: MonitorSides
     is_met: bool
     inputs: np.ndarray | None = None
+    waiting: frozenset[int] = frozenset()
+
+    def scope(self, system: System) -> set[int]:
+        """The components that are decided before what is due."""
+        return set(range(len(system.automata))) - self.waiting
 
 
 def coincident(

@@ -428,7 +428,8 @@ class ModeLoop:
         at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
-        settling = Settling(self.system, at, at.z.copy(), self.forward, inputs=found.inputs)
+        scope = found.scope(self.system)
+        settling = Settling(self.system, at, at.z.copy(), self.forward, scope, found.inputs)
         settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
         return settling.run(fired, resets)
 

@@ -28,7 +28,8 @@ def on_new_pieces(
     """
     if schedules:
         waiting = _loads_at_zero(system, found)
-        found = replace(found, fired={g: n for g, n in found.fired.items() if system.owner[g] not in waiting})
+        fired = {g: n for g, n in found.fired.items() if system.owner[g] not in waiting}
+        found = replace(found, fired=fired, waiting=waiting)
     if not system.signals:
         return found
     discrete, error = system.discrete(found.at.p), math.ulp(float(instant))
@@ -52,7 +53,7 @@ def on_new_pieces(
     return replace(found, at=at, fired=fired, inputs=before)
 
 
-def _loads_at_zero(system: System, found: Located) -> set[int]:
+def _loads_at_zero(system: System, found: Located) -> frozenset[int]:
     """The components at whose zero the run would end."""
     modes = zip(system.automata, found.at.z.tolist())
     ends = [
@@ -62,4 +63,4 @@ def _loads_at_zero(system: System, found: Located) -> set[int]:
             message and g in found.fired for g, message in zip(automaton.guards[mode], automaton.fatal[mode])
         )
     ]
-    return set(ends)
+    return frozenset(ends)

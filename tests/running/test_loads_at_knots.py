@@ -95,6 +95,24 @@ def test_a_load_that_a_schedule_renews_at_its_zero(integrator):
     assert sol(2.5)[1] == pytest.approx(50 - 20 * (0.5 + 0.5 + 0.375), rel=1e-9)
 
 
+COUNTING = {
+    "monitor": '[monitors.m]\nexpr = "y"\naction = "reset"\nreset = { n = "+= 1" }\n',
+    "guard": "[components.c.modes.a]\ninitial = true\n"
+    'guards.g = { expr = "y", then = { to = "b", reset = { n = "+= 1" } } }\n[components.c.modes.b]\n',
+}
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("what", COUNTING)
+def test_a_load_waits_for_its_schedule_whatever_else_is_zero(what, integrator):
+    """y = 1 - t comes to zero with the load; what it sets off says nothing of the load."""
+    more = '[states.y]\nstart = 1\nder = "-1"\n[discrete]\nbegan = 0\nn = 0\n'
+    more += '[schedules.s]\ntimes = [1]\nreset = { began = "t" }\n' + COUNTING[what]
+    sol = hs.simulate(sliding("P*(1 - t + began)", more=more), (0, 1.5), integrator=integrator, rtol=1e-10)
+    assert (sol.status, sol.output("n", 1.5)) == ("finished", 1.0)
+    assert sol(1.5)[1] == pytest.approx(50 - 20 * (0.5 + 0.375), rel=1e-9)
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("load", ["max(P*(1 - t), 0)", "50*max(1 - t, 0)", "P*max(1 - t, 0)"])
 def test_a_body_at_rest_stays_where_its_load_ends_unless_a_force_grows(load, integrator):
