@@ -152,8 +152,7 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
         return Explanation(event, (), (), _without_guards(solution, event, together), state)
     stage, change = place.stage, place.change
     at = stage.before
-    shown = sorted(fired) if stage.fired else []
-    fired_views = tuple(views(system, at, segment.z, shown, np.zeros(system.guard_count, int)))
+    fired_views = tuple(views(system, at, segment.z, sorted(stage.fired), np.zeros(system.guard_count, int)))
     decision = _decision(place, occurrence)
     looks = decision.looks if decision is not None else []
     candidates = tuple(candidate(system, decision, look) for look in looks if decision is not None)

@@ -11,6 +11,9 @@ import numpy as np
 
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.jets import UNIT
+from hybridsim.engine.located import Located
+from hybridsim.engine.monitor_sides import MonitorSides
+from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.rows import evaluate_rows
 from hybridsim.integrators.base import Integrator
@@ -32,14 +35,14 @@ class Stage:
     Parameters
     ----------
     before : the situation that it began with.
-    fired : whether guards were located at zero.
+    fired : numbers of the guards that were located at zero.
     due : in words, what set it off other than guards at zero; empty where nothing did.
     """
 
     before: Situation
     settling: Watched
     outcome: Outcome
-    fired: bool = False
+    fired: tuple[int, ...] = ()
     due: str = ""
 
     @property
@@ -72,7 +75,7 @@ def place_of(
     number = next(k for k, o in enumerate(instant.transitions) if o is occurrence)
     if number in found:
         return found[number]
-    return Place(stages[0], None) if fired else None
+    return Place(stages[0], None) if fired and stages else None
 
 
 def _matched(
@@ -104,7 +107,11 @@ class _Instant:
     def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
         self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
         self.transitions = [o for o in together if o.kind == "transition"]
+        self.instant, self.is_general = together[0].instant, type(run.method).run is Integrator.run
         model = self.system.model
+        declared = [schedule.name for schedule in model.schedules]
+        self.schedules = tuple(declared.index(o.component) for o in together if o.kind == "scheduled")
+        self.knots = _knots(self.system, segment, self.instant, self.task.forward)
         names = {o.component: o.direction for o in together if o.kind == "monitor"}
         resetting = [
             k
@@ -122,53 +129,52 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Of guards that were located at zero, and monitors."""
-        if not (fired or self.stopping):
+        """Of guards that were located at zero, and monitors; on the pieces of inputs that begin there."""
+        at = situation(self.system, self.segment, fired)
+        found = self._nothing(at, {g: k for k, g in enumerate(fired)})
+        if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
+            found = on_new_pieces(self.system, self.instant, found, self.schedules, self.task.forward)
+        if not (found.fired or self.stopping):
             return []
-        return [self._settled(situation(self.system, self.segment, fired), fired, self.stopping, ())]
+        return [self._settled(found, self.stopping, (), begins=found.inputs is not None)]
+
+    def _nothing(self, at: Situation, fired: dict[int, int] | None = None) -> Located:
+        """What was located where no monitor decides."""
+        monitors = self.system.model.monitors
+        none = MonitorSides.of(monitors, np.zeros(len(monitors), dtype=np.int64))
+        return Located(at, fired or {}, none, True)
 
     def crossed(self, stage: Stage) -> Stage | None:
-        """Of the resets of monitors that a stage carried to their other side; None where it did so to none."""
+        """Of the resets of monitors that a stage carried off their sides; None where it did so to none."""
         sides = stage.outcome.monitor_sides
-        crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] == way]
+        crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] != -way]
         if not crossed:
             return None
         s, of = stage.before.s, stage.outcome
         at = Situation(s, of.x.copy(), of.p, of.z.copy(), of.x_error, math.ulp(s))
-        return self._settled(at, [], crossed, ())
+        return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
         """Of what was due at the instant, and what its resets led to; `first`: the first transition of it."""
-        system, segment, forward = self.system, self.segment, self.task.forward
-        names = [schedule.name for schedule in system.model.schedules]
-        scheduled = [o for o in self.together if o.kind == "scheduled"]
-        schedules = [names.index(o.component) for o in scheduled]
-        instant = self.together[0].instant
-        knots = _knots(system, segment, instant, forward)
-        if first is None or not (schedules or knots):
+        system, segment = self.system, self.segment
+        if first is None or not (self.schedules or self.knots):
             return []
-        x = (scheduled[0] if scheduled else first).x_minus
+        x = next((o for o in self.together if o.kind == "scheduled"), first).x_minus
         z = segment.z if stage is None else stage.outcome.z
         before = segment.p if stage is None else stage.outcome.p
         error = situation(system, segment, []).x_error
         error[system.evaluated(z)] = 0.0
-        p = system.vector(instant, system.discrete(before), forward)
+        p = system.vector(self.instant, system.discrete(before), self.task.forward)
         at = Situation(0.0, x.copy(), p, z.copy(), error, math.ulp(0.0))
-        found = self._settled(at, [], [], schedules, instant, _said_of(system, knots, instant, at, forward))
+        found = self._settled(self._nothing(at), (), self.schedules, begins=True)
         crossed = self.crossed(found)
         return [found] if crossed is None else [found, crossed]
 
     def _settled(
-        self,
-        at: Situation,
-        fired: Sequence[int],
-        monitors: Sequence[int],
-        schedules: Sequence[int],
-        instant: Instant | None = None,
-        inputs: str = "",
+        self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """One settling; it jumps to begin with where an input carries a surface away."""
-        system, model = self.system, self.system.model
+        """One settling; begins: pieces of inputs begin with it, so that it jumps where one carries a surface away."""
+        system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
         said = [
@@ -178,13 +184,12 @@ class _Instant:
             f"{model.schedules[k].name} was due at this instant{_set_by(system, ('schedule', k), at)}"
             for k in schedules
         ]
-        settling = Watched(system, at, at.z.copy(), self.task.forward)
-        if instant is not None:
-            settling.jumped = surfaces_jump(system, instant, at, self.task.forward)
-        outcome = settling.run(fired, list(keys))
-        return Stage(
-            before, settling, outcome, bool(fired), " and ".join([*said, *([inputs] if inputs else [])])
-        )
+        settling = Watched(system, at, at.z.copy(), self.task.forward, found.scope(system), found.inputs)
+        if begins:
+            settling.jumped = surfaces_jump(system, self.instant, at, self.task.forward)
+            said += _said_of(system, self.knots, self.instant, at, self.task.forward)
+        outcome = settling.run(found.fired, list(keys))
+        return Stage(before, settling, outcome, tuple(found.fired), " and ".join(said))
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
@@ -224,10 +229,10 @@ def _knots(system: System, segment: Segment, instant: Instant, forward: bool) ->
     return found
 
 
-def _said_of(system: System, names: list[str], instant: Instant, at: Situation, forward: bool) -> str:
+def _said_of(system: System, names: list[str], instant: Instant, at: Situation, forward: bool) -> list[str]:
     """That inputs have a knot, and the values of those that jump there."""
     if not names:
-        return ""
+        return []
     vectors = (system.vector(instant, system.discrete(at.p), not forward), at.p)
     known, values = system.quantities, []
     for p in vectors:
@@ -243,4 +248,4 @@ def _said_of(system: System, names: list[str], instant: Instant, at: Situation, 
         if name in known and values[0][k := known.index(name)] != values[1][k]
     ]
     said = f"an input has a knot here (of {', '.join(shown[name] for name in names)})"
-    return said + (f", where {' and '.join(jumps)}" if jumps else "")
+    return [said + (f", where {' and '.join(jumps)}" if jumps else "")]
