@@ -24,8 +24,9 @@ METHODS = ("dop853", "tsit5")
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 # How many crossings of `twisting` are told apart before their limit is chance; `long-swing` is seen at zeros of
 # v alone, which have no scale. Both are judged by their truths, as all scenes are.
-# rounding decides late events of these, or grows without bound; their closed forms are in tests/conformance
-APART = ("twisting", "long-swing", "touch-beside-a-sample", "exponential-neuron")
+# In `touch-beside-a-sample` a guard comes to zero at a peak and turns: within the tolerance either is right, and the
+# next samples follow from it. The states, which no sample moves, agree to 3e-12 of their size.
+APART = ("twisting", "long-swing", "touch-beside-a-sample")
 SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in APART]
 WEIGHTS = bernstein_weights(4)
 
@@ -134,6 +135,10 @@ def test_leaps_and_the_general_way(scene: Scene, method: str, monkeypatch: pytes
     times = [[e.t for e in sol.events] for sol in (leapt, stepped)]
     assert times[0] == pytest.approx(times[1], rel=1e-8, abs=1e-8 * scene.unit)
     grid = np.linspace(*sorted((scene.span[0], min(leapt.t_end, stepped.t_end))), 201)
+    # closer to an event than times are compared, an instant may be before it in one run and behind it in the other;
+    # and the potential of `exponential-neuron` rises there by 2e10 per unit of time
+    near = 1e-8 * max(scene.unit, *map(abs, scene.span))
+    grid = grid[[all(abs(t - at) > near for at in times[0]) for t in grid]]
     size = np.max(np.abs(stepped(grid)), axis=1, initial=0.0)[:, None]
     assert np.max(np.abs(leapt(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-6
     assert [i.mode for c in leapt.modes.values() for i in c] == [
