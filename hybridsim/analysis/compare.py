@@ -23,6 +23,8 @@ from hybridsim.model import Model
 PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
 TIME = 10.0  # of a model without a period: a few swings of a mechanism of about 1 Hz
 BUDGET = 120.0  # seconds of a comparison that nobody has given any thought
+# Of the budget, what each run of a reference may take: there are three at most.
+REFERENCE_SHARE = 1 / 4
 
 
 @refusing
@@ -78,7 +80,7 @@ def compare(
         not given.
     budget : float, optional
         Seconds that all of it may take. What does not fit is not run, and its row says so: first the
-        repetitions go, then the settings that take longest.
+        repetitions go, then the settings that take longest. A run of the reference may take a quarter of it.
     progress : callable, optional
         Called as progress(done, total, what is next).
 
@@ -113,7 +115,7 @@ def compare(
     spending = Budget(budget)
     steps_to_do = Steps(1 + (1 + repeat) * sum(len(line.values) for line in series), callback(progress))
     steps_to_do("reference")
-    against = find_reference(model, span, period, bench.simulate, reference)
+    against = find_reference(model, span, period, bench.simulate, reference, seconds=REFERENCE_SHARE * budget)
     (rows,) = race([Entry(bench, against, series)], repeat, spending, steps_to_do)
     steps_to_do.finish()
     return bench.comparison(against, rows, repeat)

@@ -16,6 +16,8 @@ from hybridsim.analysis.timing import timed_in_turns
 
 # Of its equal share of the budget, a run may take this much: most runs take far less than theirs.
 _SHARES = 10
+# The shares are made for so many repetitions: more of them are the first to go.
+_TURNS = 3
 # A run that turns out longer than was predicted is stopped at this many times what it may take.
 _PATIENCE = 2
 
@@ -74,7 +76,7 @@ def race(
         for i, line in enumerate(entry.lines)
         for level in range(len(line.values))
     ]
-    share = _SHARES * budget.seconds / max(len(runs) * (1 + repeat), 1)
+    share = _SHARES * budget.seconds / max(len(runs) * (1 + min(repeat, _TURNS)), 1)
     for level in range(max((run.level + 1 for run in runs), default=0)):
         here = [run for run in runs if run.level == level]
         predicted = {run: _predicted(entries, rows, run) for run in here}

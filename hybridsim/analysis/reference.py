@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from hybridsim.analysis.allowance import Allowance, OutOfTime
 from hybridsim.analysis.closed_forms import find_closed_form
 from hybridsim.analysis.errors_against_reference import Errors, Yardstick
 from hybridsim.analysis.resets import resets_of
@@ -15,6 +17,11 @@ from hybridsim.errors import HybridsimError, SimulationError, UsageError
 if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.solution import Solution
+
+
+class _TooLong(SimulationError):
+    """A run of a reference has used up its time."""
+
 
 Run = Callable[..., "Solution"]
 """Runs the model over the span: (integrator, **options) -> Solution."""
@@ -26,6 +33,9 @@ _BEST: tuple[str, Mapping[str, Any]] = ("dop853", {"rtol": 1e-13})
 # Two methods of different kind (one step against many steps, our location of events against SUNDIALS' own).
 _FIRST: tuple[str, Mapping[str, Any]] = ("scipy-dop853", {"rtol": 1e-13})
 _SECOND: tuple[str, Mapping[str, Any]] = ("cvode-adams", {"rtol": 1e-12})
+# Two more, for a model on which these take too long: it may be stiff.
+_STIFF: tuple[str, Mapping[str, Any]] = ("rodas5p", {"rtol": 1e-10})
+_SECOND_STIFF: tuple[str, Mapping[str, Any]] = ("cvode-bdf", {"rtol": 1e-10})
 DIGITS = 32
 
 
@@ -58,6 +68,7 @@ def find_reference(
     run: Run,
     wanted: Any = None,
     progress: Callable[[float], None] | None = None,
+    seconds: float = math.inf,
 ) -> Reference:
     """The reference of a comparison.
 
@@ -68,6 +79,7 @@ def find_reference(
         a Trajectory, or a function of times (k,) that gives states (n, k).
     run : runs the model with an integrator and its options.
     progress : called with the finished fraction of a reference in multiple precision.
+    seconds : that each run may take; where the first of two takes longer, two by stiff methods stand in for them.
 
     A closed form and a motion in multiple precision owe nothing to the engine; they are held against the most
     accurate integrator, which does. Of two runs the first is the reference, and the distance of the second its
@@ -77,6 +89,15 @@ def find_reference(
     def yardstick(trajectory: Trajectory) -> Yardstick:
         nominal = [state.nominal or 1.0 for state in model.states]
         return Yardstick(trajectory, resets_of(model), nominal, period)
+
+    def timed(integrator: str, **options: Any) -> Solution:
+        try:
+            return run(integrator, **options, progress=Allowance(seconds))
+        except OutOfTime as late:
+            raise _TooLong(
+                f"the run with {_describe((integrator, options))} was {late}",
+                remedy="shorten the span, give a larger budget, or give a reference",
+            ) from None
 
     if wanted is None:
         kinds: tuple[str, ...] = (CLOSED_FORM, RUNS)
@@ -92,10 +113,10 @@ def find_reference(
             )
         try:
             if kind == CLOSED_FORM:
-                return _checked(_closed_form(model, t_span, yardstick), run)
+                return _checked(_closed_form(model, t_span, yardstick), timed)
             if kind == MULTIPLE_PRECISION:
-                return _checked(_multiple_precision(model, t_span, yardstick, progress), run)
-            return _two_runs(run, yardstick)
+                return _checked(_multiple_precision(model, t_span, yardstick, progress), timed)
+            return _two_runs(timed, yardstick)
         except UsageError as error:
             refusal = refusal or error
     assert refusal is not None
@@ -136,16 +157,22 @@ def _checked(reference: Reference, run: Run) -> Reference:
 
 
 def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Reference:
-    first = run(_FIRST[0], **_FIRST[1])
+    chosen, other, late = _FIRST, _SECOND, ""
+    try:
+        first = run(chosen[0], **chosen[1])
+    except _TooLong as error:
+        chosen, other, late = _STIFF, _SECOND_STIFF, error.message
+        first = run(chosen[0], **chosen[1])
     if not first.success:
         raise SimulationError(
-            f"the reference run with {_describe(_FIRST)} ended as {first.status}: {first.message}",
+            f"the reference run with {_describe(chosen)} ended as {first.status}: {first.message}",
             remedy="shorten the span, or give a reference",
         )
     best = yardstick(trajectory_of(first))
-    difference, warnings = _held_against(best, run, _SECOND)
-    second = f"run with {_describe(_SECOND)}" if difference else ""
-    return Reference(f"run with {_describe(_FIRST)}", best, difference, warnings, second, difference)
+    difference, warnings = _held_against(best, run, other)
+    warnings = (late, *warnings) if late else warnings
+    second = f"run with {_describe(other)}" if difference else ""
+    return Reference(f"run with {_describe(chosen)}", best, difference, warnings, second, difference)
 
 
 def _held_against(

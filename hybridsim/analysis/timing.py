@@ -47,6 +47,8 @@ def timed_in_turns(
             likely = [_warmed_up(run, seconds, until) for run, seconds in zip(runs, expected, strict=True)]
         for _ in range(repeat):
             turn = set(_fitting([max(seconds, _TURN) for seconds in likely], until - time.monotonic()))
+            if all(sum(times[i]) >= ENOUGH for i in turn):
+                break
             for i, run in enumerate(runs):
                 if progress is not None:
                     progress(i)

@@ -311,7 +311,7 @@ class ModeLoop:
             outcome.guard_floors,
             outcome.monitor_floors,
         )
-        return SegmentRun(
+        run = SegmentRun(
             system,
             self.method,
             self.origin,
@@ -324,6 +324,8 @@ class ModeLoop:
             self.forward,
             self._stepped,
         )
+        run.flow.look = lambda s: self._progress(run.origin.plus(s))
+        return run
 
     def _keep(self, run: SegmentRun) -> None:
         """Append a segment and what was seen on the way."""

@@ -111,13 +111,17 @@ class Watch:
 
 @dataclass
 class Flow:
-    """The smooth field of one segment, as integrators see it: rhs(s, x), counted."""
+    """The smooth field of one segment, as integrators see it: rhs(s, x), counted.
+
+    look: told the local time by a method that does a whole segment in one call; raises where the run has to end.
+    """
 
     system: System
     p: np.ndarray
     z: np.ndarray
     counters: Counters
     forward: bool = True
+    look: Callable[[float], None] | None = None
 
     def __post_init__(self) -> None:
         system = self.system

@@ -80,6 +80,8 @@ class NativeStepper:
 
     def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
         self.flow.counters.rhs_evaluations += 1
+        if self.flow.look is not None:
+            self.flow.look(s)
         return self.flow.rhs(s, x)
 
     def _guard(self, number: int) -> Callable[[float, np.ndarray], float]:
