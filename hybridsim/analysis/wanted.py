@@ -8,6 +8,9 @@ from typing import Any
 from hybridsim.arguments import is_row, number
 from hybridsim.errors import UsageError
 
+MOST = 10**6  # of what is counted one by one: periods, samples, repetitions
+MOST_STEPS = 10**9  # in a period
+
 
 def positive(value: Any, what: str) -> float:
     """A number above zero."""
@@ -18,11 +21,11 @@ def positive(value: Any, what: str) -> float:
     return found
 
 
-def whole(value: Any, what: str) -> int:
-    """A whole number above zero."""
-    remedy = "give a whole number above zero"
+def whole(value: Any, what: str, most: int = MOST) -> int:
+    """A whole number above zero, up to one beyond which no memory and no time suffices."""
+    remedy = f"give a whole number above zero, {most} at most"
     found = number(value, what, remedy)
-    if not (found >= 1 and found.is_integer()):
+    if not (1 <= found <= most and found.is_integer()):
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
     return int(found)
 
@@ -34,7 +37,7 @@ def positives(values: Any, what: str) -> tuple[float, ...] | None:
 
 def wholes(values: Any, what: str) -> tuple[int, ...] | None:
     """Whole numbers above zero; None stays None."""
-    return None if values is None else tuple(whole(value, what) for value in _row(values, what))
+    return None if values is None else tuple(whole(value, what, MOST_STEPS) for value in _row(values, what))
 
 
 def mapping(value: Any, what: str) -> Mapping[str, Any]:

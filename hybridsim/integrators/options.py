@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from dataclasses import MISSING, dataclass, fields
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+LARGEST = 10**6  # of a count, such as of iterations
 # A line of a docstring's section "Parameters": one or several names, a colon, text that goes on in indented lines.
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n[ \t]+.*)*)", re.MULTILINE)
 
@@ -62,8 +64,17 @@ def fits(value: object, kind: Any) -> bool:
     if get_origin(kind) in (Union, UnionType):
         return any(fits(value, part) for part in get_args(kind))
     if kind in (int, float):
-        return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
+        is_one = isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
+        return is_one and _is_small(value, LARGEST if kind is int else math.inf)
     return isinstance(value, kind) if isinstance(kind, type) else True
+
+
+def _is_small(value: Any, most: float) -> bool:
+    """Whether a number is one of the doubles, and no larger than `most`; what is not a number is left to others."""
+    try:
+        return not abs(float(value)) > most
+    except OverflowError:
+        return False
 
 
 def in_words(kind: Any) -> str:
@@ -72,5 +83,11 @@ def in_words(kind: Any) -> str:
         return "one of " + ", ".join(map(str, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):
         return " or ".join(in_words(part) for part in get_args(kind))
-    words = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", NoneType: "None"}
+    words = {
+        int: "a whole number",
+        float: "a number",
+        bool: "true or false",
+        str: "a word",
+        NoneType: "None",
+    }
     return words.get(kind, str(kind))

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 
 from hybridsim.errors import UsageError, near, nearest
 from hybridsim.integrators.base import Integrator
-from hybridsim.integrators.options import fits, in_words
+from hybridsim.integrators.options import LARGEST, fits, in_words
 
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
@@ -159,5 +159,7 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():
         if not fits(value, kinds[option]):
-            raise UsageError(f"{name}: {option} is {value!r}", remedy=f"give {in_words(kinds[option])}")
+            is_large = isinstance(value, int) and value > LARGEST and fits(1, kinds[option])
+            remedy = f"give {in_words(kinds[option])}" + (f", {LARGEST} at most" if is_large else "")
+            raise UsageError(f"{name}: {option} is {value!r}", remedy=remedy)
     return cls(**options)

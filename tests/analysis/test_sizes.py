@@ -83,3 +83,40 @@ def test_the_command_line(
     assert main(words) == 2
     out, err = capsys.readouterr()
     assert told in err and not out and "internal" not in err
+
+
+@pytest.mark.parametrize("count", [10**7, 10**12, 10**400], ids=["1e7", "1e12", "huge"])
+@pytest.mark.parametrize(
+    ("name", "ask"),
+    [
+        ("settle", lambda n: hs.bifurcation("dfcs", "F0", [20.0], settle=n)),
+        ("samples", lambda n: hs.bifurcation("dfcs", "F0", [20.0], samples=n)),
+        ("workers", lambda n: hs.bifurcation("dfcs", "F0", [20.0], workers=n)),
+        ("workers", lambda n: hs.sweep(DECAY, {"k": [1.0]}, "final.x", t_span=(0, 1), workers=n)),
+        ("max_points", lambda n: hs.continuation("dfcs", "F0", (20.0, 40.0), max_points=n)),
+        ("repeat", lambda n: hs.compare(DECAY, (0, 1), repeat=n)),
+        ("repeat", lambda n: hs.compare_suite(repeat=n)),
+        ("steps", lambda n: hs.compare(DECAY, (0, 1), steps=[1000 * n])),
+    ],
+)
+def test_counts_that_no_time_suffices_for(name: str, ask: Callable[[int], object], count: int) -> None:
+    refused(lambda: ask(count), f"{name} is 1000.*\n.*give a whole number above zero, 1000000(000)? at most")
+
+
+@pytest.mark.parametrize(
+    ("integrator", "option"),
+    [
+        *(
+            ("rk4-dichotomy", name)
+            for name in ("step", "period", "steps_per_period", "eps_v", "max_bisections")
+        ),
+        ("rk4-sign", "steps_per_period"),
+        ("moreau", "steps_per_period"),
+        ("moreau", "iterations"),
+    ],
+)
+def test_options_of_integrators_that_are_no_doubles(integrator: str, option: str) -> None:
+    refused(
+        lambda: hs.simulate("dfcs", (0, 0.01), integrator=integrator, **{option: 10**400}),
+        f"{integrator}: {option} is 1000(.*\n.*)give ",
+    )
