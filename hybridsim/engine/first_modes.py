@@ -24,16 +24,19 @@ if TYPE_CHECKING:
 _MOST_FLOWS = 3**4  # combinations of modes that are looked at; each costs a series
 
 
-def as_given(system: System, at: Situation) -> Situation:
+def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
     """A situation with the modes and the run-time vector in which conditions and resets read the state as it is.
 
     At a start some components have no mode yet. They are read on the side of their surface on which the state is, and
-    as holding where it rests there. No state is evaluated from a surface.
+    as holding where it rests there. There, and where a reset or a belt has jumped, none is evaluated from a surface.
     """
-    if not (at.z < 0).any():
+    is_start = (at.z < 0).any()
+    if not (is_start or jumped):
         return at
     z, p = at.z.copy(), at.p.copy()
     p[system.layout.pin_at] = 0.0
+    if not is_start:
+        return replace(at, p=p)
     series: Any = system.series(at.s, at.x, p, np.maximum(z, 0), at.x_error, at.s_error)
     for k, c in enumerate(system.surface_of):
         if z[c] >= 0:

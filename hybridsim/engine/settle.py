@@ -276,7 +276,7 @@ class Settling:
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
         taken: list[tuple[int, str, int, int]] = []
-        given = as_given(system, at)
+        given = as_given(system, at, self.jumped)
         if self.inputs is not None:
             given, self.inputs = replace(given, p=self.inputs), None
         for c in sorted(components, key=lambda c: (self._place(c), c)):

@@ -14,6 +14,7 @@ from hybridsim.engine.decide import side_after
 from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.first_modes import as_given
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
+from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.limits import Gauge, LimitReached
 from hybridsim.engine.outcome import Situation
@@ -386,7 +387,9 @@ class FixedStepRun:
             at.z = as_given(system, at).z
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
-        outcome = Settling(system, at, before, forward=True, scope=self.declared).run(fired, resets)
+        settling = Settling(system, at, before, forward=True, scope=self.declared)
+        settling.jumped = surfaces_jump(system, instant, at, forward=True)
+        outcome = settling.run(fired, resets)
         self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()
         self.z = np.where(system.has_surface, self.z, outcome.z)
         self._record_monitors(instant, seen, x_minus, outcome.x)

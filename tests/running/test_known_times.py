@@ -80,3 +80,53 @@ def test_a_belt_that_jumps_beside_another_known_time_does_not_carry_the_body_alo
     sol = hs.simulate(model, (0.0, 2.0), integrator=integrator)
     times = np.array([0.5, 1.1, 1.2, 1.5])
     np.testing.assert_allclose(sol(times)[0], [0.604, 0.4472, 0.4864, 0.5], atol=1e-9)
+
+
+READ = """
+[parameters]
+restitution = 0
+[states]
+v = { start = 0, der = "-f" }
+h = { start = 0, der = "w" }
+w = { start = 0.15, der = "p - 3" }
+[contacts.f]
+velocity = "v - (BELT)"
+normal = 2
+law = { name = "coulomb", mu = 0.5 }
+[impacts.p]
+gap = "h - (0.15*t if t < 1 else 0.2*t - 0.05)"
+restitution = "restitution"
+[discrete]
+b = 0.15
+held = 0
+raised = 0
+late = 0
+[clocks.c]
+period = 1
+offset = 1
+set = { b = 0.2, held = "v", raised = "w" }
+[components.a]
+initial = "on"
+[components.a.modes.on]
+guards.g = { expr = "0.18 - b", then = [{ to = "off", reset = { late = "v" } }] }
+[components.a.modes.off]
+[inputs.u]
+kind = "table"
+times = [0, 1, 1, 9]
+values = [0.15, 0.15, 0.2, 0.2]
+"""
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p", "moreau"])
+@pytest.mark.parametrize("belt", ["0.15 if t < 1 else 0.2", "u", "b"])
+def test_a_reset_reads_the_velocity_that_a_body_has_before_its_surface_jumps(
+    integrator: str, belt: str
+) -> None:
+    """The body goes with the belt at 0.15 until t = 1, and follows it to 0.2 at the acceleration 1 of friction."""
+    options = {"step": 1.0 / 128.0} if integrator == "moreau" else {}
+    model = hs.Model.from_toml(READ.replace("BELT", belt))
+    sol = hs.simulate(model, (0.0, 1.5), integrator=integrator, **options)
+    assert [sol.output(name, 1.2) for name in ("held", "raised", "late")] == pytest.approx(
+        [0.15] * 3, abs=1e-9
+    )
+    assert sol(1.02)[0] == pytest.approx(0.17, abs=1.0 / 64.0 if options else 1e-9)
