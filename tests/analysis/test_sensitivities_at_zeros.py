@@ -155,6 +155,29 @@ def test_bodies_that_a_reset_makes_stick_share_their_momentum() -> None:
     assert found.by_start == pytest.approx(np.array([[1 / 4, 3 / 4]] * 2), rel=1e-12)
 
 
+def test_a_reset_at_the_end_leaves_no_time_to_stick() -> None:
+    """At the end v becomes w + q, with q = 0: from a little more it would come back to w, but later."""
+    rest = '[schedules.s]\ntimes = [1.0]\nreset.v = "w + q"'
+    found = hs.sensitivities(hs.simulate(rubbing(COULOMB, "0", rest), (0, 1)), ["q"])
+    assert found.by_parameter[:, 0].tolist() == [1.0, 0.0]
+
+
+def test_a_guard_that_a_reset_meets_at_the_end() -> None:
+    """y becomes q = 1 and z counts it, where 1 or less; from more it would be counted, but later."""
+    counts = hs.Guard("end", "y - 1", hs.Choice("b", reset={"z": "z + 1"}))
+    model = hs.Model(
+        "meets",
+        states=[hs.State("y", 5, -1), hs.State("z", 0, 0)],
+        parameters={"q": 1.0, "r": 1.0},
+        schedules=[hs.Schedule("s", times=[1.0], reset={"y": "q"})],
+        components=[hs.Component("g", [hs.Mode("a", counts), hs.Mode("b")], initial="a")],
+    )
+    solution = hs.simulate(model, (0, 1))
+    assert solution.y[:, -1].tolist() == [1.0, 1.0]
+    assert np.isnan(differ(hs.sensitivities(solution), "q", "guard end of g")).all()
+    assert hs.sensitivities(hs.simulate(model, (0, 2)), ["q"]).by_parameter.tolist() == [[1.0], [0.0]]
+
+
 def test_what_slips_from_its_start_on_has_no_derivative_by_its_velocity() -> None:
     """Pushed by 30 against 10: a little behind, friction turns and adds 20/1, and 20/3 the other way.
 
@@ -373,3 +396,17 @@ def test_two_guards_at_the_start() -> None:
     for x0, expected in ((0.75, [2.0, 0.0]), (1.25, [1.0, 1.0])):
         beside = hs.sensitivities(hs.simulate(model, (0, 1), params={"x0": x0}))
         assert beside.by_parameter[:, 0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
+def test_a_monitor_that_only_touches_zero_leaves_the_derivatives_of_the_state(integrator: str) -> None:
+    """x = a - (t - 1)^2 touches 1 at t = 1, where a is 1, and y = exp(a t)."""
+    model = hs.Model(
+        "touch",
+        states=[hs.State("x", "a - 1", "v"), hs.State("v", 2, -2), hs.State("y", 1, "a*y")],
+        parameters={"a": 1.0},
+        monitors=[hs.Monitor("top", "x - 1"), hs.Monitor("half", "x - 0.75", direction="up")],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 2), integrator=integrator, rtol=1e-10))
+    assert found.by_parameter[:, 0] == pytest.approx([1.0, 0.0, 2.0 * math.exp(2.0)], rel=1e-9)
+    assert found.times_by_parameter[0, 0] == pytest.approx(-1.0, rel=1e-9)

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
-from hybridsim.analysis.variations.carried import Carrier, Directions
+from hybridsim.analysis.variations.carried import Carrier
+from hybridsim.analysis.variations.directions import Directions
 
 _STRETCHES = 60
 _PERIODS = 5  # in each

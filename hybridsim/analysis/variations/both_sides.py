@@ -9,7 +9,8 @@ import numpy as np
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
-    from hybridsim.analysis.variations.carried import Carried, Carrier, Directions
+    from hybridsim.analysis.variations.carried import Carrier
+    from hybridsim.analysis.variations.directions import Carried, Directions
 
 _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less agree
 _ROUNDING = 1e-11  # of the states' sizes, by a change of everything by its own size

@@ -12,12 +12,13 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
+from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.event_times import EventTimes
 from hybridsim.analysis.variations.off_zero import OffZero, beyond, differ, limits_at_zero, off_zero, rates_of
 from hybridsim.analysis.variations.refused import refuse_inputs
@@ -44,39 +45,6 @@ if TYPE_CHECKING:
 
 _ROUNDING = 1e-11  # of a run's length, by a change of its own size: a time that moves by less does not move
 _SAME = 1e-9  # of its size: a state that changes by less at an event does not jump
-
-
-@dataclass(frozen=True)
-class Directions:
-    """What is changed: M directions in the states, the discrete states and the parameters.
-
-    x (n, M), discrete (d, M), parameters (P, M): the derivatives at the start of the run.
-    """
-
-    x: np.ndarray
-    discrete: np.ndarray
-    parameters: np.ndarray
-
-    def both_ways(self, chosen: np.ndarray) -> Directions:
-        """Some of them, and then the same backward."""
-        rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
-        return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
-
-
-@dataclass(frozen=True)
-class Carried:
-    """Derivatives at the end of a run, and of the time of each event on the way.
-
-    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,);
-    off: what is exactly at its zero and is moved off it by some directions;
-    lost: times (M,) from which on directions lead to another run, or infinity.
-    """
-
-    x: np.ndarray
-    discrete: np.ndarray
-    times: list[tuple[float, np.ndarray]]
-    off: list[OffZero]
-    lost: np.ndarray
 
 
 class Carrier:
@@ -115,6 +83,9 @@ class Carrier:
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
         stretches = list(stretches_of(self.solution))
+        if any(not is_recorded(self.system, one) for one in stretches[-1].happened):
+            whole = stretches[-1].segment  # at the end, and left the states and modes as they were
+            stretches.append(Stretch(replace(whole, s=whole.s[-1:], x=whole.x[-1:]), (), ()))
         Y, Yd = self._started(stretches[0].segment, Y, Yd, G, event_times)
         for stretch, following in zip(stretches, [*stretches[1:], None], strict=True):
             segment, s = stretch.segment, float(stretch.segment.s[0])
@@ -127,8 +98,7 @@ class Carrier:
             if following is None:
                 break
             behind = self._through(stretch, following.segment, Y, Yd, G, event_times)
-            end = stretches[-1].segment.end  # of which an event may be short by rounding
-            if following.segment.start.minus(end) >= -4.0 * math.ulp(float(end)) and last is None:
+            if self._is_end(following.segment) and last is None:
                 last = Last(segment, Y, Yd, behind[2], stretch.happened)
             Y, Yd, shift = behind
             if any(one.kind != "corner" for one in stretch.happened):
@@ -137,13 +107,22 @@ class Carrier:
             Y, Yd = self._at_end(last, stretches[-1].segment, Y, Yd)
         return Carried(Y, Yd, times, self._off, self._lost)
 
+    def _is_end(self, segment: Segment) -> bool:
+        """Whether a segment begins at the end of the run, to rounding."""
+        end = self.solution._segments[-1].end
+        return bool(segment.start.minus(end) >= -4.0 * math.ulp(float(end)))
+
+    def _moves(self, shift: np.ndarray) -> np.ndarray:
+        """Mask (M,) of the directions that move a time, given its derivatives."""
+        length = self.solution.t_end - self.solution.t_start
+        return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
+
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Where something happens exactly at the end: a change may move it beyond the end, where it is not seen."""
         before, system = last.segment, self.system
-        length = float(behind.end) - self.solution.t_start
-        moves = np.abs(last.shift) * self._changes.own > _ROUNDING * length
+        moves = self._moves(last.shift)
         jumps = bool(
             (np.abs(before.x[-1] - behind.x[0]) > _SAME * self._scale).any()
             or (system.discrete(before.p) != system.discrete(behind.p)).any()
@@ -276,6 +255,13 @@ class Carrier:
                 rounds.at_appointment(following.start, batch)
             else:
                 rounds.at_end(segment, batch)
+        Yd, at_once = rounds.Yd, rounds.Y
+        if self._is_end(
+            following
+        ):  # what a jump moves off its surface has no time to come back, nor guards to fire
+            later = self._moves(rounds.shift - shift)
+            self._note([one._replace(lost=one.lost | later) for one in rounds.off])
+            rounds.off.clear()
         if rounds.has_jumped or is_knot(system, following.start):
             Y = self._settled(rounds, following, x, before)
         else:
@@ -289,7 +275,8 @@ class Carrier:
                 else 0.0
             )
             Y = rounds.Y + more - np.outer(self._rates_at_start(following), rounds.shift)
-        return self._projected(following, Y, rounds.Yd, G), rounds.Yd, shift
+        Y = self._projected(following, Y, Yd, G)
+        return np.where(self._is_end(following) & ~self._moves(shift), at_once, Y), Yd, shift
 
     def _rates_at_start(self, segment: Segment) -> np.ndarray:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)

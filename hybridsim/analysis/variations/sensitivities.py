@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.variations.both_sides import agreed
-from hybridsim.analysis.variations.carried import Carried, Carrier, Directions
+from hybridsim.analysis.variations.carried import Carrier
+from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
 from hybridsim.analysis.variations.stretches import at_start
