@@ -120,10 +120,12 @@ def located(
         zeros = [(known.guards[g], known.guard_bounds[g]) for g in arrival.fired]
         zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
         late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
-        is_met = abs(target - arrival.s) <= at.s_error + late
+        known_at = math.ulp(float(origin.plus(target)))  # it is a number in doubles
+        is_met = abs(target - arrival.s) <= at.s_error + late + known_at
         if is_met:  # so far from the time that is known
             wide.s_error += abs(target - arrival.s)
             at, series = wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+            at, series = _as_due(system, origin, at, series, arrival, known_at)
     if not is_met and others_near(system, at, series, arrival, segment):
         at, series = together(system, origin, at, series, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired, series)
@@ -142,6 +144,17 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
     wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
     add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
     return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+
+
+def _as_due(
+    system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
+) -> tuple[Situation, Any]:
+    """The state where something is due, with a bound for the rounding of that time, if more is zero within it."""
+    slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
+    wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
+    known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+    fewer = _number_at_zero(system, origin, at, arrival, series)
+    return (wide, known) if _number_at_zero(system, origin, wide, arrival, known) > fewer else (at, series)
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, segment: SegmentRun) -> bool:
@@ -219,8 +232,9 @@ def before_appointment(
     """
     way = np.abs(at.x - before)
     scale = np.maximum(np.abs(before), np.abs(at.x)) + way
-    at.x_error = at.x_error + 4.0 * UNIT * scale
     at.s_error = math.ulp(float(target))
+    slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
+    at.x_error = at.x_error + 4.0 * UNIT * scale + at.s_error * slopes
     add_steps(system, at, scale, steps, rounding * way)
     return coincident(system, target, at, ())
 

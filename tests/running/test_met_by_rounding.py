@@ -135,3 +135,39 @@ def test_what_is_held_stays_held_where_a_guard_meets_a_tick(integrator: str) -> 
         values = dict(zip(run.names, run(run.t_end), strict=True))
         assert values["h"] == pytest.approx(float(number["floor"] * end), rel=1e-14)
         assert values["v"] == pytest.approx(float(number["belt"] + number["floor"] * end), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-rk45", "scipy-radau", "cvode-bdf"]
+)
+def test_a_guard_meets_a_tick_whose_time_is_rounded(integrator: str) -> None:
+    """In decimals the guard is zero at the first tick; in doubles that time has the rounding of the time at the start."""
+    model = hs.Model.from_toml("""
+[parameters]
+start = 0
+speed = 1
+level = 1
+first = 1
+[states]
+x = { start = "start", der = "speed" }
+[discrete]
+n = 0
+[components.a]
+initial = "on"
+[components.a.modes.on]
+guards.g = { expr = "level - x", then = [{ to = "off", reset = { n = 1 } }] }
+[components.a.modes.off]
+[clocks.c]
+period = 1
+offset = "first"
+set = { x = "start" }
+""")
+    rng = random.Random(integrator)
+    for _ in range(12):
+        begin = Decimal(rng.choice(["100", "-3", "0.1", "1000"]))
+        start, speed, after = (Decimal(rng.randint(*of)) / 100 for of in ((-100, 100), (30, 150), (20, 99)))
+        numbers = {"start": start, "speed": speed, "level": start + speed * after, "first": begin + after}
+        span = (float(begin), float(begin + after + Decimal("0.1")))
+        params = {name: float(value) for name, value in numbers.items()}
+        run = hs.simulate(model, span, params=params, integrator=integrator)
+        assert run.output("n", run.t_end) == 1

@@ -154,7 +154,8 @@ class Judge(Configurations):
                     if self.time < at:
                         self.resolve()
                 self.motion.jumps.append(float(at))
-                self.resolve_before()
+                if self.is_due():
+                    self.resolve_before()
                 self.scheduled()
             self.resolve()
         except Stop as stop:
@@ -162,6 +163,11 @@ class Judge(Configurations):
             self.motion.status = status
         self.motion.end = float(self.time)
         return self.motion
+
+    def is_due(self) -> bool:
+        """Whether a schedule fires now; where signals alone change, zeros are judged on what begins there."""
+        firings = (at for s in self.m.schedules.values() for at in self.firings(s))
+        return any(abs(at - self.time) <= self.tol for at in firings)
 
     def resolve_before(self) -> None:
         """What is zero at a known time without its jump happens with the signals as they were."""
