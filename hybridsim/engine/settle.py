@@ -340,7 +340,7 @@ class Settling:
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
         holds = np.array([automata[c].hold for c in taking_part])
-        caused = candidates[with_cause(self, taking_part, candidates, open_)]
+        caused = candidates[with_cause(self, taking_part, candidates)]
         current = self._current(taking_part, holds)
         verdicts, is_whole = verdicts_on(self, taking_part, caused, current, holds, cluster)
         if len(caused) < len(candidates) and (verdicts == LEAVES).all():

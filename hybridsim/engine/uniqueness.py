@@ -23,25 +23,27 @@ if TYPE_CHECKING:
 MAX_JOINT_COMPONENTS = 4
 
 
-def with_cause(settling: Settling, members: list[int], candidates: np.ndarray, open_: set[int]) -> np.ndarray:
+def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -> np.ndarray:
     """Mask of the candidates in which friction that holds, and is certainly below its limits, goes on to hold."""
     system, at = settling.system, settling.at
-    automata = system.automata
+    automata, modes = system.automata, np.maximum(at.z, 0)
     holding = [
         k
         for k, c in enumerate(members)
-        if c not in open_
-        and at.z[c] == automata[c].hold
-        and not (automata[c].is_unilateral or automata[c].is_unique)
+        if at.z[c] in (-1, automata[c].hold) and not (automata[c].is_unilateral or automata[c].is_unique)
     ]
     mask = np.ones(len(candidates), dtype=np.bool_)
-    if not holding or len(holding) == len(members):
+    if not holding or len(members) == 1:
         return mask
-    series = settling.series_of(np.maximum(at.z, 0))
+    begun = [members[k] for k in holding]
+    modes[begun] = [
+        automata[c].hold for c in begun
+    ]  # at a start, too, a contact on its surface rests if it can
+    series = settling.series_of(modes)
     values, bounds = series.guards[:, 0], series.guard_bounds[:, 0]
     for k in holding:
         c = members[k]
-        guards = list(automata[c].guards[at.z[c]])
+        guards = list(automata[c].guards[automata[c].hold])
         if (values[guards] > bounds[guards]).all():
             mask &= candidates[:, k] == automata[c].hold
     return mask

@@ -30,3 +30,38 @@ def test_a_body_slips_beyond_the_limit(method: str) -> None:
     """A load above the limit by one part in 1e12 is no question of rounding."""
     sol = hs.simulate(at_the_limit("(a + b)", "(a + b)*(1 + 1e-12)", 1.0), (0.0, 2.0), integrator=method)
     assert sol(2.0)[0] == pytest.approx(2 * 0.36, rel=1e-9)
+
+
+PUSHES = {
+    "table": ("u", '[inputs.u]\nkind = "table"\ntimes = [0, 1, 1, 9]\nvalues = [0.5, 0.5, 1.4, 1.4]\n'),
+    "step": ("(0.5 if t < 1 else 1.4)", ""),
+    "schedule": ("d", "[schedules.s]\ntimes = [1]\nreset = { d = 1.4 }\n[discrete]\nd = 0.5\n"),
+    "start": ("1.4", ""),
+}
+
+
+@pytest.mark.parametrize("push", PUSHES)
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p"])
+def test_a_jump_of_force_parts_the_contact_that_it_exceeds(push: str, integrator: str) -> None:
+    """If both hold, 1.4 is below the 1.6 of f and above the 1.2 of g: the bodies slide together by (1.4 - 1.2)/2."""
+    force, more = PUSHES[push]
+    model = hs.Model.from_toml(
+        f"""
+[states]
+v = {{ start = 0, der = "{force} - f" }}
+w = {{ start = 0, der = "f - g" }}
+[contacts.f]
+velocity = "v - w"
+normal = 2
+law = {{ name = "static-kinetic", mu_s = 0.8, mu_k = 0.4 }}
+[contacts.g]
+velocity = "w"
+normal = 2
+law = {{ name = "static-kinetic", mu_s = 0.6, mu_k = 0.6 }}
+"""
+        + more
+    )
+    run = hs.simulate(model, (0, 2), integrator=integrator)
+    begin = 0 if push == "start" else 1
+    assert (run.status, run.t_end) == ("finished", 2.0)
+    assert run(2.0) == pytest.approx([0.1 * (2 - begin)] * 2, abs=1e-9)

@@ -141,7 +141,7 @@ def test_what_is_held_stays_held_where_a_guard_meets_a_tick(integrator: str) -> 
     "integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-rk45", "scipy-radau", "cvode-bdf"]
 )
 def test_a_guard_meets_a_tick_whose_time_is_rounded(integrator: str) -> None:
-    """In decimals the guard is zero at the first tick; in doubles that time has the rounding of the time at the start."""
+    """In decimals the guard is zero at the first tick; in doubles that time is rounded as the start is."""
     model = hs.Model.from_toml("""
 [parameters]
 start = 0

@@ -138,9 +138,19 @@ class Configurations(Values):
                     break
         return self.distinct(found)
 
+    def firm_together(self) -> list[str]:
+        """The contacts that were below their limits, and are if all of these hold: they have no cause to let go."""
+        modes = {name: options[0] for name, options in self.options().items()}
+        held = modes | {f: "stick" for f in self.firm if "stick" in self.options()[f]}
+        tape, watch = self.tape(held)
+        c = series(tape, [self.x[k] for k in self.names], self.surroundings(self.sides_of(tape)[0]), LOOK)
+        limits = {(f, n): slot for kind, f, n, slot in watch if kind == "limit"}
+        firm = [f for f in sorted(self.firm) if held[f] == "stick"]
+        return [] if c is None else [f for f in firm if all(c[limits[f, n]][0] > self.tol for n in "+-")]
+
     def distinct(self, found: list[Any]) -> list[Any]:
         """Admissible candidates without those that rest on less priority or are the same motion."""
-        for f in self.firm:
+        for f in self.firm_together() if len(found) > 1 else ():
             held = [c for c in found if c[0][f] == "stick"]
             found = held or found
         configs = [c[0] for c in found]
