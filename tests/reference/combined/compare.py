@@ -149,7 +149,7 @@ def compared(model: Abstract, renderer: Renderer, sol: Any, truth: Truth, integr
         near = event.t - shift
         if event.kind != "near-grazing" or near > certain - 1e-3:
             continue
-        if not any(abs(t - near) < 1e-3 for t, _ in motion.touches):
+        if not any(abs(t - near) < 1e-3 for t in [*motion.near, *(t for t, _ in motion.touches)]):
             what = f"near-grazing of {event.component} at {near:.6g}, where nothing touches zero"
             return Verdict("differs", integrator, sol.status, what, certain)
     return Verdict("agrees", integrator, sol.status, f"{worst[0]:.1e}", certain, worst[0])

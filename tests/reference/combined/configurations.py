@@ -150,9 +150,11 @@ class Configurations(Values):
 
     def distinct(self, found: list[Any]) -> list[Any]:
         """Admissible candidates without those that rest on less priority or are the same motion."""
-        for f in self.firm_together() if len(found) > 1 else ():
+        together = [c for c in found if all(c[0][f] == "stick" for f in self.firm)]
+        for f in self.firm_together() if len(found) > 1 and not together else ():
             held = [c for c in found if c[0][f] == "stick"]
             found = held or found
+        found = together or found
         configs = [c[0] for c in found]
 
         def outranked(config: dict[str, str]) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 from .blows import blow
 from .configurations import Configurations
-from .roots import first_negative, horner, lead
+from .roots import GRAZE, first_negative, horner, lead
 from .series import Slots, series
 from .values import Motion, Stop
 
@@ -215,3 +215,5 @@ class Judge(Configurations):
         self.time = at if not hit and first >= at - self.time else self.time + first
         if hit:
             self.motion.jumps.append(float(self.time))
+        elif any(abs(horner(row, first)) <= GRAZE * max(map(abs, row)) > self.tol for _, row, sign in slots if sign):
+            self.motion.near.append(float(self.time))

@@ -42,13 +42,13 @@ def first_negative(row: list[Any], h: Any, tol: float) -> tuple[Any | None, floa
     values = np.polynomial.polynomial.polyval(s, coefficients)
     slopes = np.polynomial.polynomial.polyval(s, coefficients[1:] * np.arange(1, len(coefficients)))
     size = np.abs(values).max() or 1.0
-    if values.min() > 0 and not ((slopes[:-1] < 0) & (slopes[1:] > 0)).any() and values[-1] > GRAZE * size:
+    if values.min() > 0 and not ((slopes[:-1] < 0) & (slopes[1:] >= 0)).any() and values[-1] > GRAZE * size:
         return None, None
     touch = None
     for i in range(SAMPLES):
         if values[i + 1] < 0:
             return bisected(q, s[i], s[i + 1] if i + 1 < SAMPLES else h, 1), touch
-        if slopes[i] < 0 < slopes[i + 1]:
+        if slopes[i] < 0 <= slopes[i + 1]:
             slope = [k * c for k, c in enumerate(q)][1:]
             dip = bisected(slope, s[i], s[i + 1], -1)
             value = horner(q, dip)

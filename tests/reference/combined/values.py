@@ -56,6 +56,7 @@ class Motion:
     events: list[tuple[float, str, str]] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)  # all instants at which something happened
     touches: list[tuple[float, str]] = field(default_factory=list)
+    near: list[float] = field(default_factory=list)  # known times at which something comes to zero
     unclear: list[tuple[float, str]] = field(default_factory=list)
     borders: list[float] = field(default_factory=list)  # times at which static friction is just enough
 
