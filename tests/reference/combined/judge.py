@@ -215,5 +215,7 @@ class Judge(Configurations):
         self.time = at if not hit and first >= at - self.time else self.time + first
         if hit:
             self.motion.jumps.append(float(self.time))
-        elif any(abs(horner(row, first)) <= GRAZE * max(map(abs, row)) > self.tol for _, row, sign in slots if sign):
+        elif any(
+            abs(horner(row, first)) <= GRAZE * max(map(abs, row)) > self.tol for _, row, sign in slots if sign
+        ):
             self.motion.near.append(float(self.time))
