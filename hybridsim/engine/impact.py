@@ -207,7 +207,10 @@ class _Collision:
         x = np.where(moved, at.x + shares.sum(axis=0), self._on_gaps(normal))
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
-        at.x, at.x_error = x, np.where(moved, error, UNIT * np.abs(x))
+        kept = np.where(
+            settling.pinned_states(normal), 0.0, at.x_error
+        )  # what gaps evaluate is as exact as they are
+        at.x, at.x_error = x, np.where(moved, error, np.maximum(kept, UNIT * np.abs(x)))
         # a rate that cannot be told from zero any more is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
         if len(normal) == 1 and 0.0 < restitution[0] < 1.0:

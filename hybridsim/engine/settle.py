@@ -338,7 +338,7 @@ class Settling:
             return "inconsistent", f"{len(sizes)} coupled components at their surfaces at once ({names})"
         candidates = together(self.system, taking_part, joint_candidates(sizes))
         at.x = self._pinned(taking_part)
-        at.x_error = np.where(self._pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
+        at.x_error = np.where(self.pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
         holds = np.array([automata[c].hold for c in taking_part])
         caused = candidates[with_cause(self, taking_part, candidates)]
         current = self._current(taking_part, holds)
@@ -396,7 +396,7 @@ class Settling:
                 return "step-failure", lost
         return "nonunique", self._say(components, candidates, _SEVERAL)
 
-    def _pinned_states(self, components: list[int]) -> np.ndarray:
+    def pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)
         mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
         return mask

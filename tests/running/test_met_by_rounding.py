@@ -171,3 +171,33 @@ set = { x = "start" }
         params = {name: float(value) for name, value in numbers.items()}
         run = hs.simulate(model, span, params=params, integrator=integrator)
         assert run.output("n", run.t_end) == 1
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor"])
+def test_a_touch_at_the_instant_of_an_impact_is_no_event(integrator: str) -> None:
+    """The impact leaves the errors of what it does not move as they are."""
+    model = hs.Model.from_toml("""
+[parameters]
+bend = 1
+at = 1
+[states]
+h = { start = "at**2", der = "w" }
+w = { start = 0, der = "p - 2" }
+y = { start = "bend*at**2", der = "2*bend*(t - at)" }
+z = { start = "bend*at**2", der = "s" }
+s = { start = "-2*bend*at", der = "2*bend" }
+[impacts.p]
+gap = "h"
+restitution = 0.5
+[components.a]
+initial = "on"
+[components.a.modes.on]
+guards.g = { expr = "y", then = [{ to = "off" }] }
+guards.k = { expr = "z", then = [{ to = "off" }] }
+[components.a.modes.off]
+""")
+    rng = random.Random(1)
+    for _ in range(20):
+        numbers = {"bend": rng.uniform(0.5, 2), "at": rng.uniform(0.5, 2)}
+        run = hs.simulate(model, (0, 1.2 * numbers["at"]), params=numbers, integrator=integrator)
+        assert [event.component for event in run.events if event.kind == "transition"] == ["p"]
