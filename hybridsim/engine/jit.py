@@ -13,9 +13,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hybridsim.engine.cache import cache_root, kernel_folder, store
 
@@ -333,10 +335,21 @@ if ENABLED:
 else:
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Leave the function as it is: the compiler is switched off."""
+        """The function itself: the compiler is switched off. As in compiled code, NaN is no warning."""
+
+        @wraps(function)
+        def quiet(*arguments: Any) -> Any:
+            with np.errstate(all="ignore"):
+                return function(*arguments)
+
+        return quiet
+
+    def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function itself: what calls it is a kernel."""
         return function
 
-    inlined = merged = allocating_kernel = polynomial_kernel = kernel
+    merged = polynomial_kernel = inlined
+    allocating_kernel = kernel
 
     def seconds_compiling() -> float:
         """None: nothing is compiled."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
+from engine.uncompiled import uncompiled
 
 from hybridsim.engine.recipe import Numbers, Recipe
 
@@ -49,3 +50,15 @@ def test_no_decision_goes_unnoticed() -> None:
     for decide in (lambda: a < b, lambda: bool(a), lambda: a >= 1.0, lambda: max(a, b)):
         with pytest.raises(TypeError):
             decide()
+
+
+def test_what_is_no_number_is_no_warning_where_nothing_is_compiled() -> None:
+    """As in compiled code: 0/0 is told by its value."""
+    code = """
+import math, warnings
+warnings.simplefilter("error")
+from hybridsim.engine.recipe import computed
+from hybridsim.engine.tape import DIV
+print(math.isnan(computed(DIV, (0.0, 0.0), 0, 0)[0]), computed(DIV, (1.0, 0.0), 0, 0)[0])
+"""
+    assert uncompiled(code).split() == ["True", "inf"]
