@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from fractions import Fraction
 
 import pytest
 from reference.combined import compare
 from reference.combined.compare import judged
 from reference.combined.forms import TIME, Abstract, Contact, Impact, Node, abs_, node, sin, var
 from reference.combined.parts import PARTS, alone
+from reference.combined.roots import first_negative
 from reference.combined.shrink import shrunk
 from reference.combined.trial import QUIET, features, single_runs, trials
 from reference.combined.values import Digits
@@ -142,3 +144,11 @@ def test_what_the_disagreement_does_not_need_is_taken_away() -> None:
     model = alone("walls", 1).m
     small = shrunk(model, lambda m: len(m.impacts) > 0 and m.duration > 0)
     assert len(small.impacts) == 1 and not small.states and not small.contacts
+
+
+@pytest.mark.parametrize("dip", [0.25, 0.3])
+def test_the_judge_sees_a_touch_wherever_its_samples_are(dip: float) -> None:
+    """(s - dip)^2 on an interval of 1, with one of the 48 samples at a quarter of it exactly, and none at 0.3."""
+    row = [Fraction(dip) ** 2, -2 * Fraction(dip), Fraction(1)]
+    zero, touch = first_negative(row, Fraction(1), 1e-30)
+    assert zero is None and touch == pytest.approx(dip, abs=1e-12)
