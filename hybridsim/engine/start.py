@@ -41,15 +41,16 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
 def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     """Bounds of the errors of the states at the start.
 
-    Of an expression that of its evaluation. Of any other number its own roundoff, as the value of some expression that
-    nobody knows; whole numbers are exact.
+    Of an expression that of its evaluation and of the numbers in it. Of any other number its own roundoff, as the value
+    of some expression that nobody knows; whole numbers are exact. On a surface it stands beside a number of its size,
+    such as the speed of a belt, which is rounded as well.
     """
-    errors = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
-    declared = system.start_state({})
+    rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
+    errors, declared = rounding.copy(), system.start_state({})
     for i, state in enumerate(system.model.states):
         if x0[i] == declared[i] and not isinstance(state.start.tree, ast.Constant):
-            errors[i] = max(errors[i], rounding_of(state.start, system.values))
-    return errors
+            errors[i] = max(errors[i], rounding_of(state.start, system.values, of_numbers=UNIT))
+    return errors + rounding
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:

@@ -18,20 +18,20 @@ _WIDER = 2.0**10  # arguments are moved by so much more than their errors, which
 _OF_FUNCTIONS = 2.0  # units of roundoff that the functions of the mathematics library are within
 
 
-def rounding_of(expr: Expression, values: Mapping[str, float]) -> float:
-    """Bound of the error of an expression's value, at values of its names that count as exact."""
-    return _with_error(expr.tree, values)[1]
+def rounding_of(expr: Expression, values: Mapping[str, float], of_numbers: float = 0.0) -> float:
+    """Bound of the error of an expression's value; of_numbers: relative, of those in it that are not whole."""
+    return _with_error(expr.tree, values, of_numbers)[1]
 
 
-def _with_error(node: ast.expr, values: Mapping[str, float]) -> tuple[float, float]:
+def _with_error(node: ast.expr, values: Mapping[str, float], unit: float) -> tuple[float, float]:
     value = float(value_of(node, values))
     match node:
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            return value, _with_error(operand, values)[1]
+            return value, _with_error(operand, values, unit)[1]
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            return _with_error(body if value_of(test, values) else orelse, values)
+            return _with_error(body if value_of(test, values) else orelse, values, unit)
         case ast.BinOp(left=left, op=op, right=right):
-            (a, da), (b, db) = _with_error(left, values), _with_error(right, values)
+            (a, da), (b, db) = (_with_error(side, values, unit) for side in (left, right))
             if isinstance(op, ast.Pow):
                 return value, _carried(node, [(a, da), (b, db)], value)
             off = float(abs(_EXACT[type(op)](Fraction(a), Fraction(b)) - Fraction(value)))
@@ -42,8 +42,8 @@ def _with_error(node: ast.expr, values: Mapping[str, float]) -> tuple[float, flo
                 return value, ((da + abs(value) * db) / least if least > 0.0 else math.inf) + off
             return value, da + db + off
         case ast.Call(args=args):
-            return value, _carried(node, [_with_error(arg, values) for arg in args], value)
-    return value, 0.0
+            return value, _carried(node, [_with_error(arg, values, unit) for arg in args], value)
+    return value, unit * abs(value) if unit and not value.is_integer() else 0.0
 
 
 def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import random
+from decimal import Decimal
+
 import pytest
 
 import hybridsim as hs
@@ -65,3 +68,29 @@ law = {{ name = "static-kinetic", mu_s = 0.6, mu_k = 0.6 }}
     begin = 0 if push == "start" else 1
     assert (run.status, run.t_end) == ("finished", 2.0)
     assert run(2.0) == pytest.approx([0.1 * (2 - begin)] * 2, abs=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853", "rodas5p"])
+@pytest.mark.parametrize("load", ["2.5", "-2.5", "3", "-3", "mu*10", "-mu*10"])
+def test_a_start_at_the_speed_of_a_belt_holds_up_to_the_static_limit(integrator: str, load: str) -> None:
+    """The speed is one decimal number, which the start and the belt write in two ways: doubles may differ by an ulp."""
+    draw = random.Random(load)
+    for _ in range(12):
+        a, b, times = (
+            Decimal(draw.randint(1, 99)) / 100,
+            Decimal(draw.randint(1, 99)) / 100,
+            draw.choice([3, 7]),
+        )
+        start, belt = draw.choice(
+            [("a + b", a + b), (f"{times}*a", times * a), ("a*b", a * b), ("a - b", a - b)]
+        )
+        model = hs.Model(
+            "belt",
+            states=[hs.State("v", start, f"{load} - f")],
+            parameters={"a": float(a), "b": float(b), "mu": 0.3},
+            contacts=[hs.Contact("f", f"v - ({belt})", 10, "static-kinetic", {"mu_s": "mu", "mu_k": 0.2})],
+        )
+        for x0 in (None, {"v": model.start_values()["v"]}):
+            sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, x0=x0)
+            assert [part.mode for part in sol.modes["f"]] == ["stick"]
+            assert sol(1.0)[0] == pytest.approx(float(belt), rel=1e-15)
