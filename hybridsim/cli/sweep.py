@@ -177,17 +177,18 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
 
 
 def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> float:
-    """The end of all runs, which is refused where it is written over what is swept."""
+    """The end of all runs, which is refused where it depends on what is swept."""
     end = values.end_time(model, text)
-    for name, row in axes.items() if text is not None else ():
+    for name, row in axes.items():
         ends = {end}
-        for value in (row[0], row[-1]):
+        for value in row:
             with suppress(HybridsimError):  # a value that no model takes fails at its own points
                 ends.add(values.end_time(model.with_(**{name: value}), text))
         if len(ends) > 1:
+            what = "the end of the runs" if text is None else f"--t-end {text}"
             raise UsageError(
-                f"--t-end {text} depends on {name}, which is swept, and all runs end at one time",
-                remedy="give the time as a number",
+                f"{what} depends on {name}, which is swept, and all runs end at one time",
+                remedy="give --t-end as a number",
             )
     return end
 

@@ -102,3 +102,21 @@ def test_a_sweep_that_is_refused_leaves_no_folder(hybridsim: Callable, tmp_path:
     code, _, err = hybridsim("sweep", "dfcs", "F0=20:30:3", "--measure", "amplitude.q", "--out", "q")
     assert code == 2 and "amplitude.q" in err
     assert not (tmp_path / "q").exists()
+
+
+@pytest.mark.parametrize(
+    ("end", "rate", "want"),
+    [('duration = "2*R"', "1", [2.0, 2.0]), ("", "cos(R*t)", [math.sin(2.0), math.sin(6.0) / 3.0])],
+)
+def test_the_end_of_a_model_that_depends_on_what_is_swept_is_refused(
+    end: str, rate: str, want: list[float], hybridsim: Callable, tmp_path: Path
+) -> None:
+    model = tmp_path / "d.toml"
+    model.write_text(
+        f"""schema = 1\nname = "d"\n{end}\nparameters = {{ R = 2 }}\nstates.x = {{ start = 0, der = "{rate}" }}\n"""
+    )
+    code, out, err = hybridsim("sweep", model, "R=1,3", "--measure", "final")
+    assert code == 2 and "the end of the runs depends on R" in err and "--t-end" in err and not out
+    code, out, err = hybridsim("sweep", model, "R=1,3", "--measure", "final", "--t-end", "2", "--json")
+    assert code == 0, err
+    assert json.loads(out)["values"]["final.x"] == pytest.approx(want, rel=1e-6)
