@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -173,6 +174,35 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
     return (
         reasons[place] if " in mode " in reasons[place] else f"{place}{reasons[place]}"
     )  # a guard's title has it
+
+
+def is_linear_beside_corners(system: System) -> bool:
+    """Whether each mode is linear on both sides of each corner as well, at the values of the parameters."""
+    known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
+    for p in (None, tuple(system.values.values())):
+        if p not in known:
+            if len(known) >= _KEPT:
+                known.clear()
+            known[p] = _is_linear_beside_corners(system, p)
+        if known[p]:
+            return True
+    return False
+
+
+def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool:
+    counts = [len(automaton.modes) for automaton in system.automata]
+    corners = [c for c, automaton in enumerate(system.automata) if automaton.is_corner]
+    for k, c in product(corners, range(len(counts))):
+        for side, mode in product(range(1, counts[k]), range(1, counts[c])):
+            z = np.zeros(len(counts), dtype=np.int64)
+            z[k], z[c] = side, mode
+            try:
+                LinearMode(system, Atoms(), z, p)
+            except DividesByZero:
+                continue  # no such motion
+            except NotLinear:
+                return False
+    return True
 
 
 def refuse_nonlinear(system: System) -> None:

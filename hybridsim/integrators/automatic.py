@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear_modes import what_is_not_linear
+from hybridsim.engine.linear_modes import is_linear_beside_corners, what_is_not_linear
 from hybridsim.engine.outcome import Situation
 from hybridsim.engine.python_code import PythonCode
 from hybridsim.engine.rosenbrock_step import linearise
@@ -47,7 +47,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     model = system.model
     is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
     is_watched, rest = bool(model.monitors or model.inputs), ""
-    if is_small and what_is_not_linear(system) is None:
+    if is_small and what_is_not_linear(system) is None and is_linear_beside_corners(system):
         if not is_watched:
             return Choice("exact", "its modes are linear in the states")
         what = "monitors" if model.monitors else "inputs"

@@ -225,3 +225,29 @@ def test_a_decision_does_not_hang_on_the_last_bits_of_a_basis(
     sol = hs.simulate("pid-servo", (0, 40), params={"ki": 200 + seed / 1024}, integrator="exact")
     assert sol.status == "finished" and sol.events[-1].target == "stick"
     assert sol(40.0)[1] == 0.0
+
+
+BESIDE_A_CORNER = """
+[states]
+v = { start = 1.8, der = -1 }
+[discrete]
+k = 0.5
+[components.a]
+initial = "on"
+[components.a.modes.on]
+guards.g = { expr = "v - 1", then = [{ to = "off" }] }
+[components.a.modes.off]
+guards.g = { expr = "0.5 + (v if v > 0 else k*v)", then = [{ to = "out" }] }
+[components.a.modes.out]
+"""
+
+
+def test_auto_leaves_a_mode_that_is_not_linear_beyond_a_corner_to_another_method() -> None:
+    """v = 1.8 - t is 1 at 0.8 and -1 at 2.8, where half of it makes the second guard zero."""
+    model = hs.Model.from_toml(BESIDE_A_CORNER)
+    run = hs.simulate(model, (0, 4), integrator="auto")
+    assert run.status == "finished"
+    assert run.event_times("a") == pytest.approx([0.8, 2.8], abs=1e-9)
+    linear = hs.Model.from_toml(BESIDE_A_CORNER.replace("k*v", "v/2"))
+    run = hs.simulate(linear, (0, 4), integrator="auto")
+    assert "exact" in run.message and run.event_times("a") == pytest.approx([0.8, 2.8], abs=1e-14)
