@@ -477,16 +477,13 @@ class ModeLoop:
     ) -> Outcome:
         """Settle a scheduled instant, inputs as they are from then on.
 
-        before: what holds until then. s_error: how well the zeros of what was located there are known. What is held is
-        evaluated for the instant: a guard that was located at it may have been some ulp away.
+        before: what holds until then. s_error: how well the zeros of what was located there are known.
         """
         system, z, discrete = self.system, before.z, self.system.discrete(before.p)
-        p, x = system.vector(instant, discrete, self.forward), x_minus.copy()
-        if system.can_hold:
-            x = system.project(0.0, x, system.vector(instant, discrete, not self.forward), z)
+        p = system.vector(instant, discrete, self.forward)
         error = error.copy()
         error[system.evaluated(z)] = 0.0
-        at = Situation(0.0, x, p, z.copy(), error, max(s_error, math.ulp(0.0)))
+        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
         resets = [("schedule", k) for k in schedules]
         settling = Settling(system, at, z.copy(), self.forward)
         settling.jumped = surfaces_jump(system, instant, at, self.forward)
