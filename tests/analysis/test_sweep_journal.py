@@ -7,8 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from analysis import swept
 from analysis.swept import end
 
 import hybridsim as hs
+from hybridsim.analysis.sweep.identity import identity
 from hybridsim.cli import main
 
 VALUES = {"F0": np.linspace(20.0, 40.0, 12).tolist(), "omega": [350.0, 424.0, 500.0]}
@@ -181,13 +184,130 @@ def test_a_journal_serves_no_measure_that_reads_another_constant(
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, _over_level, journal=path)
 
 
+class _Scaled:
+    """A measure with a factor of its class, and a method that its call uses."""
+
+    factor = 1.0
+
+    def __call__(self, model: hs.Model) -> float:
+        return self.factor * self.read(model) + self.added()
+
+    def read(self, model: hs.Model) -> float:
+        return model.parameter_values()["F0"]
+
+    @staticmethod
+    def added() -> float:
+        return 0.0
+
+
+class _Heir(_Scaled):
+    pass
+
+
+def _asks_a_class(model: hs.Model) -> float:
+    return model.parameter_values()["F0"] + _Scaled.added()
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("factor", 2.0),
+        ("read", lambda self, model: 10.0 * model.parameter_values()["F0"]),
+        ("added", staticmethod(lambda: 1.0)),
+    ],
+)
+@pytest.mark.parametrize("measure", [_Scaled(), _Heir(), _Scaled().__call__, _asks_a_class])
+def test_a_journal_serves_no_measure_of_a_class_that_has_changed(
+    measure: Callable[[hs.Model], float],
+    name: str,
+    part: object,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "sweep.journal"
+    whole = hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
+    monkeypatch.setattr(_Scaled, name, part)
+    with pytest.raises(hs.UsageError, match="of another sweep"):
+        hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
+    monkeypatch.undo()
+    assert same(whole, hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path))
+
+
+class _Slotted:
+    __slots__ = ("factor",)
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def __call__(self, model: hs.Model) -> float:
+        return self.factor * model.parameter_values()["F0"]
+
+
+class _Silent(_Slotted):
+    def __repr__(self) -> str:
+        return "silent"
+
+
+class _Row(list[float]):
+    def __call__(self, model: hs.Model) -> float:
+        return self[0] * model.parameter_values()["F0"]
+
+
+@dataclass
+class _Both(_Slotted):
+    factor: float
+
+
+@pytest.mark.parametrize("kind", [_Slotted, _Silent, _Both, lambda factor: _Row([factor])])
+def test_an_object_is_told_by_its_state(
+    kind: Callable[[float], Callable[[hs.Model], float]], tmp_path: Path
+) -> None:
+    path = tmp_path / "sweep.journal"
+    assert identity(partial(_asks_a_class, kind(1.0))) != identity(partial(_asks_a_class, kind(2.0)))
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(1.0), journal=path)
+    hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(1.0), journal=path)
+    with pytest.raises(hs.UsageError, match="of another sweep"):
+        hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(2.0), journal=path)
+
+
+def test_what_cannot_be_told_from_another_one_is_refused(tmp_path: Path) -> None:
+    lock, path = threading.Lock(), tmp_path / "sweep.journal"
+
+    def measure(model: hs.Model) -> float:
+        with lock:
+            return model.parameter_values()["F0"]
+
+    with pytest.raises(hs.UsageError, match=r"an object of lock(?s:.)*__getstate__"):
+        hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
+    assert not path.exists()
+    assert hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure)["value"].tolist() == [20.0, 30.0]
+
+
+def test_what_reads_itself_or_names_no_value_yet_is_told() -> None:
+    def ring(factor: float) -> Callable[[int], float]:
+        def inner(n: int) -> float:
+            return factor if n < 1 else inner(n - 1) + later
+
+        return inner
+        later = 1.0  # type: ignore[unreachable]
+
+    assert identity(ring(1.0)) == identity(ring(1.0)) != identity(ring(2.0))
+
+
 def test_a_measure_is_told_alike_in_another_process() -> None:
     """By code, constants, closures and functions that are not written in Python."""
     text = (
         "import numpy as np, hybridsim as hs\n"
         "from hybridsim.analysis.sweep.identity import identity\n"
         "measure = (lambda k: lambda model: np.max(k))(2.0)\n"
-        "print(identity([measure, np.max, np.arange(3.0), hs.load('dfcs')]))"
+        "import enum, functools, dataclasses\n"
+        "class Side(enum.Enum):\n    left = {'a', 'b', 'c'}\n    right = 2\n"
+        "@dataclasses.dataclass\nclass One:\n    side: Side\n    names: frozenset = frozenset({'x', 'y', 'z'})\n"
+        "    @functools.cached_property\n    def twice(self): return 2\n"
+        "    def __call__(self, model): return self.twice, {'p', 'q', 'r'}, One\n"
+        "more = [One(Side.left), functools.lru_cache(measure), np.sin, len, dict.get, [].append]\n"
+        "more += [np.random.default_rng(1), np.float64(2), np.dtype(float), 1j, slice(1, 2)]\n"
+        "print(identity([measure, np.max, np.arange(3.0), hs.load('dfcs'), more]))"
     )
     told = {subprocess.check_output([sys.executable, "-c", text]) for _ in range(2)}
     assert len(told) == 1

@@ -1,74 +1,184 @@
 """What tells one value from another, in a text: of a function its code and all that it reads, of an array its bytes.
 
 A file of a sweep that was interrupted serves the sweep that it was begun for. A function's name does not tell it: an
-edited measure, another lambda or another closure may have the same.
+edited measure, another lambda or another closure may have the same. An object is its class and its state as pickle
+takes it, and a class is all that it and its bases define. What comes with Python or is installed is known by its name
+and version.
 """
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
+import sys
+import sysconfig
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from functools import partial
-from inspect import getattr_static
-from types import CodeType, FunctionType, MethodType, ModuleType
+from functools import cached_property, partial
+from operator import itemgetter
+from pathlib import Path
+from types import (
+    BuiltinFunctionType,
+    CellType,
+    CodeType,
+    FunctionType,
+    GetSetDescriptorType,
+    MemberDescriptorType,
+    MethodType,
+    ModuleType,
+)
 from typing import Any
 
 import numpy as np
 
+from hybridsim.errors import UsageError
 
-def identity(value: Any, seen: tuple[int, ...] = ()) -> str:
-    """A text that is the same for what is the same, also in another process; seen: what this is a part of."""
-    if id(value) in seen:
-        return "itself"
-    seen = (*seen, id(value))
+_PLAIN = (type(None), bool, int, float, complex, str, bytes, type(...), type(NotImplemented), range)
+_INSTALLED = {Path(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")}
+_EMPTY = CellType()
+_NOT_READ = {"__module__", "__doc__", "__dict__", "__weakref__", "_abc_impl", "__slotnames__"} | {
+    "__annotations__", "__annotate_func__", "__annotations_cache__", "__firstlineno__", "__static_attributes__"
+}  # fmt: skip
 
-    def of(part: Any) -> str:
-        return identity(part, seen)
 
-    if isinstance(value, np.ndarray):
-        if value.dtype.hasobject:
-            return f"array({value.shape}, {of(value.ravel().tolist())})"
-        return f"array({value.dtype.str}, {value.shape}, {hashlib.sha256(value.tobytes()).hexdigest()})"
-    if isinstance(value, np.generic):
-        return of(value.item())
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(sorted(f'{of(k)}: {of(v)}' for k, v in value.items()))}}}"
-    if isinstance(value, list | tuple):
-        return f"({', '.join(map(of, value))})"
-    if isinstance(value, set | frozenset):
-        return f"{{{', '.join(sorted(map(of, value)))}}}"
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = {field.name: getattr(value, field.name) for field in fields(value)}
-        return f"{type(value).__qualname__}{of(parts)}"
-    if isinstance(value, partial):
-        return f"partial({of(value.func)}, {of(value.args)}, {of(value.keywords)})"
-    if isinstance(value, MethodType):
-        return f"method({of(value.__func__)}, {of(value.__self__)})"
-    if isinstance(value, FunctionType):
-        return f"function({', '.join(map(of, _read_by(value)))})"
-    if isinstance(value, CodeType):
-        return f"code({value.co_code.hex()}, {of(value.co_names)}, {of(value.co_consts)})"
-    if isinstance(value, ModuleType):
-        return value.__name__
-    if hasattr(value, "__qualname__"):  # of classes, and of functions that are not written in Python
-        return f"{value.__module__}.{value.__qualname__}"
-    text = repr(value)
-    if f" at {id(value):#x}" not in text:
-        return text
-    call = getattr_static(type(value), "__call__", None) if callable(value) else None
-    return f"{of(type(value))}({of(getattr(value, '__dict__', None))}, {of(call)})"
+def identity(value: Any) -> str:
+    """A text that is the same for what is the same, also in another process.
+
+    Raises
+    ------
+    UsageError
+        For what has no state that can be told.
+    """
+    return _Teller().of(value)
+
+
+class _Teller:
+    """Tells values that may be parts of one another."""
+
+    def __init__(self) -> None:
+        self._around: list[int] = []  # what is being told: a value may be a part of itself
+        self._known: dict[int, str] = {}  # functions and classes that many others may read
+
+    def of(self, value: Any) -> str:
+        if type(value) in _PLAIN:
+            return repr(value)
+        if id(value) in self._around:
+            return f"part of itself({self._around.index(id(value))})"
+        if id(value) in self._known:
+            return self._known[id(value)]
+        self._around.append(id(value))
+        told = self._told(value)
+        self._around.pop()
+        if isinstance(value, FunctionType | type):
+            told = self._known[id(value)] = hashlib.sha256(told.encode()).hexdigest()
+        return told
+
+    def _told(self, value: Any) -> str:
+        if isinstance(value, ModuleType):
+            return _of_module(value.__name__)
+        if isinstance(value, FunctionType | type) and _is_library(_module(value)):
+            return f"{_of_module(_module(value))}.{value.__qualname__}"
+        if isinstance(value, type):
+            return self._class(value)
+        if isinstance(value, FunctionType):
+            return f"function({', '.join(map(self.of, _read_by(value)))})"
+        if isinstance(value, CodeType):
+            parts = (
+                value.co_code,
+                value.co_exceptiontable,
+                value.co_names,
+                value.co_varnames,
+                value.co_consts,
+            )
+            return f"code({', '.join(map(self.of, parts))})"
+        if isinstance(value, MethodType):
+            return f"method({self.of(value.__func__)}, {self.of(value.__self__)})"
+        if isinstance(value, GetSetDescriptorType | MemberDescriptorType):
+            return value.__qualname__
+        return self._data(value)
+
+    def _data(self, value: Any) -> str:
+        if type(value) is np.ndarray and not value.dtype.hasobject:
+            return f"array({value.dtype!r}, {value.shape}, {hashlib.sha256(value.tobytes()).hexdigest()})"
+        if type(value) is np.ndarray:
+            return f"array({value.shape}, {self.of(value.ravel().tolist())})"
+        if isinstance(value, np.generic) and type(value.item()) in _PLAIN:
+            return self.of(value.item())
+        if isinstance(value, Mapping) and _is_library(_module(type(value))):
+            keys = sorted(((self.of(key), key) for key in value), key=itemgetter(0))
+            return f"{{{', '.join(f'{told}: {self.of(value[key])}' for told, key in keys)}}}"
+        if type(value) in (list, tuple):
+            return f"({', '.join(map(self.of, value))})"
+        if type(value) in (set, frozenset):
+            return f"{{{', '.join(sorted(map(self.of, value)))}}}"
+        return f"{self.of(type(value))}({self._state(value)})"
+
+    def _class(self, value: type) -> str:
+        """All that a class and its bases define."""
+        defined = {name: part for name, part in vars(value).items() if name not in _NOT_READ}
+        parts = (value.__qualname__, type(value), value.__bases__, defined)
+        return f"class({', '.join(map(self.of, parts))})"
+
+    def _state(self, value: Any) -> str:
+        if isinstance(value, partial):
+            return self.of((value.func, value.args, value.keywords))
+        if isinstance(value, staticmethod | classmethod):
+            return self.of(value.__func__)
+        if isinstance(value, property):
+            return self.of((value.fget, value.fset, value.fdel))
+        if isinstance(value, cached_property):
+            return self.of(value.func)
+        if isinstance(getattr(value, "__wrapped__", None), FunctionType):  # compiled, or with a cache
+            return self.of(value.__wrapped__)
+        if is_dataclass(value) and _is_library(_module(type(value))):
+            return self.of({field.name: getattr(value, field.name) for field in fields(value)})
+        if isinstance(value, BuiltinFunctionType) and isinstance(value.__self__, ModuleType | type(None)):
+            return f"{value.__module__}.{value.__qualname__}"
+        try:
+            reduce = copyreg.dispatch_table.get(type(value))
+            state = value.__reduce_ex__(4) if reduce is None else reduce(value)
+        except Exception as error:  # a class may be anybody's: whatever it raises, it cannot be told
+            raise UsageError(
+                f"the measure reads an object of {type(value).__qualname__}, and a journal cannot tell it from "
+                f"another one: {error}",
+                remedy="sweep without a journal, or give its class a method __getstate__ that returns what it holds",
+            ) from error
+        if isinstance(state, str):
+            return f"{_of_module(_module(value))}.{state}"
+        made, given, *rest = state
+        held, items, pairs = (*rest, None, None, None)[:3]
+        return self.of((made, given, held, list(items or ()), dict(pairs or ())))
+
+
+def _module(value: Any) -> str:
+    """Where a class or function is from; some that are not written in Python have something else for it."""
+    name = getattr(value, "__module__", None)
+    return name if isinstance(name, str) else "builtins"
+
+
+def _is_library(name: str) -> bool:
+    """Whether a module comes with Python, is installed, or is of this package."""
+    top = name.partition(".")[0]
+    if top in sys.stdlib_module_names or top == __name__.partition(".")[0]:
+        return True
+    file = getattr(sys.modules.get(name), "__file__", None)
+    return file is not None and not _INSTALLED.isdisjoint(Path(file).parents)
+
+
+def _of_module(name: str) -> str:
+    """A module of a library by its version, any other by its file."""
+    module = sys.modules.get(name)
+    if _is_library(name) or not (file := getattr(module, "__file__", None)) or not Path(file).is_file():
+        return f"{name} {getattr(sys.modules.get(name.partition('.')[0]), '__version__', '')}"
+    return f"{name} {hashlib.sha256(Path(file).read_bytes()).hexdigest()}"
 
 
 def _read_by(function: FunctionType) -> list[Any]:
-    """What the result of a function depends on beside its arguments; functions of other files by their names."""
+    """What the result of a function depends on beside its arguments."""
     code = function.__code__
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    found = {name: function.__globals__[name] for name in _names(code) if name in function.__globals__}
-    for name, value in found.items():
-        if isinstance(value, FunctionType) and value.__module__ != function.__module__:
-            found[name] = f"{value.__module__}.{value.__qualname__}"
-    return [code, function.__defaults__, function.__kwdefaults__, cells, found]
+    cells = [cell.cell_contents for cell in function.__closure__ or () if cell != _EMPTY]
+    found = {n: function.__globals__[n] for n in sorted(_names(code)) if n in function.__globals__}
+    return [code, function.__defaults__, function.__kwdefaults__, cells, vars(function), found]
 
 
 def _names(code: CodeType) -> set[str]:

@@ -86,7 +86,8 @@ def sweep(
     journal : str or path, optional
         A file to which results are written as they come. The same sweep with the same file takes from it what
         there is: what was killed loses at most the points that were being worked at (with ``warm_start`` the
-        rows), and the result is to the last bit that of a sweep in one.
+        rows), and the result is to the last bit that of a sweep in one. A function is known by its code and all that
+        it reads, an object by its class and its state; what cannot be told from another one is refused.
     progress : callable, optional
         Called as progress(done, total, what is next).
     **options : Any
@@ -137,10 +138,15 @@ def sweep(
         warm_start,
     )
     began = time.perf_counter()
-    mark = fingerprint(
-        model.to_toml() if model.flow is None else model, points, measure, warm_start, options, __version__
+    asked = (
+        model.to_toml() if model.flow is None else model,
+        points,
+        measure,
+        warm_start,
+        options,
+        __version__,
     )
-    with Journal(journal, mark) if journal is not None else nullcontext() as file:
+    with Journal(journal, fingerprint(*asked)) if journal is not None else nullcontext() as file:
         collected, finished, who = work(job, points, executor, count, tell, file)
     nothing = measured.nothing() if isinstance(measured, Steady | Final | LastPeriod) else None
     found = collected.values(points.shape, nothing)
