@@ -44,7 +44,7 @@ def plain_start(
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     set_origin((origin_at, phases_at), rates, t0, 0.0, p)
     for i in range(x.shape[0]):
-        x_error[i] = 0.0
+        x_error[i] = 0.0 if x[i] == round(x[i]) else 2.0 * UNIT * abs(x[i])  # as `engine.start.start_errors`
     if not _take_sides(automata, inputs, surfaces, pin_at, state, work):
         return False
     for c in range(z.shape[0]):

@@ -94,3 +94,15 @@ def test_a_start_at_the_speed_of_a_belt_holds_up_to_the_static_limit(integrator:
             sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, x0=x0)
             assert [part.mode for part in sol.modes["f"]] == ["stick"]
             assert sol(1.0)[0] == pytest.approx(float(belt), rel=1e-15)
+
+
+def test_runs_of_a_sweep_start_at_the_speed_of_a_belt_as_one_run_does() -> None:
+    """A start of 3*0.1 is the belt's 0.3: the body rides on it, below the static limit of 3 and above the kinetic 2."""
+    model = hs.Model(
+        "belt",
+        states=[hs.State("x", 0, "v"), hs.State("v", "3*b", "F + A*sin(om*t) - f")],
+        parameters={"b": 0.1, "F": 2.5, "A": 1e-3, "om": 6.283185307179586},
+        contacts=[hs.Contact("f", "v - 0.3", 10, "static-kinetic", {"mu_s": 0.3, "mu_k": 0.2})],
+    )
+    found = hs.sweep(model, {"F": [2.4, 2.5, 2.6]}, measure=["stick_fraction.f", "peak.v"], after=3)
+    assert found["stick_fraction.f"] == pytest.approx(1.0) and found["peak.v"] == pytest.approx(0.3)
