@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.accumulation import Accumulation, accumulated
 from hybridsim.engine.checkpoint import Checkpoint, damaged
-from hybridsim.engine.decide import side_after
+from hybridsim.engine.decide import side_after, side_before
 from hybridsim.engine.diagnosis import power_without_value
 from hybridsim.engine.first_modes import as_given
 from hybridsim.engine.fixed_blocks import StepOccurrences, StepSegments
@@ -375,7 +375,7 @@ class FixedStepRun:
         self.origin = instant
         p = self._vector()
         before = np.where(starting, self.task.z0, self.z)
-        sides = np.sign(self._monitors(0.0, self.x, p))
+        x, sides = self.x, np.sign(self._monitors(0.0, self.x, p))
         # what was located lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
         x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
@@ -422,7 +422,16 @@ class FixedStepRun:
                     "terminated",
                     f"ended by {schedule.name} at t = {float(instant)!r}",
                 )
-        self._crossed_in_jump(instant, sides, np.sign(self._monitors(0.0, self.x, self._vector())), monitors)
+        left = _left(sides, self._monitors(0.0, self.x, self._vector()))
+        left[list(monitors)] = False
+        if left.any():
+            series = system.series(0.0, x, p, before, x_error, s_error)
+            # a little beyond its zero a monitor is on the side that it had before
+            for k in map(int, np.flatnonzero(left)):
+                value, bound = series.monitors[k], series.monitor_bounds[k]
+                sides[k] = side_before(value, bound, 1)[0] if abs(value[0]) <= bound[0] else sides[k]
+            left &= (sides != 0) & (outcome.monitor_sides != sides)
+            self._monitor_events(instant, np.flatnonzero(left), -sides.astype(np.int64), self.x)
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
         changed = tuple(sorted({c.component for c in outcome.changes}))
@@ -431,13 +440,6 @@ class FixedStepRun:
             record.status = "accumulation"
             record.message = accumulated(limit, system.automata, has_rtol=False)
         return record.status != "finished"
-
-    def _crossed_in_jump(
-        self, instant: Instant, before: np.ndarray, after: np.ndarray, handled: tuple[int, ...]
-    ) -> None:
-        """Record the monitors that a reset carried to their other side."""
-        crossed = [k for k in np.flatnonzero(before * after < 0.0) if k not in handled]
-        self._monitor_events(instant, np.array(crossed, dtype=np.int64), after.astype(np.int64), self.x)
 
     # -- the record -----------------------------------------------------------------------------------------
 

@@ -93,6 +93,27 @@ def test_time_stepping_ends_at_a_stop_from_either_side(action: str, speed: float
     assert sol.status == ("terminated" if action == "terminate" else "finished")
 
 
+AT_RESETS = (
+    "set to zero",
+    "bounce of a guard",
+    "a corner to zero",
+    "a corner from zero",
+    "size of a speed that passes zero",
+)
+
+
+@pytest.mark.parametrize("integrator", ["rk4-dichotomy", "moreau"])
+@pytest.mark.parametrize("what", AT_RESETS)
+def test_fixed_steps_fire_by_the_sides_before_and_after_a_reset(integrator: str, what: str) -> None:
+    text, expr, end, times = SITUATIONS[what]
+    for action in ACTIONS:
+        sol = hs.simulate(
+            model(text + monitor(expr, "both", action)), (0, end), integrator=integrator, step=1e-2
+        )
+        assert fired(sol) == [(pytest.approx(t, abs=1e-6), way) for t, way in times], action
+        assert sol.status == ("terminated" if times and action == "terminate" else "finished"), action
+
+
 @pytest.mark.parametrize("integrator", ADAPTIVE)
 def test_equal_monitors_fire_together_whatever_the_reset_of_one_does(integrator: str) -> None:
     """One turns the ball around at its floor, the others record and count: at t = 1 and 2."""
