@@ -410,3 +410,35 @@ def test_a_monitor_that_only_touches_zero_leaves_the_derivatives_of_the_state(in
     found = hs.sensitivities(hs.simulate(model, (0, 2), integrator=integrator, rtol=1e-10))
     assert found.by_parameter[:, 0] == pytest.approx([1.0, 0.0, 2.0 * math.exp(2.0)], rel=1e-9)
     assert found.times_by_parameter[0, 0] == pytest.approx(-1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate", "expr", "direction", "is_lost"),
+    [
+        ("1", "x", "both", True),
+        ("1", "-x", "down", True),
+        ("-1", "x", "down", True),
+        ("2*t", "x", "up", True),  # x = x0 + t^2: from below it passes at sqrt(-x0)
+        ("1", "x", "down", False),
+        ("0*t", "x", "both", False),
+        ("1", "y", "both", False),  # y = q t, whatever x0 is
+    ],
+)
+@pytest.mark.parametrize("then", [{"action": "terminate"}, {"action": "reset", "reset": {"x": "5"}}])
+def test_a_start_on_a_monitor_that_one_side_would_pass(
+    rate: str, expr: str, direction: str, is_lost: bool, then: dict
+) -> None:
+    """From one side the run passes the zero after a moment, and ends or is reset; from the other it never does."""
+    model = hs.Model(
+        "watched",
+        states=[hs.State("x", "x0", rate), hs.State("y", 0, "q")],
+        parameters={"x0": 0.0, "q": 2.0},
+        monitors=[hs.Monitor("m", expr, direction=direction, **then)],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0, 1), integrator="dop853"))
+    if is_lost:
+        assert np.isnan(differ(found, "x0", "t = 0 monitor m is exactly at its zero")).all()
+    else:
+        assert found.by_parameter[:, 0] == pytest.approx([1.0, 0.0], abs=1e-12)
+        assert not any("x0" in warning for warning in found.warnings)
+    assert found.by_parameter[:, 1] == pytest.approx([0.0, 1.0], abs=1e-12)

@@ -19,7 +19,15 @@ import numpy as np
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.event_times import EventTimes
-from hybridsim.analysis.variations.off_zero import OffZero, beyond, differ, limits_at_zero, off_zero, rates_of
+from hybridsim.analysis.variations.off_zero import (
+    OffZero,
+    beyond,
+    differ,
+    limits_at_zero,
+    monitors_at_zero,
+    off_zero,
+    rates_of,
+)
 from hybridsim.analysis.variations.refused import refuse_inputs
 from hybridsim.analysis.variations.rounds import (
     Rounds,
@@ -181,7 +189,10 @@ class Carrier:
         for batch in batches(happened):
             rounds.at_appointment(segment.start, batch)
         before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
-        Y = self._settled(rounds, segment, x, before)
+        at = _place(rounds, segment)
+        later = replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
+        off = monitors_at_zero(self._changes, at, later)
+        Y = self._settled(rounds, segment, x, before) + self._note(off)
         return self._projected(segment, Y, rounds.Yd, G), rounds.Yd
 
     def _rounds(

@@ -65,6 +65,26 @@ def limits_at_zero(changes: Changes, at: Place, components: Sequence[int]) -> li
     return [one for c in components for one in sides.limits(c)]
 
 
+def monitors_at_zero(changes: Changes, at: Place, later: Place) -> list[OffZero]:
+    """Monitors at their zero at the start of a run, which from one side would fire a little later.
+
+    later : where the run is then; it tells the side that it goes to where the rate at the start is zero.
+    """
+    monitors = changes.system.model.monitors
+    numbers = tuple(range(len(monitors)))
+    if all(monitor.action == "record" for monitor in monitors):
+        return []
+    sides, off = _Sides(changes, at), []
+    for monitor, one, then in zip(
+        monitors, changes.of(at, (), numbers), changes.of(later, (), numbers), strict=True
+    ):
+        rate = one.along(sides.here) or (0.0 if then.is_zero else then.value)
+        fires = rate != 0.0 and (monitor.direction == "both" or (monitor.direction == "up") == (rate > 0.0))
+        if monitor.action != "record" and one.is_zero and one.moves.any() and fires:
+            off.append(sides.off(f"monitor {monitor.name}", one, one.by * rate < 0.0, sides.here, 0.0))
+    return off
+
+
 class _Sides:
     """Both sides of what is at its zero at one place."""
 
@@ -138,7 +158,7 @@ class _Sides:
             if not comes_back:
                 loose.append(c)
             if one.moves.any() and not comes_back:
-                off.append(self._off(automaton.name, one, one.moves, self.here, 0.0))
+                off.append(self.off(automaton.name, one, one.moves, self.here, 0.0))
             else:
                 holding.append((c, one))
                 rows.append(one.row)
@@ -182,7 +202,7 @@ class _Sides:
                 other = moves & (one.by < 0.0 if is_above else one.by > 0.0)
                 speed = one.along(there)
                 comes_back = not is_pushed and (speed > 0.0 if is_above else speed < 0.0)
-                off.append(self._off(name, one, other, there, speed if comes_back else 0.0))
+                off.append(self.off(name, one, other, there, speed if comes_back else 0.0))
         return off
 
     def _freed(self, c: int, one: Changed, other: int) -> list[OffZero]:
@@ -192,7 +212,7 @@ class _Sides:
         for mode, mask in ((automaton.above, one.by > 0.0), (automaton.below, one.by < 0.0)):
             found = self.changes.of(replace(self.before, z=self._with(c, mode)), numbers) if numbers else []
             if any(limit.value < 0.0 and not limit.is_zero for limit in found):
-                off.append(self._off(self.system.automata[other].name, one, mask, self.here, 0.0))
+                off.append(self.off(self.system.automata[other].name, one, mask, self.here, 0.0))
         return off
 
     def _guard(self, c: int, i: int, one: Changed) -> list[OffZero]:
@@ -204,7 +224,7 @@ class _Sides:
         z, other = self._with(c, automaton.targets[m][i][choice]), one.moves & (one.by < 0.0)
         there = self._rates(z)
         if self._resets(c, m, i, choice):
-            return [self._off(name, one, other, there, 0.0)]
+            return [self.off(name, one, other, there, 0.0)]
         numbers = automaton.guards[z[c]]
         for k, back in enumerate(self.changes.of(replace(self.at, z=z), numbers) if numbers else ()):
             onward = self.system.choose(c, int(z[c]), k, self.at.s, self.at.x, self.at.p, z)
@@ -212,12 +232,12 @@ class _Sides:
                 continue
             speed = back.along(there)
             if speed < 0.0 and not self._resets(c, int(z[c]), k, onward) and (back.by >= 0.0)[other].all():
-                return [self._off(name, back, other, there, speed)] if differ(there, self.here) else []
+                return [self.off(name, back, other, there, speed)] if differ(there, self.here) else []
             if speed == 0.0 and automaton.is_corner and self._is_smooth(z):
                 return []
         if not numbers and TangentTape(self.system, z).is_same(TangentTape(self.system, self.at.z)):
             return []
-        return [self._off(name, one, other, there, 0.0)]
+        return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
         """Limits of what a surface holds, or would hold, that are exactly reached."""
@@ -232,14 +252,14 @@ class _Sides:
             name = f"guard {automaton.guard_names[automaton.hold][i]} of {automaton.name}"
             if self.at.z[c] != automaton.hold:  # beyond its zero it holds for a while
                 if speed >= 0.0 or differ(held, self.here):
-                    off.append(self._off(name, one, one.moves & (one.by > 0.0), held, min(speed, 0.0)))
+                    off.append(self.off(name, one, one.moves & (one.by > 0.0), held, min(speed, 0.0)))
                 continue
             slipping = (self._rates(self._with(c, mode)) for mode in (automaton.above, automaton.below))
             if not (speed > 0.0 and any(not differ(rates, held) for rates in slipping)):
-                off.append(self._off(name, one, one.moves & (one.by < 0.0), held, 0.0))
+                off.append(self.off(name, one, one.moves & (one.by < 0.0), held, 0.0))
         return off
 
-    def _off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
+    def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
         """At its zero; on the other side of it a function that changes at a speed, or does not come back (0)."""
         other = other & one.moves
         t = self.at.origin + self.at.s
