@@ -124,7 +124,8 @@ class ModeLoop:
             self.record.stop_early("interrupted", "", self.task.t0)
         if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
             self.record.message += said_of_direction(self.task.t0, self.task.t1)
-        if self.adopted == self.origin:
+        reached = self.record.segments.blocks[-1].until if self.record.segments else self.origin
+        if self.adopted == self.origin and self.origin in (self.end, reached):
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
             )
@@ -342,7 +343,8 @@ class ModeLoop:
             self.forward,
             self._stepped,
         )
-        run.flow.look = lambda s: self._progress(run.origin.plus(s))
+        origin, progress = run.origin, self._progress  # not the run: it would hold itself
+        run.flow.look = lambda s: progress(origin.plus(s))
         return run
 
     def _keep(self, run: SegmentRun) -> None:
