@@ -34,8 +34,6 @@ from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
 
-_NEAR = 1e-6  # of a time: farther from it nothing is that rounding may put there
-
 
 class ModeLoop:
     """One run of a system with one stepping method; leaper: a compiled loop that has been called ahead."""
@@ -177,13 +175,12 @@ class ModeLoop:
                     bound, target = arrival.s, self.origin.plus(arrival.s)
                     appointment = Appointment(target, (), is_renewal=True)
                 at_target = arrival.s == bound
-                # the end is a known time as well, where it is so near that rounding may tell
-                is_over = appointment is None and bound - arrival.s <= _NEAR * max(bound, abs(float(target)))
+                is_over = arrival.is_bare and appointment is None  # the end is a known time as well
                 is_due = is_over or (appointment is not None and not appointment.is_renewal)
                 if self.forward and (arrival.fired or arrival.stopping or at_target):
                     found = located(self.system, self.origin, arrival, segment, bound, is_due)
                     at_target = at_target or found.is_met
-                    if appointment is None and arrival.is_bare and not self._is_event(found):
+                    if is_over and not self._is_event(found):
                         found = None
             finally:
                 self._keep(segment)
@@ -586,9 +583,9 @@ class ModeLoop:
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
         ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
-        # a run that ends here needs no load that goes on behind it
-        is_over = self.forward and instant == self.end and outcome.status == "inconsistent"
-        if outcome.status and not (ended or terminated or is_over):
+        if (
+            outcome.status and not ended
+        ):  # a run that ends here by a monitor needs nothing that holds behind it
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
         if terminated or ended:

@@ -67,9 +67,10 @@ class Trajectory:
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
         """Keep the state after an event at the very end of the run, which no segment begins with."""
         if self.segments:
-            last, is_there = self.segments[-1], float(self.segments.blocks[-1].until) == float(instant)
-            same = (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all()
-            if is_there and same:
+            if float(self.segments.blocks[-1].until) != float(instant):
+                return
+            last = self.segments[-1]
+            if (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all():
                 return
         self.segments.append(end_point(instant, z, p, x))
 

@@ -114,30 +114,3 @@ def test_a_derivative_to_both_sides_of_an_event_at_the_end(integrator):
         found = hs.sensitivities(hs.simulate(model, (0.0, 1.0), integrator=integrator), ["start"])
         assert np.isnan(found.by_parameter[1, 0]) and found.by_parameter[0, 0] == pytest.approx(1.0)
         assert "start" in found.warnings[0]
-
-
-LOADS = {
-    "state": '[states.L]\nstart = "T*rate"\nder = "-rate"\n[states.v]\nstart = 50\nder = "-f"\n',
-    "time": '[states.v]\nstart = 50\nder = "-f"\n[definitions]\nL = "rate*(T - t)"\n',
-}
-
-
-@pytest.mark.parametrize("integrator", METHODS)
-@pytest.mark.parametrize("kind", LOADS)
-@pytest.mark.parametrize("ends", ["t_end", "schedule"])
-def test_a_run_that_ends_where_its_load_ends_needs_no_load_behind_it(integrator, kind, ends):
-    """Friction of 0.4 of a load that falls to zero takes 0.4 rate T^2/2 of the speed; resumed, the load is missing."""
-    draw = random.Random(9)
-    text = f'schema = 1\nname = "load"\n[parameters]\nT = 1\nrate = 1\n{LOADS[kind]}[contacts.f]\nvelocity = "v"\n'
-    text += 'normal = "L"\nlaw = { name = "coulomb", mu = 0.4 }\n'
-    text += '[schedules.end]\ntimes = ["T"]\nterminate = true\n' if ends == "schedule" else ""
-    model = hs.Model.from_toml(text)
-    for _ in range(6):
-        T, rate = round(draw.uniform(0.1, 3.0), 2), round(draw.uniform(0.3, 3.0), 2)
-        until = T if ends == "t_end" else T + 1.0
-        sol = hs.simulate(model, (0.0, until), params={"T": T, "rate": rate}, integrator=integrator)
-        assert sol.status == ("finished" if ends == "t_end" else "terminated") and sol.t_end == T
-        v = dict(zip(sol.names, sol(T), strict=True))["v"]
-        assert v == pytest.approx(50.0 - 0.2 * rate * T**2, abs=1e-9)
-        if ends == "t_end":
-            assert sol.resume(T + 1.0).status == "inconsistent"
