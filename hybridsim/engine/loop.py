@@ -122,8 +122,7 @@ class ModeLoop:
             self.record.stop_early("interrupted", "", self.task.t0)
         if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
             self.record.message += said_of_direction(self.task.t0, self.task.t1)
-        reached = self.record.segments.blocks[-1].until if self.record.segments else self.origin
-        if self.adopted == self.origin and self.origin in (self.end, reached):
+        if self.adopted == self.origin:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
             )

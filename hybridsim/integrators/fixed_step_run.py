@@ -122,8 +122,7 @@ class FixedStepRun:
         record = self.record
         try:
             self._run()
-            if not record.segments or float(record.segments.blocks[-1].until) == float(self.origin):
-                record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
+            record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
         except LimitReached as reached:
             record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
