@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hybridsim.engine.accumulation import MOST, leads_nowhere
-from hybridsim.engine.at_end import may_be_at_zero
 from hybridsim.engine.blocks import OccurrenceList
 from hybridsim.engine.chain import Chain, SegmentChain
 from hybridsim.engine.hidden_bounces import may_be_hidden
@@ -27,7 +26,6 @@ from hybridsim.engine.system import System
 from hybridsim.engine.trajectory import Task, Trajectory
 
 if TYPE_CHECKING:
-    from hybridsim.engine.desk import Laid
     from hybridsim.engine.leapt import Leapt
     from hybridsim.engine.pieces import Occurrence
 
@@ -102,11 +100,9 @@ class _BrokenOff:
 _leads_nowhere = Door(leads_nowhere)
 
 
-def _is_over(system: System, leapt: Leapt, start: Laid, rounding: float) -> bool:
-    """Whether the call is all of the run: its events surely have no limit, hide no bounces, and none is at its end."""
+def _is_over(system: System, leapt: Leapt) -> bool:
+    """Whether the call is all of the run for certain: its events have no limit, and hide no bounces."""
     if not leapt.is_at_target or leapt.has_news or not leapt.count:
-        return False
-    if may_be_at_zero(system, leapt, start.part("x"), rounding):
         return False
     if leapt.events == 0:
         return True
@@ -135,11 +131,7 @@ def carried_out(
         leapt = leaper.leapt = leaper.go(plan.origin, start, plan.end)
     except (KeyboardInterrupt, StepFailure) as error:
         return ModeLoop(system, method, task, None, cast("Leaps", _BrokenOff(leaper.place, error))).run()
-    if (
-        leapt is None
-        or not _is_over(system, leapt, start, method.rounding)
-        or not (keep.segments or leaper.forget_segments(leapt))
-    ):
+    if leapt is None or not _is_over(system, leapt) or not (keep.segments or leaper.forget_segments(leapt)):
         return ModeLoop(system, method, task, None, leaper).run()
 
     def made() -> Trajectory:

@@ -63,7 +63,6 @@ class LeanTape:
     constant_rows : run once a segment, at order 0.
     rows : run at every order.
     states, derivatives, guards, surfaces, monitors : registers of the states, their rates and the results.
-    watched : those of the guards that these modes have.
     """
 
     constant_rows: np.ndarray
@@ -73,7 +72,6 @@ class LeanTape:
     guards: np.ndarray
     surfaces: np.ndarray
     monitors: np.ndarray
-    watched: np.ndarray
 
 
 def twins_of(tape: dict[str, Any]) -> dict[int, int]:
@@ -143,13 +141,10 @@ def lean(
 
     states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
     surfaces, monitors = registers("surfaces"), registers("monitors")
-    watched = np.array([guards[g] for g in active], dtype=np.int64)
-    wanted = {*derivatives, *surfaces, *monitors, *watched}
+    wanted = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
     needed = needed_rows(series_rows, wanted)
     constants = needed_rows(constant_rows, wanted | {r for row in needed for r in row[1:4]})
-    return LeanTape(
-        _array(constants), _array(needed), states, derivatives, guards, surfaces, monitors, watched
-    )
+    return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
 
 
 def has_corners(tape: dict[str, Any]) -> bool:

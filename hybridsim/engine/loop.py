@@ -174,13 +174,10 @@ class ModeLoop:
                     bound, target = arrival.s, self.origin.plus(arrival.s)
                     appointment = Appointment(target, (), is_renewal=True)
                 at_target = arrival.s == bound
-                is_over = arrival.is_bare and appointment is None  # the end is a known time as well
-                is_due = is_over or (appointment is not None and not appointment.is_renewal)
-                if self.forward and (arrival.fired or arrival.stopping or at_target):
+                is_due = appointment is not None and not appointment.is_renewal
+                if self.forward and (arrival.fired or arrival.stopping or (at_target and appointment)):
                     found = located(self.system, self.origin, arrival, segment, bound, is_due)
                     at_target = at_target or found.is_met
-                    if is_over and not self._is_event(found):
-                        found = None
             finally:
                 self._keep(segment)
                 self.notices.look()
@@ -276,18 +273,15 @@ class ModeLoop:
             self.headway.leapt(self.origin)
         if not arrived:
             return False, False
-        at, steps = self._at_target(target), self.record.counters.steps - steps
-        monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
         if appointment is None:
             self._tell(self.origin)
-            found = Located(at, self._before(target, at, steps, x_before), monitors, True)
-            if self._is_event(found):
-                self._adopt(target, self._settle_located(target, found, found.fired, []), at.x.copy(), ())
             return True, True
         error = self.outcome.x_error
         if not appointment.is_renewal:
             self.timetable.kept(target)
-            if fired := self._before(target, at, steps, x_before):
+            at, steps = self._at_target(target), self.record.counters.steps - steps
+            if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
+                monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
                 found = Located(at, fired, monitors, True)
                 found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
                 fired = found.fired
@@ -297,15 +291,6 @@ class ModeLoop:
         x = self.outcome.x
         settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
-
-    def _before(self, target: Instant, at: Situation, steps: int, x_before: np.ndarray) -> dict[int, int]:
-        """What comes to zero at a known time that a compiled loop has reached."""
-        return before_appointment(self.system, target, at, steps, self.method.rounding, x_before)
-
-    def _is_event(self, found: Located) -> bool:
-        """Whether something happens at the end of the run: corners alone decide nothing there."""
-        owners = set(self.system.owner[list(found.fired)].tolist())
-        return bool(owners - self._led) or bool(found.monitors.leads.any())
 
     def _at_target(self, target: Instant) -> Situation:
         """The state just before an instant that a compiled loop has reached."""
@@ -372,7 +357,7 @@ class ModeLoop:
                 f"at t = {float(instant)!r}: {arrival.entered} is zero: the mode may have begun here"
             )
             return True
-        if arrival.is_bare and not appointment and found is None:
+        if not (arrival.fired or arrival.stopping or appointment):
             self.origin = instant
             return True
         if found is None:

@@ -11,6 +11,7 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ from hybridsim.analysis.variations.rounds import (
 from hybridsim.analysis.variations.seeds import rate_slopes, seeds
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
-from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of, time_rounding
+from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of
 from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.errors import UsageError
@@ -117,7 +118,7 @@ class Carrier:
     def _is_end(self, segment: Segment) -> bool:
         """Whether a segment begins at the end of the run, to rounding."""
         end = self.solution._segments[-1].end
-        return bool(segment.start.minus(end) >= -time_rounding(self.solution))
+        return bool(segment.start.minus(end) >= -4.0 * math.ulp(float(end)))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
         """Mask (M,) of the directions that move a time, given its derivatives."""
