@@ -6,6 +6,7 @@ import json
 import pickle
 import signal
 import zipfile
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -93,7 +94,15 @@ def test_an_interrupted_run_goes_on(name: str) -> None:
     assert not difference(hs.simulate(scene, span, integrator=name), part.resume())
 
 
-def test_ctrl_c_ends_a_loop_of_runs() -> None:
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """SIGINT raises KeyboardInterrupt, also where a shell has started the tests in the background with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_a_loop_of_runs(interruptible: None) -> None:
     """An interruption from outside, as it comes to a notebook, ends the loop, and what was computed is kept."""
     runs = 0
 
