@@ -1,4 +1,4 @@
-"""Tests whether random trials find each mended fault when it is put back alone.
+"""Put each mended fault back alone and test whether random trials find it.
 
     python studies/faults_put_back.py [journal] [fault ...]      (without a name: all)
 

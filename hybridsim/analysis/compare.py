@@ -23,7 +23,7 @@ from hybridsim.model import Model
 PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
 TIME = 10.0  # of a model without a period: a few swings of a mechanism of about 1 Hz
 BUDGET = 120.0  # seconds of a comparison that nobody has given any thought
-# Of the budget, what each run of a reference may take: there are three at most.
+# the share of the budget that each run of a reference may take: there are at most three such runs
 REFERENCE_SHARE = 1 / 4
 
 

@@ -207,9 +207,8 @@ class _Collision:
         x = np.where(moved, at.x + shares.sum(axis=0), self._on_gaps(normal))
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
-        kept = np.where(
-            settling.pinned_states(normal), 0.0, at.x_error
-        )  # what gaps evaluate is as exact as they are
+        # states that are evaluated from gaps are as exact as the gaps
+        kept = np.where(settling.pinned_states(normal), 0.0, at.x_error)
         at.x, at.x_error = x, np.where(moved, error, np.maximum(kept, UNIT * np.abs(x)))
         # a rate that cannot be told from zero any more is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error

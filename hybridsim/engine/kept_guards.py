@@ -1,4 +1,4 @@
-"""Which located guards a decision at a surface keeps from going negative: these are no events.
+"""Find located guards that a decision at a surface keeps from going negative: they are no events.
 
 A guard on the velocity of a contact comes to zero with it, by the motion before. Where the contact then sticks, the
 guard stays at zero; where an impact throws the motion back, it only touches zero.
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def kept(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
-    """Those of some automata with located guards that would not leave if the surfaces were decided first."""
+    """The automata whose located guards would not fire if the surfaces were decided first."""
     ahead = copy(settling)
     ahead.at = replace(settling.at, z=settling.at.z.copy())
     ahead.fired, ahead.on_surface = settling.fired.copy(), settling.on_surface.copy()

@@ -149,7 +149,7 @@ class ModeLoop:
                 before = self.origin
                 arrived, stop = self._leap(self.leaper, target, appointment)
                 if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
-                    # a segment longer than that is none for compiled code: it may be that only this was in the way
+                    # compiled code takes no segment longer than that, which may be its only obstacle here
                     nearer, renewal = self._no_farther(target, appointment)
                     if nearer != target:
                         arrived, stop = self._leap(self.leaper, nearer, renewal)
@@ -194,7 +194,7 @@ class ModeLoop:
     def _no_farther(
         self, target: Instant, appointment: Appointment | None
     ) -> tuple[Instant, Appointment | None]:
-        """A target and what is due there; where a segment to it would be too long, the end of a shorter one."""
+        """The target and what is due there, or the end of the longest segment allowed if the target is farther."""
         reach = self._reach()
         if abs(target.minus(self.origin)) <= reach:
             return target, appointment
@@ -427,7 +427,7 @@ class ModeLoop:
     def _settle_located(
         self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
     ) -> Outcome:
-        """Settle the guards that were located and resets of monitors, at a state of which nothing is changed."""
+        """Settle the located guards and resets of monitors on a copy of the state."""
         at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
@@ -437,7 +437,7 @@ class ModeLoop:
         return settling.run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
-        """Apply the resets of the monitors that an event carried off their sides, and what these carry in turn."""
+        """Apply the resets of monitors that an event moved off their sides, and those that such resets move in turn."""
         changes = list(outcome.changes)
         while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
             monitors.fire(outcome)
@@ -567,9 +567,8 @@ class ModeLoop:
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
         ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
-        if (
-            outcome.status and not ended
-        ):  # a run that ends here by a monitor needs nothing that holds behind it
+        # a run that a monitor ends here needs no modes that hold behind it
+        if outcome.status and not ended:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
         if terminated or ended:

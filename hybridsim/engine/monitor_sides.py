@@ -1,4 +1,4 @@
-"""Whether a monitor fires at an instant: it does, whatever its action, where it leaves the side that it had before."""
+"""Decide which monitors fire at an instant: those that leave the side of zero that they had before it."""
 
 from __future__ import annotations
 
@@ -82,6 +82,6 @@ class MonitorSides:
         return -before
 
     def keep_open(self, outcome: Outcome) -> None:
-        """Leave on their sides those of which rounding hides whether they are at zero."""
+        """Keep the sides of monitors for which rounding hides whether they are at zero."""
         kept = self.is_open & (outcome.monitor_sides == 0)
         outcome.monitor_sides[kept] = self.before[kept]

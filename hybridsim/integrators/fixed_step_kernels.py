@@ -56,7 +56,7 @@ def passed(
     """What ends the stretch at a step to (s1, x1), or GOES_ON.
 
     functions: addresses of guards and monitors. watched: guards that must not be negative. fresh: monitors that have
-    just fired, what is left of whose zero is no new one on the first step. before: their values where the step begins.
+    just fired: the rest of such a zero is no new zero on the first step. before: their values where the step begins.
     guards, after: room.
     """
     for i in range(x1.shape[0]):

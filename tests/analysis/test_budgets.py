@@ -17,7 +17,7 @@ DECAY = hs.Model("decay", [hs.State("x", 1.0, "-x")])
 
 
 def late(*names: str) -> Any:
-    """Runs of the decay, of which those by these integrators use up all their time."""
+    """Runs of the decay. Those by the given integrators use up all their time."""
 
     def run(integrator: str, *, progress: Any, **options: Any) -> hs.Solution:
         if integrator in names:
@@ -64,7 +64,7 @@ def test_repetitions_end_where_all_runs_have_been_timed_for_long_enough(
 
 
 def test_a_segment_that_is_done_in_one_call_is_looked_at_on_the_way() -> None:
-    """SciPy's own event finding steps through a whole segment: here some 1e4 steps."""
+    """SciPy's own event finding steps through a whole segment: here about 1e4 steps."""
     fractions: list[float] = []
 
     def watch(fraction: float) -> None:

@@ -119,7 +119,7 @@ def test_corners_at_the_start() -> None:
 
     assert ran("1 + abs(x)").by_parameter[0, 0] == pytest.approx(math.e, rel=1e-9)
     assert np.isnan(ran("abs(x)").by_parameter[0, 0])
-    # no corner to first order: x' = -x - x |x|, of which x(1) = x0 exp(-1) next to 0
+    # no corner to first order: x' = -x - x |x| has x(1) = x0 exp(-1) near 0
     assert ran("-x - x*abs(x)").by_parameter[0, 0] == pytest.approx(math.exp(-1), rel=1e-9)
 
 

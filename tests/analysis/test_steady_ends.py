@@ -59,7 +59,7 @@ def most_steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     ids=["common", "none", "none-cubic"],
 )
 def test_a_run_that_would_cost_too_much_is_not_made(model: hs.Model, most_steps: list[int]) -> None:
-    """32 periods of the slow forcing are 3.2e7 of the fast one: some 1e8 steps, of which 1 in 1000 is taken."""
+    """32 periods of the slow forcing are 3.2e7 of the fast one: about 1e8 steps, and 1 in 1000 of them is taken."""
     found = hs.steady_state(model, integrator="taylor")
     assert found.kind == "not settled" and "a smaller settle" in found.message
     assert most_steps[0] <= 100_000

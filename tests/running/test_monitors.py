@@ -47,7 +47,8 @@ TICK = '[states]\nx = { start = 2, der = "0" }\n[schedules.k]\ntimes = [1.5]\nre
 BACK = '[states]\nx = { start = 1, der = "-1" }\n[schedules.k]\ntimes = [1]\nreset = { x = "1" }\n'
 CORNER = '[states]\nx = { start = 1, der = "-1" }\n'
 
-# (model, what is watched, end, when it fires): v = 1.25 - t, then 0; h is positive but for rest at t = 3
+# (model, watched expression, end, times and directions of firing)
+# v is 1.25 - t until it reaches 0 and stays there. h is positive, except that it is at rest at zero at t = 3.
 SITUATIONS = {
     "stop from above": (FALLING, "v", 3.0, [(1.25, -1)]),
     "stop from below": (RISING, "v", 3.0, [(1.25, 1)]),

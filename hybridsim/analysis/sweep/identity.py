@@ -42,7 +42,7 @@ _NOT_READ = {"__module__", "__doc__", "__dict__", "__weakref__", "_abc_impl", "_
 
 
 def identity(value: Any) -> str:
-    """A text that is the same for what is the same, also in another process.
+    """A text that is equal for equal values, also in another process.
 
     Raises
     ------

@@ -58,7 +58,7 @@ class Collocation(NamedTuple):
 
 
 GAUSS = Collocation.at(legendre.leggauss(_STAGES)[0])
-# the zeros of P_s - P_(s-1), of which the last is the end of the piece
+# the zeros of P_s - P_(s-1); the last is the end of the piece
 RADAU = Collocation.at(np.sort(legendre.legroots([*[0.0] * (_STAGES - 1), -1.0, 1.0]).real))
 
 Slopes = Callable[[np.ndarray], np.ndarray]
@@ -77,7 +77,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
         return stiff_transition(slopes, knots, scale, constants)
     if turns > _FADES * len(begins) + _TURNS:
         raise UsageError(
-            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) turn through some "
+            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) turn through about "
             f"{turns:.1g} radians: following that takes minutes or longer",
             remedy="take a shorter run, or slower parameters",
         )

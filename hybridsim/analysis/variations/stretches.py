@@ -38,7 +38,7 @@ def stretches_of(solution: Solution) -> Iterator[Stretch]:
     waiting = [o for o in solution._trajectory.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
     for segment, following in zip(segments, [*segments[1:], None], strict=True):
-        # an event and the end of its segment are one instant but for that
+        # an event and the end of its segment are one instant if they differ by no more than this
         rounding = 4.0 * math.ulp(float(segment.end))
         # where events accumulate, the next segment begins at their limit
         until = segment.end if following is None else following.start
