@@ -19,7 +19,7 @@ def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     switches on the speed) is crossed by no step; it leaves when that component lets go.
     """
     system, at = settling.system, settling.at
-    series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error)
+    series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
     near = np.abs(series.surfaces[:, 0]) <= series.surface_bounds[:, 0]
     return {c for k, c in enumerate(system.surface_of) if near[k]} & set(cluster)
 
@@ -31,7 +31,7 @@ def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     error: that was crossed first.
     """
     system, at = settling.system, settling.at
-    series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error)
+    series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
     found = set()
     for c, value in zip(system.surface_of, series.surfaces[:, 0], strict=True):
         automaton, mode = system.automata[c], at.z[c]

@@ -37,7 +37,7 @@ def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
     p[system.layout.pin_at] = 0.0
     if not is_start:
         return replace(at, p=p)
-    series: Any = system.series(at.s, at.x, p, np.maximum(z, 0), at.x_error, at.s_error)
+    series: Any = system.series(at.s, at.x, p, np.maximum(z, 0), at.x_error, at.s_error, at.is_put)
     for k, c in enumerate(system.surface_of):
         if z[c] >= 0:
             continue
@@ -88,7 +88,7 @@ def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
     p = at.p.copy()
     p[system.layout.pin_at] = 0.0
     z = np.maximum(at.z, 0)
-    series: Any = system.series(at.s, at.x, p, z, at.x_error, at.s_error)
+    series: Any = system.series(at.s, at.x, p, z, at.x_error, at.s_error, at.is_put)
     values, bounds = series.surfaces[:, 0], series.surface_bounds[:, 0]
     on = []
     for k, c in enumerate(system.surface_of):

@@ -53,7 +53,7 @@ def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
     at, system = settling.at, settling.system
     free = at.p.copy()
     free[system.layout.pin_at] = 0.0
-    series: Any = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
+    series: Any = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
     return series.surfaces, series.surface_bounds
 
 
@@ -259,7 +259,7 @@ class _Collision:
         free[system.layout.pin_at] = 0.0
         rows = [self.place[c] for c in projected]
         for _ in range(_CORRECTIONS):
-            gaps = system.series(at.s, x, free, z, at.x_error, at.s_error).surfaces[rows, 0]
+            gaps = system.series(at.s, x, free, z, at.x_error, at.s_error, at.is_put).surfaces[rows, 0]
             slopes = system.gap_slopes(at.s, x, free, z)[rows]
             if not (np.isfinite(gaps).all() and np.isfinite(slopes).all()):
                 return x

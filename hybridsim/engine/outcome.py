@@ -22,6 +22,8 @@ class Situation:
     z: np.ndarray
     x_error: np.ndarray
     s_error: float
+    # a start or a reset has put the state where it is: zeros are known to the roundoff of the model's numbers
+    is_put: bool = False
 
 
 @dataclass(frozen=True)

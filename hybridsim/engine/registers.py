@@ -9,6 +9,7 @@ import numpy as np
 from hybridsim.engine.layout import Layout
 from hybridsim.engine.lean_tape import twins_of
 from hybridsim.engine.packs import packed
+from hybridsim.expr import own_roundoff
 
 
 class Inputs(NamedTuple):
@@ -40,3 +41,23 @@ class Registers:
         self.inputs = packed(
             Inputs(constants, values, parameters, sources, phases, np.array([time], dtype=np.int64), states)
         )
+
+    def with_roundoff(self, p: np.ndarray) -> Inputs:
+        """The inputs with the roundoff of each number itself: parameters as constants that have an error."""
+        known: Inputs = self.inputs
+        numbers = np.concatenate([known.values[:, 0], p[known.sources]])
+        errors = np.array([own_roundoff(number) for number in numbers.tolist()])
+        errors[: len(known.constants)] = np.maximum(errors[: len(known.constants)], known.values[:, 1])
+        none = np.zeros(0, dtype=np.int64)
+        inputs: Inputs = packed(
+            Inputs(
+                np.concatenate([known.constants, known.parameters]),
+                np.column_stack([numbers, errors]),
+                none,
+                none,
+                known.phases,
+                known.time,
+                known.states,
+            )
+        )
+        return inputs

@@ -14,8 +14,9 @@ import numpy as np
 from hybridsim.engine.diagnosis import reset_in_words
 from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.reset_keys import added, declared_reset
-from hybridsim.expr import FunctionExpression
+from hybridsim.engine.reset_keys import added, declared_reset, is_added
+from hybridsim.expr import FunctionExpression, has_rounded_number, rounding_of
+from hybridsim.expr.walk import NoValue
 from hybridsim.model.one_sided import names_of
 
 if TYPE_CHECKING:
@@ -142,7 +143,27 @@ def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.
     slopes = _slopes(system, at, key, errors) if system.has_tape else None
     if slopes is None:
         slopes = _differences(system, at, key, errors)
-    return values, np.abs(slopes) @ errors + UNIT * np.abs(values)
+    return values, np.abs(slopes) @ errors + UNIT * np.abs(values) + _of_numbers(system, at, key)
+
+
+def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
+    """What the numbers written in a reset add to the errors of states; nothing where it reads definitions."""
+    found = np.zeros(system.n + len(system.model.discrete))
+    values = dict(zip(system.names, at.x.tolist(), strict=True))
+    discrete = at.p[system.layout.discrete_slice].tolist()
+    values |= {
+        d.name: value for d, value in zip(system.model.discrete, discrete, strict=True)
+    } | system.values
+    declared = declared_reset(system.model, key[1:] if is_added(key) else key)
+    for name, value in declared.items():
+        if name not in system.names or isinstance(value, FunctionExpression) or not has_rounded_number(value):
+            continue
+        if names_of(value.tree) <= values.keys():
+            try:
+                found[_place(system, name)] = rounding_of(value, values, values.keys())
+            except NoValue:
+                continue
+    return found
 
 
 def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray | None:

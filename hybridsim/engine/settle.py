@@ -194,7 +194,7 @@ class Settling:
         at, system = self.at, self.system
         free = at.p.copy()
         free[system.layout.pin_at] = 0.0  # the states as they are, not as a holding mode would have them
-        series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error)
+        series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
         for k, c in enumerate(system.surface_of):
             automaton, value = system.automata[c], series.surfaces[k, 0]
             if abs(value) <= series.surface_bounds[k, 0]:
@@ -242,7 +242,7 @@ class Settling:
             self.behind, self.series = behind, {}
         key = z.tobytes()
         if key not in self.series:
-            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error)
+            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
         return self.series[key]
 
     def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
@@ -299,6 +299,7 @@ class Settling:
         clash = merged_resets(system, given, resets, x_plus, p_plus, x_error)
         if clash:
             return "inconsistent", clash
+        at.is_put = at.is_put or not np.array_equal(x_plus, at.x)
         self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
         self.jumped = self.jumped or bool(taken) or bool(resets)
         at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error

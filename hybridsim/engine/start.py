@@ -26,7 +26,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
     known = system.starts.get(key)
     if known is None:
         p = system.vector(origin, task.discrete, task.forward)
-        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0)
+        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0, True)
         resets = [("schedule", k) for k in due]
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
         # a corner has no side to change before it has found one
@@ -42,15 +42,16 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     """Bounds of the errors of the states at the start.
 
     Of an expression that of its evaluation and of the numbers in it. Of any other number its own roundoff, as the value
-    of some expression that nobody knows; whole numbers are exact. On a surface it stands beside a number of its size,
-    such as the speed of a belt, which is rounded as well.
+    of some expression that nobody knows; whole numbers are exact. The bounds of guards count the roundoff of the
+    numbers in them; those of functions, in which nobody can look for numbers, are as if one of the start's size stood
+    beside it.
     """
     rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
     errors, declared = rounding.copy(), system.start_state({})
     for i, state in enumerate(system.model.states):
         if x0[i] == declared[i] and not isinstance(state.start.tree, ast.Constant):
-            errors[i] = max(errors[i], rounding_of(state.start, system.values, of_numbers=UNIT))
-    return errors + rounding
+            errors[i] = max(errors[i], rounding_of(state.start, system.values))
+    return errors if system.has_tape else errors + rounding
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:

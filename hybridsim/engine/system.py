@@ -472,16 +472,27 @@ class System:
         return self._high[key]
 
     def series(
-        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
+        self,
+        s: float,
+        x: np.ndarray,
+        p: np.ndarray,
+        z: np.ndarray,
+        x_error: np.ndarray,
+        s_error: float,
+        with_numbers: bool = False,
     ) -> Series | DifferenceSeries:
-        """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z."""
+        """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
+
+        with_numbers: the bounds count the own roundoff of the model's numbers.
+        """
         if not self.has_tape:
             return self._differences(s, x, p, z, x_error, s_error)
         tape, count = self.lean_tape(z), self._registers.count
         V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
         x, x_error, p = (np.ascontiguousarray(array, dtype=float) for array in (x, x_error, p))
+        inputs = self._registers.with_roundoff(p) if with_numbers else self._registers.inputs
         _run_series(
-            tape.constant_rows, tape.rows, self._registers.inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
+            tape.constant_rows, tape.rows, inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
         )  # fmt: skip
         return Series(V, E, tape)
 

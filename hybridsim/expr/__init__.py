@@ -4,7 +4,7 @@ from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function
 from hybridsim.expr.increment import Increment, assignment, parse_reset, substitute_in_reset
 from hybridsim.expr.parse import Expression, of_tree, parse, require_names, substitute
-from hybridsim.expr.rounding import rounding_of
+from hybridsim.expr.rounding import has_rounded_number, own_roundoff, rounding_of
 
 __all__ = [
     "Expression",
@@ -13,8 +13,10 @@ __all__ = [
     "assignment",
     "evaluate",
     "function_name",
+    "has_rounded_number",
     "of_function",
     "of_tree",
+    "own_roundoff",
     "parse",
     "parse_reset",
     "require_names",

@@ -6,8 +6,10 @@ import ast
 import itertools
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from decimal import Decimal
 from fractions import Fraction
+from functools import lru_cache
 
 from hybridsim.expr.parse import Expression
 from hybridsim.expr.walk import NoValue, value_of
@@ -18,20 +20,39 @@ _WIDER = 2.0**10  # arguments are moved by so much more than their errors, which
 _OF_FUNCTIONS = 2.0  # units of roundoff that the functions of the mathematics library are within
 
 
-def rounding_of(expr: Expression, values: Mapping[str, float], of_numbers: float = 0.0) -> float:
-    """Bound of the error of an expression's value; of_numbers: relative, of those in it that are not whole."""
-    return _with_error(expr.tree, values, of_numbers)[1]
+@lru_cache(maxsize=4096)
+def own_roundoff(number: float) -> float:
+    """How far a number may be from the one that was meant: half of its last place, as no double is 0.1.
+
+    Where its shortest decimal form is the double itself (3, 0.5), that was meant.
+    """
+    is_exact = not math.isfinite(number) or number.is_integer() or Decimal(repr(number)) == Decimal(number)
+    return 0.0 if is_exact else 0.5 * math.ulp(number)
 
 
-def _with_error(node: ast.expr, values: Mapping[str, float], unit: float) -> tuple[float, float]:
+def rounding_of(expr: Expression, values: Mapping[str, float], exact: Collection[str] = ()) -> float:
+    """Bound of the error of an expression's value: of its evaluation and of the numbers in it.
+
+    exact: names whose values have no error; any other number has its own roundoff.
+    """
+    return _with_error(expr.tree, values, exact)[1]
+
+
+def has_rounded_number(expr: Expression) -> bool:
+    """Whether an expression has a number written in it that no double is."""
+    numbers = [node.value for node in ast.walk(expr.tree) if isinstance(node, ast.Constant)]
+    return any(isinstance(number, float) and own_roundoff(number) > 0.0 for number in numbers)
+
+
+def _with_error(node: ast.expr, values: Mapping[str, float], exact: Collection[str]) -> tuple[float, float]:
     value = float(value_of(node, values))
     match node:
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            return value, _with_error(operand, values, unit)[1]
+            return value, _with_error(operand, values, exact)[1]
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            return _with_error(body if value_of(test, values) else orelse, values, unit)
+            return _with_error(body if value_of(test, values) else orelse, values, exact)
         case ast.BinOp(left=left, op=op, right=right):
-            (a, da), (b, db) = (_with_error(side, values, unit) for side in (left, right))
+            (a, da), (b, db) = _with_error(left, values, exact), _with_error(right, values, exact)
             if isinstance(op, ast.Pow):
                 return value, _carried(node, [(a, da), (b, db)], value)
             off = float(abs(_EXACT[type(op)](Fraction(a), Fraction(b)) - Fraction(value)))
@@ -41,9 +62,13 @@ def _with_error(node: ast.expr, values: Mapping[str, float], unit: float) -> tup
                 least = abs(b) - db
                 return value, ((da + abs(value) * db) / least if least > 0.0 else math.inf) + off
             return value, da + db + off
+        case ast.Name(id=name) if name in exact:
+            return value, 0.0
+        case ast.Name() | ast.Constant(value=int() | float()):
+            return value, own_roundoff(value)
         case ast.Call(args=args):
-            return value, _carried(node, [_with_error(arg, values, unit) for arg in args], value)
-    return value, unit * abs(value) if unit and not value.is_integer() else 0.0
+            return value, _carried(node, [_with_error(arg, values, exact) for arg in args], value)
+    return value, 0.0
 
 
 def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:

@@ -381,7 +381,7 @@ class FixedStepRun:
         x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
         if s_error:
             x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
-        at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error)
+        at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error, bool(starting))
         if starting:  # resets read contacts on the sides on which they are
             at.z[system.has_surface] = self.task.z0[system.has_surface]
             at.z = as_given(system, at).z

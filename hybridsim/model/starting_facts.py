@@ -65,7 +65,7 @@ def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> boo
         return False
     trees = {state.name: state.start.tree for state in model.states}
     trees |= {discrete.name: discrete.start.tree for discrete in model.discrete}
-    bound = rounding_of(of_tree(with_names(tree, trees)), values, of_numbers=0.5 * _ULP)
+    bound = rounding_of(of_tree(with_names(tree, trees)), values)
     for name in names_of(tree) & starts.keys():
         if starts[name] != round(starts[name]):
             moved = number_of(tree, values | {name: starts[name] * (1.0 + _ULP)}, meanings.lookup)

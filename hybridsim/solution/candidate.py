@@ -101,7 +101,7 @@ def views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
     """Guards along the flow of the modes z, those that the event decrees to be zero taken as such."""
-    series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error)
+    series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error, at.is_put)
     time = time_unit(system.model)
     for g in guards:
         c = int(system.owner[g])
