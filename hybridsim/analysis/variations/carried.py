@@ -12,6 +12,7 @@ a mode holds a state on a constraint, its derivative is that of the constraint: 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -186,7 +187,13 @@ class Carrier:
                 z[c] = automaton.modes.index(one.source)
         x = happened[0].x_minus if happened else segment.x[0]
         d = self.system.discrete_start if happened else self.system.discrete(segment.p)
-        rounds = self._rounds((x, d, z), Y, Yd, np.zeros(Y.shape[1]), np.abs(Y), is_start=True)
+        begun = self.solution._run.task.z0  # what was in no mode yet held nothing either
+        loose = [
+            (c, a.above)
+            for c, a in enumerate(self.system.automata)
+            if a.has_surface and begun[c] < 0 and z[c] == a.hold
+        ]
+        rounds = self._rounds((x, d, z), Y, Yd, np.zeros(Y.shape[1]), np.abs(Y), loose, is_start=True)
         for batch in batches(happened):
             rounds.at_appointment(segment.start, batch)
         before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
@@ -203,9 +210,10 @@ class Carrier:
         Yd: np.ndarray,
         shift: np.ndarray,
         large: np.ndarray,
+        loose: Sequence[tuple[int, int]] = (),
         is_start: bool = False,
     ) -> Rounds:
-        return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, is_start, self._sided)
+        return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, loose, is_start, self._sided)
 
     # -- between events -------------------------------------------------------------------------------------
 
@@ -302,7 +310,7 @@ class Carrier:
         rates = self._rates_at_start(following)
         if rounds.has_reset or (after.x != x).any() or differ(before, rates):
             off = [*rounds.off, *off]
-        return Y + self._note(off) - np.outer(rates, rounds.shift)
+        return Y + self._note([*rounds.overtaken, *off]) - np.outer(rates, rounds.shift)
 
     def _projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None

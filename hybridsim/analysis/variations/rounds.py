@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,6 +58,7 @@ class Rounds:
     changes : of guards and monitors, with the derivatives of the parameters.
     shift : derivatives (M,) of the time of the instant.
     large : sizes (n, M) of the terms whose sums Y are.
+    loose : components that hold from this instant on, each with a mode in which nothing is held: states are read in it.
     is_start : whether what has fired was at its zero before anything moved.
     sided : whether directions that move off a zero are followed on their own side of it.
     """
@@ -72,15 +74,17 @@ class Rounds:
         changes: Changes,
         shift: np.ndarray,
         large: np.ndarray,
+        loose: Sequence[tuple[int, int]],
         is_start: bool,
         sided: bool,
     ) -> None:
         self.system, self.x, self.d, self.z, self.Y, self.Yd = system, x.copy(), d.copy(), z.copy(), Y, Yd
         self._changes, self.shift, self.large, self._sided = changes, shift, large, sided
         self._G, self._by_rates = changes.G, changes.rates @ changes.G
-        self._has_moved = is_start
+        self._loose, self._has_moved = loose, is_start
         self.has_reset = self.has_jumped = False
         self.off: list[OffZero] = []
+        self.overtaken: list[OffZero] = []  # what else happens, where a change delays a round
         self._later: list[np.ndarray] = []
         self._reset = differentiated(system.code.module.reset)
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
@@ -125,7 +129,7 @@ class Rounds:
                 return True
             chosen = ((number,), ())
         values = self._with_discrete(p)
-        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
+        at = Place(s, origin, self.x, values, self._reading(), self.Y, self.Yd, self.shift, self.large)
         (found,) = self._changes.of(at, *chosen)
         has_fired = found.is_near or (one.kind != "monitor" and found.value <= 0.0)
         later = np.zeros(self.Y.shape[1])
@@ -147,17 +151,28 @@ class Rounds:
 
         They have to do so together, and nothing else may happen before that.
         """
-        later, values = self._later[0], self._with_discrete(p)
+        system, later, values = self.system, self._later[0], self._with_discrete(p)
+        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
         apart = [np.abs(other - later) > _ALIKE * (np.abs(other) + np.abs(later)) for other in self._later]
         lost, names = np.any(apart, axis=0), [f"guard {one.guard} of {one.component}" for one in fired]
-        at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
-        for one in off_zero(self._changes, at)[1] if later.any() else ():
-            if one.name not in names:
-                lost |= (one.lost | one.more.any(axis=0)) & (later > 0.0)
+        for c, _ in self._loose:  # which comes to hold on its way there
+            free, k = replace(at, z=self._reading()), system.surface_of.index(c)
+            lost |= self._changes.of(free, surfaces=(k,))[0].moves & (later > 0.0)
         if lost.any():
             self.off.append(self.off[-1]._replace(lost=lost))
-        self.Y = self.Y + np.outer(rates_of(self.system, s, self.x, values, self.z), later)
+        for one in off_zero(self._changes, at)[1] if later.any() else ():
+            earlier = (one.lost | one.more.any(axis=0)) & (later > 0.0)
+            if one.name not in names and earlier.any():
+                self.overtaken.append(one._replace(lost=earlier, more=np.zeros_like(one.more)))
+        self.Y = self.Y + np.outer(rates_of(system, s, self.x, values, self.z), later)
         self.shift = self.shift + later
+
+    def _reading(self) -> np.ndarray:
+        """Modes in which states are read as they are, and not evaluated from what is to hold them."""
+        z = self.z.copy()
+        for c, mode in self._loose:
+            z[c] = mode
+        return z
 
     def _with_discrete(self, p: np.ndarray) -> np.ndarray:
         values = p.copy()
@@ -186,7 +201,7 @@ class Rounds:
                 if not names:
                     continue
                 out = list(before)
-                z = np.array([*self.z, system.resets[part][0]])
+                z = np.array([*self._reading(), system.resets[part][0]])
                 self._reset(Dual(s, self.shift), x, lifted, z, out)
                 for name in names:
                     k = self._names.index(name)

@@ -13,7 +13,6 @@ from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
-from hybridsim.analysis.variations.stretches import at_start
 from hybridsim.analysis.wanted import words
 from hybridsim.arguments import flag
 from hybridsim.calls import refusing
@@ -81,7 +80,7 @@ def sensitivities(
     parameters : sequence of str, optional
         Names; None takes all.
     starts_follow : bool, optional
-        Whether starts that are declared over parameters change with them, where the run began at them.
+        Whether starts that are declared over parameters change with them, where the run was given no others.
 
     Returns
     -------
@@ -143,10 +142,7 @@ def _found(
     n, d = system.n, system.layout.discrete
     by_parameter = value_slopes(model, chosen)
     starts = start_slopes([s.start for s in model.states], model, by_parameter)
-    happened = at_start(solution)
-    first = happened[0].x_minus if happened else solution._segments[0].x[0]
-    declared = system.start_state({})
-    starts[first != declared] = 0.0
+    starts[solution._run.task.x0 != system.start_state({})] = 0.0  # stick may have moved them since
     discrete_starts = start_slopes([s.start for s in model.discrete], model, by_parameter)
     if not starts_follow:
         starts[:], discrete_starts[:] = 0.0, 0.0
