@@ -171,7 +171,7 @@ def test_every_study_says_what_makes_its_figures(monkeypatch: pytest.MonkeyPatch
     assert len(scripts) > 20
     assert all((ROOT / script).is_file() for script in scripts)
     assert "studies/speed.py" in figures["footer"]("studies/speed.md")
-    assert figures["footer"]("index.md") == ""
+    assert figures["footer"]("tutorials/index.md") == ""
 
 
 def test_figures_depend_on_what_their_commands_use() -> None:

@@ -6,8 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import complain, require_writable, say
+from hybridsim.cli.output import complain, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.cli.sweep import values_by_name
@@ -81,8 +80,7 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Ask, print the table and draw the picture."""
-    if args.plot:
-        require_writable(args.plot, "--plot", PICTURES)
+    options.check_plot(args)
     model = values.changed_model(args)
     over = None if args.over is None else values_by_name(model, args.over)
 

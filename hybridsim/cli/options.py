@@ -6,8 +6,10 @@ import argparse
 from pathlib import Path
 
 from hybridsim.cli import values
+from hybridsim.cli.output import require_writable
 
 PICTURES = (".png", ".pdf", ".svg")
+_UNNAMED = Path()  # --plot without a file
 
 
 def add_integrator(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +55,22 @@ def add_out(parser: argparse.ArgumentParser, default: str) -> None:
 
 def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
     """A picture of what, to a file."""
-    parser.add_argument("--plot", metavar="FILE", type=Path, help=f"draw {what} ({', '.join(PICTURES)})")
+    parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        nargs="?",
+        const=_UNNAMED,
+        type=Path,
+        help=f"draw {what} ({', '.join(PICTURES)}; default: NAME.png, after the model or the file)",
+    )
+
+
+def check_plot(args: argparse.Namespace) -> None:
+    """Name the picture if the user did not, and refuse a file that cannot be written."""
+    if args.plot == _UNNAMED:
+        args.plot = Path(Path(getattr(args, "model", None) or args.solution).with_suffix(".png").name)
+    if args.plot:
+        require_writable(args.plot, "--plot", PICTURES)
 
 
 def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.options import PICTURES
 from hybridsim.cli.output import complain, print_json, require_apart, require_writable, say
 from hybridsim.cli.session import Session
 from hybridsim.errors import RunInterrupted, SimulationError, UsageError
@@ -60,8 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def check_arguments(args: argparse.Namespace) -> None:
     """Refuse what cannot be written, before the work is done."""
-    if args.plot:
-        require_writable(args.plot, "--plot", PICTURES)
+    options.check_plot(args)
     if args.csv:
         require_writable(args.csv, "--csv")
     if args.npz:

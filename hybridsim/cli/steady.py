@@ -6,8 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import options, values
-from hybridsim.cli.options import PICTURES
-from hybridsim.cli.output import complain, print_json, require_writable, say
+from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError
@@ -61,8 +60,7 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Find the motion and print what it is; 1 where it neither repeats nor rests."""
-    if args.plot:
-        require_writable(args.plot, "--plot", PICTURES)
+    options.check_plot(args)
     model = values.changed_model(args)
 
     import hybridsim

@@ -96,6 +96,14 @@ def test_other_pictures(suffix: str, hybridsim: Callable, tmp_path: Path) -> Non
     assert (tmp_path / f"out.{suffix}").stat().st_size > 1000
 
 
+def test_a_picture_without_a_name_is_named_after_the_model(hybridsim: Callable, tmp_path: Path) -> None:
+    code, _, err = hybridsim("run", "dfcs", "--plot", "--t-end", "1T", "--save", "saved.hsol")
+    assert (code, err.splitlines()[-1]) == (0, "hybridsim: wrote saved.hsol")
+    code, _, _ = hybridsim("resume", "saved.hsol", "--t-end", "2T", "--plot")
+    assert code == 0
+    assert {path.name for path in tmp_path.glob("*.png")} == {"dfcs.png", "saved.png"}
+
+
 def test_run_with_options_of_the_integrator(hybridsim: Callable) -> None:
     argv = ("--integrator", "rk4-dichotomy", "--option", "stick_velocity=zero", "--json")
     counts = []
