@@ -8,8 +8,11 @@ Value Problems in Ordinary Differential Equations, Prentice-Hall 1971, chapter 9
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from hybridsim.engine.jit import kernel
 from hybridsim.engine.stepping import Dense
 
 MOST = 6  # points: the highest order of backward differentiation formulas is five
@@ -18,11 +21,20 @@ MOST = 6  # points: the highest order of backward differentiation formulas is fi
 _CONVERGES = 0.1
 
 
-def converges(series: np.ndarray, h: float, x1: np.ndarray) -> bool:
+@kernel
+def converges(series: Any, h: float, x1: Any) -> bool:
     """Whether Taylor coefficients (n, k) of the states at one end of a step of length h lead to its other end."""
-    terms = series * h ** np.arange(series.shape[1])
-    largest = np.max(np.abs(terms[:, 1:]), axis=1)
-    return bool((np.abs(terms.sum(axis=1) - x1) <= _CONVERGES * largest + 1e-12 * np.abs(x1)).all())
+    for i in range(series.shape[0]):
+        power, largest, total = 1.0, 0.0, 0.0
+        for k in range(series.shape[1]):
+            term = series[i, k] * power
+            total += term
+            if k > 0:
+                largest = max(largest, abs(term))
+            power *= h
+        if not abs(total - x1[i]) <= _CONVERGES * largest + 1e-12 * abs(x1[i]):
+            return False
+    return True
 
 
 def through(s: np.ndarray, x: np.ndarray) -> Dense:

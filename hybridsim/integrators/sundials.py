@@ -1,34 +1,27 @@
-"""CVODE of SUNDIALS through scikit-sundae, with its own root finding, restarted at every event."""
+"""CVODE of SUNDIALS through scikit-sundae, restarted at every event, which the engine locates on its steps."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from hybridsim.engine.hermite import hermite
-from hybridsim.engine.jets import UNIT
-from hybridsim.engine.stepping import Dense, Flow, Root, Step, StepFailure, Stepper, Tolerances, Watch
+from hybridsim.engine.stepping import Dense, Flow, Step, StepFailure, Stepper, Tolerances, Watch
 from hybridsim.integrators.base import Integrator
 from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.past_steps import MOST, converges, through
 
-_MISSES = (
-    "CVODE compares the signs of a guard at both ends of a step, and misses one that changes its sign twice in between "
-    "(SUNDIALS, CVODE user guide, section on rootfinding)"
-)
-_NOISE = "events closer to each other than its tolerances are noise to its root finding; the run then stops, saying so"
-_TANGENT = (
-    "where a motion leaves a surface over several states at a tangency, the guard is smaller at first than the error "
-    "of the states, so that its root finding may not see the way out; the run then stops, and says so"
-)
+_NOISE = {
+    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+}
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
-_CLEAR = 8.0  # times its rounding: a guard that has grown to this has the sign that it should
 _SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
 
 
@@ -47,7 +40,7 @@ class CvodeStepper:
     """Steps CVODE through one segment.
 
     CVODE's step control sees the states alone. While a mode holds them still, a step would grow over many periods of
-    a forcing that only the guards feel, and the sign test at its ends would see nothing. So the sine of every angle
+    a forcing that only the guards feel. So the sine of every angle
     that grows in time is integrated along: the error control then resolves the forcing in every mode.
     """
 
@@ -59,18 +52,12 @@ class CvodeStepper:
         bound: float,
         tolerances: Tolerances,
         first_step: float | None,
-        watch: Watch,
         origin: tuple[float, np.ndarray] | None = None,
     ) -> None:
         from sksundae.cvode import CVODE
 
         _leave_stdout_alone()
-        self.flow, self.bound, self.watch = flow, bound, watch
-        self.kinds = [(int(g), False) for g in watch.guards]
-        self.kinds += [(k, True) for k in range(len(watch.monitor_sides))]
-        options: dict[str, Any] = {}
-        if self.kinds:
-            options = {"eventsfn": self._events(x0), "num_events": len(self.kinds)}
+        self.flow, self.bound = flow, bound
         at = flow.system.layout.phases_at
         self.rates = np.asarray(flow.system.rates)
         self.phases = flow.p[at : at + len(self.rates)]
@@ -89,12 +76,13 @@ class CvodeStepper:
             first_step=first or 0.0,
             max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,
             max_num_steps=_MAX_STEPS,
-            **options,
         )
         self.s, self.x = (0.0, x0) if origin is None else origin
         angles = np.sin(self.phases + self.rates * self.s)
         self.solver.init_step(self.s, np.concatenate([self.x, angles]))
         self.past_times, self.past_states = [self.s], [self.x]
+        # the series at the end of the last step whose dense output was asked for
+        self.last_series = math.nan, np.zeros((0, 0))
 
     def _rhs(self) -> Callable[[float, np.ndarray, np.ndarray], None]:
         flow, n, rates, phases = self.flow, self.flow.n, self.rates, self.phases
@@ -119,14 +107,16 @@ class CvodeStepper:
         return jacobian
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
-        """Interpolation made when it is first asked for: most steps never are."""
+        """Interpolation made when it is first asked for."""
         made: list[Dense] = []
         self.past_times, self.past_states = [*self.past_times, s1][-MOST:], [*self.past_states, x1][-MOST:]
         times, states = np.array(self.past_times), np.array(self.past_states)
 
         def dense(s: np.ndarray) -> np.ndarray:
             if not made:
-                left, right = self._series(s0, x0), self._series(s1, x1)
+                left = self._series(s0, x0) if self.last_series[0] != s0 else self.last_series[1]
+                right = self._series(s1, x1)
+                self.last_series = s1, right
                 smooth = converges(left, s1 - s0, x1) and converges(right, s0 - s1, x0)
                 made.append(hermite(s0, s1, left, right) if smooth else through(times, states))
             return made[0](s)
@@ -137,43 +127,8 @@ class CvodeStepper:
         zero = np.zeros(self.flow.n)
         return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
 
-    def _events(self, x0: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], None]:
-        """The functions to watch; what is zero at the start by decree is taken out, the rest divided by its power of s.
-
-        So no function starts at zero and none can fire again from the zero that ended the last segment. Until the power
-        with its factor exceeds the rounding of the states, the function has the value that it starts with.
-        """
-        flow, watch = self.flow, self.watch
-        at_start = flow.system.series(0.0, x0, flow.p, flow.z, UNIT * np.abs(x0), 0.0)
-        count = len(self.kinds)
-        orders, start, rounding = np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros(count)
-        decreed = np.zeros((count, at_start.guards.shape[1]))  # Taylor coefficients that are zero by decree
-        for k, (number, is_monitor) in enumerate(self.kinds):
-            side = (watch.monitor_sides if is_monitor else watch.sides)[number]
-            order = int((watch.monitor_orders if is_monitor else watch.orders)[number]) if side else 0
-            series = (at_start.monitors if is_monitor else at_start.guards)[number]
-            bounds = (at_start.monitor_bounds if is_monitor else at_start.guard_bounds)[number]
-            orders[k], start[k] = order, side * abs(series[order])
-            decreed[k, :order], rounding[k] = series[:order], _CLEAR * bounds[0]
-        powers = np.arange(decreed.shape[1])
-
-        def events(s: float, x: np.ndarray, out: np.ndarray) -> None:
-            time, state = np.array([s]), np.array(x[: flow.n], dtype=float)[None, :]
-            values = flow.guards(time, state)[0][watch.guards]
-            if len(watch.monitor_sides):
-                values = np.concatenate([values, flow.monitors(time, state)[0]])
-            power = abs(s) ** orders
-            is_start = (orders > 0) & (np.abs(start) * power <= rounding)
-            out[:] = np.where(
-                is_start, start, (values - decreed @ s**powers) / np.where(is_start, 1.0, power)
-            )
-
-        # scikit-sundae reads the directions off the function itself; a function has no such attribute by its type
-        events.direction = [0 if is_monitor else -1 for _, is_monitor in self.kinds]  # type: ignore[attr-defined]  # read off the function
-        return events
-
     def step(self) -> Step:
-        """One internal step of CVODE, cut at a root or at the bound."""
+        """One internal step of CVODE, cut at the bound."""
         result = self.solver.step(self.bound, method="onestep", tstop=self.bound)
         if not result.success:
             raise StepFailure(f"CVODE: {result.message}")
@@ -182,39 +137,27 @@ class CvodeStepper:
         if s1 == s0:
             raise StepFailure("CVODE: no progress")
         self.s, self.x = s1, x1
-        roots: tuple[Root, ...] = ()
-        if result.status == 2 and result.i_events is not None:
-            signs = result.i_events[-1]
-            roots = tuple(
-                Root(number, int(sign), is_monitor)
-                for (number, is_monitor), sign in zip(self.kinds, signs, strict=True)
-                if sign
-            )
-        return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1), roots)
+        return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Not needed: the step ends at the root."""
-        raise NotImplementedError("CVODE ends its step at a root")
+        """Not needed: the dense output is as accurate as the method."""
+        raise NotImplementedError("an event of CVODE is taken from the dense output")
 
 
 @dataclass(frozen=True)
 class CvodeBDF(Integrator):
     """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
 
-    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. At events: CVODE's own
-    root finding, then a fresh start of order 1; dense output is the two-point Hermite polynomial of degree 7.
+    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. At events: a fresh
+    start of order 1. Dense output, on which events are located, is the two-point Hermite polynomial of degree 7.
     """
 
     name: ClassVar[str] = "cvode-bdf"
-    title: ClassVar[str] = "SUNDIALS CVODE, BDF, with its own root finding"
+    title: ClassVar[str] = "SUNDIALS CVODE, BDF"
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = {
-        "multiple-roots": _MISSES,
-        "accumulation": _NOISE,
-        "tangent-exit": _TANGENT,
-    }
+    lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
@@ -233,7 +176,7 @@ class CvodeBDF(Integrator):
             s_bound,
             tolerances,
             watch,
-            lambda s, x: CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, watch, (s, x)),
+            lambda s, x: CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, (s, x)),
         )
 
 
@@ -245,14 +188,12 @@ class CvodeAdams(Integrator):
     """
 
     name: ClassVar[str] = "cvode-adams"
-    title: ClassVar[str] = "SUNDIALS CVODE, Adams, with its own root finding"
+    title: ClassVar[str] = "SUNDIALS CVODE, Adams"
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "long smooth stretches, not stiff"
     lacks: ClassVar[dict[str, str]] = {
-        "multiple-roots": _MISSES,
-        "accumulation": _NOISE,
-        "tangent-exit": _TANGENT,
+        **_NOISE,
         "stiff": "where rates are stiff its iteration converges with very short steps only: use cvode-bdf",
     }
     dense_is_accurate: ClassVar[bool] = True
@@ -273,5 +214,5 @@ class CvodeAdams(Integrator):
             s_bound,
             tolerances,
             watch,
-            lambda s, x: CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, watch, (s, x)),
+            lambda s, x: CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, (s, x)),
         )

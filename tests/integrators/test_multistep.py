@@ -53,3 +53,18 @@ def test_lsoda_is_not_sent_off_with_a_step_as_long_as_the_stick_before(periods: 
         sol = hs.simulate(model, (0, periods * period), integrator="scipy-lsoda", rtol=rtol)
         assert sol.success, sol.message
         assert len(sol.events) == 4 * periods + 1
+
+
+@pytest.mark.parametrize("name", ["cvode-bdf", "cvode-adams"])
+def test_a_gap_that_closes_and_opens_within_a_step(name: str) -> None:
+    """x moves evenly over a floor that has a bump of a fiftieth of the way: it hits the bump where that begins."""
+    ball = hs.Model(
+        "bump",
+        states=[hs.State("x", 0, 1), hs.State("h", 0, "w"), hs.State("w", 0, "p")],
+        impacts=[hs.Impact("p", gap="h + (x - 5)**2 - 0.01", restitution=1)],
+    )
+    sol = hs.simulate(ball, (0.0, 10.0), integrator=name)
+    assert sol.success, sol.message
+    # the gap falls at 0.2 where it closes, and w becomes 2*0.2 of it: h + (t - 5)**2 >= 0.01 from then on
+    assert [event.t for event in sol.events] == [pytest.approx(4.9, abs=1e-9)]
+    assert sol(10.0) == pytest.approx([10.0, 0.4 * 5.1, 0.4], abs=1e-6)

@@ -45,7 +45,7 @@ stands the order in the step that the last two settings show, where the error fa
 is run, also where an integrator says what it lacks; what fails there fails for the reason that it gives.
 
 All methods share the location and the decisions of events, unless their name says otherwise: native events, cooldown,
-regularised forms, CVODE's own root finding, and the fixed-step methods. Where all are right, the text says what goes
+regularised forms, and the fixed-step methods. Where all are right, the text says what goes
 wrong in programs that decide otherwise.
 
 A scene's picture shows one state over a part of the run, around where a method first goes visibly wrong: solid what is
