@@ -239,6 +239,23 @@ def before_appointment(
     return coincident(system, target, at, ())
 
 
+def with_evaluated(
+    system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
+) -> np.ndarray:
+    """Errors of the states where something is due, with those of what the modes until then evaluate.
+
+    That was evaluated at a local time of the run-time vector `before` and is judged at the origin of p: both times are
+    rounded.
+    """
+    held, error = system.evaluated(z), error.copy()
+    if held:
+        origin, now = before[system.layout.origin_at], p[system.layout.origin_at]
+        rounding = 2.0 * math.ulp(max(abs(origin), abs(now)))
+        early, late = (system.project(now - origin + d, x, before, z) for d in (-rounding, rounding))
+        error[held] = UNIT * np.abs(x[held]) + np.abs(late - early)[held]
+    return error
+
+
 def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
     """Add to the errors of the states what so many steps have rounded away.
 

@@ -17,7 +17,13 @@ from hybridsim.engine.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
-from hybridsim.engine.located import Located, before_appointment, located, located_backward
+from hybridsim.engine.located import (
+    Located,
+    before_appointment,
+    located,
+    located_backward,
+    with_evaluated,
+)
 from hybridsim.engine.monitor_sides import MonitorSides
 from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.notices import Notices
@@ -464,8 +470,7 @@ class ModeLoop:
         """
         system, z, discrete = self.system, before.z, self.system.discrete(before.p)
         p = system.vector(instant, discrete, self.forward)
-        error = error.copy()
-        error[system.evaluated(z)] = 0.0
+        error = with_evaluated(system, before.p, x_minus, p, z, error)
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
         resets = [("schedule", k) for k in schedules]
         settling = Settling(system, at, z.copy(), self.forward)

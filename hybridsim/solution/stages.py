@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.jets import UNIT
-from hybridsim.engine.located import Located
+from hybridsim.engine.located import Located, with_evaluated
 from hybridsim.engine.monitor_sides import MonitorSides
 from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.outcome import Situation
@@ -163,8 +163,8 @@ class _Instant:
         z = segment.z if stage is None else stage.outcome.z
         before = segment.p if stage is None else stage.outcome.p
         error = situation(system, segment, []).x_error
-        error[system.evaluated(z)] = 0.0
         p = system.vector(self.instant, system.discrete(before), self.task.forward)
+        error = with_evaluated(system, before, x, p, z, error)
         at = Situation(0.0, x.copy(), p, z.copy(), error, math.ulp(0.0))
         found = self._settled(self._nothing(at), (), self.schedules, begins=True)
         crossed = self.crossed(found)

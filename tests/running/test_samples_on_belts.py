@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -62,3 +63,28 @@ def test_a_sample_in_multiple_precision(sample: str) -> None:
     assert run.output("v", 2.1) == pytest.approx(0.2 + 0.6 * (0.1 - 0.5), abs=1e-12)
     reference = multiple_precision_trajectory(model, (0, 2.1))
     assert reference.states.state(2.1)[0] == pytest.approx(0.2 + 0.6 * (0.1 - 0.5), abs=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853"])
+def test_an_unrelated_tick_beside_a_body_on_a_moving_floor(integrator: str) -> None:
+    """The floor accelerates by 0.484 at most, gravity by 3.2: the body lies on it, whatever another state does."""
+    omega = 2.2
+    for k in range(12):
+        period = 0.5 + 0.0371 * k
+        body = hs.Model(
+            "floor",
+            parameters={"w0": omega},
+            states=[
+                hs.State("h", 0, "w"),
+                hs.State("w", 0.1 * omega, "p - 3.2"),
+                hs.State("x", 0.4, 0.7),
+            ],
+            impacts=[hs.Impact("p", gap="h - 0.1*sin(w0*t)", restitution=0)],
+            schedules=[hs.Schedule("clock", start=period, period=period, reset={"x": 0.4})],
+        )
+        sol = hs.simulate(body, (0.0, 6.0), integrator=integrator)
+        assert sol.success, (period, sol.message)
+        assert [mode.mode for mode in sol.modes["p"]] == ["closed"]
+        assert {event.component for event in sol.events} == {"clock"}
+        times = np.linspace(0.0, 6.0, 50)
+        assert sol(times)[0] == pytest.approx(0.1 * np.sin(omega * times), abs=1e-15)
