@@ -466,9 +466,13 @@ class ModeLoop:
     ) -> Outcome:
         """Settle a scheduled instant, inputs as they are from then on.
 
-        before: what holds until then. s_error: how well the zeros of what was located there are known.
+        before: what holds until then. s_error: how well the zeros of what was located there are known. An event that
+        was settled within two roundings of the instant has its zero there as well.
         """
         system, z, discrete = self.system, before.z, self.system.discrete(before.p)
+        rounding = math.ulp(float(instant))
+        if self.adopted is not None and abs(instant.minus(self.adopted)) <= 2.0 * rounding:
+            s_error = max(s_error, rounding)
         p = system.vector(instant, discrete, self.forward)
         error = with_evaluated(system, before.p, x_minus, p, z, error)
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))

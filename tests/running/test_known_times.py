@@ -130,3 +130,24 @@ def test_a_reset_reads_the_velocity_that_a_body_has_before_its_surface_jumps(
         [0.15] * 3, abs=1e-9
     )
     assert sol(1.02)[0] == pytest.approx(0.17, abs=1.0 / 64.0 if options else 1e-9)
+
+
+@pytest.mark.parametrize(
+    "integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853", "cvode-bdf"]
+)
+@pytest.mark.parametrize(
+    ("period", "offset"), [(0.46, 0.36), (0.3, 0.1), (0.7, 0.1), (0.55, 0.0), (0.2, 0.0)]
+)
+@pytest.mark.parametrize("rate", ["(1 if abs(t - 2) < w else 2)", "(1 if t > 2 - w and t < 2 + w else 2)"])
+def test_a_clock_that_ticks_within_rounding_of_a_jump(rate, period, offset, integrator) -> None:
+    """The clock ticks at 2.2, where the rate jumps, up to the rounding of both times."""
+    model = hs.Model.from_toml(f"""
+        schema = 1
+        name = "m"
+        parameters = {{ w = 0.2 }}
+        states.x = {{ start = 0, der = "{rate}" }}
+        clocks.c = {{ period = {period}, offset = {offset}, set = {{}} }}
+    """)
+    sol = hs.simulate(model, (0.0, 5.0), integrator=integrator)
+    assert sol.success, sol.message
+    assert sol(5.0)[0] == pytest.approx(9.6, abs=1e-6)
