@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hybridsim.engine.reset_keys import amounts_of
-from hybridsim.engine.resets import merged_resets
 
 if TYPE_CHECKING:
     from hybridsim.engine.outcome import Situation
@@ -47,18 +46,20 @@ def taken_at_once(
             # what only sets does the same once more
             found.setdefault((what, j if amounts_of(choice.reset) else -1), (j, number))
     taken = list(found.values())
-    apart = _apart(settling, given, component, taken) if len(taken) > 1 else ""
+    apart = _apart(settling, component, taken)
     return ([], ("nonunique", apart)) if apart else (taken, None)
 
 
-def _apart(settling: Settling, given: Situation, component: int, taken: Sequence[tuple[int, int]]) -> str:
-    """Why several guards cannot be taken at once; empty if they can."""
-    system, at, mode = settling.system, settling.at, int(settling.at.z[component])
-    automaton = system.automata[component]
-    names = " and ".join(automaton.guard_names[mode][j] for j, _ in taken)
-    said = f"guards {names} of mode {automaton.modes[mode]} ({automaton.name}) come to zero at once and "
-    if len({automaton.targets[mode][j][number] for j, number in taken}) > 1:
-        return f"{said}lead apart"
-    keys: list[tuple[object, ...]] = [("choice", component, mode, j, number) for j, number in taken]
-    clash = merged_resets(system, given, keys, at.x.copy(), at.p.copy(), at.x_error.copy())
-    return f"{said}their resets differ: put them into two components ({clash})" if clash else ""
+def _apart(settling: Settling, component: int, taken: Sequence[tuple[int, int]]) -> str:
+    """Why several guards cannot be taken at once; empty if they lead to one mode, where resets must agree."""
+    automaton, mode = settling.system.automata[component], int(settling.at.z[component])
+    targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]
+    if len(set(targets)) <= 1:
+        return ""
+    ways = [
+        f"{automaton.guard_names[mode][j]} leads to {to}" for (j, _), to in zip(taken, targets, strict=True)
+    ]
+    return (
+        f"guards of mode {automaton.modes[mode]} ({automaton.name}) come to zero at once and lead apart: "
+        f"{' and '.join(ways)}; give their choices a `when` that says which one is taken, or one target"
+    )

@@ -220,7 +220,28 @@ def test_a_ball_in_a_corner_of_a_box_meets_both_walls(integrator: str) -> None:
 @pytest.mark.parametrize("integrator", ADAPTIVE)
 def test_walls_that_contradict_each_other_in_a_corner_end_the_run(integrator: str) -> None:
     sol = hs.simulate(box('u = "-1"', 'u = "-2", v = "-v"'), (0, 1.5), integrator=integrator)
+    assert sol.status == "inconsistent"
+    assert "two resets at one instant set u to -2.0 and to -1.0" in sol.message
+    assert "guard right of" in sol.message
+    assert "guard top of" in sol.message
+    assert sol.t_end == pytest.approx(1.0, abs=1e-9)
+    apart = [
+        '[components.right.modes.fly.guards.right]\nexpr = "1 - x"\nthen = { to = "fly", reset = { u = "-1" } }',
+        '[components.top.modes.fly.guards.top]\nexpr = "1 - y"\nthen = { to = "fly", reset = { u = "-2" } }',
+    ]
+    in_two = hs.simulate(
+        model(BOX.split("[modes.fly]")[0] + "\n".join(apart)), (0, 1.5), integrator=integrator
+    )
+    assert in_two.status == "inconsistent"
+    assert "two resets at one instant set u to -2.0 and to -1.0" in in_two.message
+
+
+@pytest.mark.parametrize("integrator", ADAPTIVE)
+def test_walls_that_lead_apart_in_a_corner_end_the_run(integrator: str) -> None:
+    text = BOX.replace("[modes.fly]", "[modes.fly]\ninitial = true") + "[modes.up]\n[modes.down]\n"
+    text = text.replace('to = "fly", reset = { RIGHT }', 'to = "up"')
+    text = text.replace('to = "fly", reset = { TOP }', 'to = "down"')
+    sol = hs.simulate(model(text), (0, 1.5), integrator=integrator)
     assert sol.status == "nonunique"
-    assert "right and top" in sol.message
-    assert "their resets differ: put them into two components" in sol.message
+    assert "right leads to up and top leads to down" in sol.message
     assert sol.t_end == pytest.approx(1.0, abs=1e-9)
