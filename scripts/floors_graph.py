@@ -33,6 +33,7 @@ PLACES = {
     "tables": (5, 4.4),
     "colours": (4, 2.2),
     "notebook": (5, 2.2),
+    "readable": (5, -2.2),
     "arguments": (5, 0.0),
     "solution": (6, 0.0),
     "preparation": (7, 2.2),

@@ -28,6 +28,7 @@ FLOORS = (
     "tables",
     "colours",
     "notebook",
+    "readable",
     "arguments",
     "solution",
     "preparation",

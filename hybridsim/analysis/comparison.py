@@ -15,10 +15,11 @@ from hybridsim.analysis.table import table
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
 from hybridsim.files import json_text, whole_file, write_text
+from hybridsim.readable import Readable
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Readable):
     """Integrators on one model, each at several settings, against one reference.
 
     Parameters
@@ -63,6 +64,9 @@ class Comparison:
     warnings: tuple[str, ...] = ()
     second_reference: str = ""
     difference: Errors | None = None
+
+    def __repr__(self) -> str:
+        return self.table()
 
     def reading(self, row: Row, quantity: str) -> Reading | None:
         """An error of a row, one of `QUANTITIES`; None where the row has none.

@@ -12,6 +12,7 @@ from typing import Any, TextIO
 
 from hybridsim.errors import UsageError, printable
 from hybridsim.files import json_text
+from hybridsim.readable import aligned
 
 TRIAL = ".hybridsim-"  # how the name of a folder begins that is made, and removed, to see whether it can be
 
@@ -75,10 +76,8 @@ def print_json(value: Any) -> None:
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print rows under a header, columns aligned to the left."""
-    lines = [tuple(header), *(tuple(row) for row in rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
-    for line in lines:
-        say("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+    for line in aligned([header, *rows]):
+        say(line)
 
 
 def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:

@@ -10,6 +10,7 @@ from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError
+from hybridsim.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis import SteadyState
@@ -125,7 +126,7 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         (name, *(f"{record[key][name]:.6g}" for key in ("amplitude", "minimum", "maximum", "mean", "energy")))
         for name in record["amplitude"]
     ]
-    lines += ["", *_columns([header, *rows])]
+    lines += ["", *aligned([header, *rows], indent="  ")]
     lines += [f"  {name}: varies too fast, or jumps too often, to be read" for name in record["too_fast"]]
     count = len(next(iter(record["harmonics"].values()), [])) - 1
     if count > 0 and found.kind == "periodic":
@@ -133,12 +134,5 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         rows = [
             (name, *(f"{h['amplitude']:.4g}" for h in row[1:])) for name, row in record["harmonics"].items()
         ]
-        lines += ["", *_columns([header, *rows])]
+        lines += ["", *aligned([header, *rows], indent="  ")]
     return lines
-
-
-def _columns(rows: list[tuple[str, ...]]) -> list[str]:
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return [
-        "  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]

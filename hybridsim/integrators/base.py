@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABCMeta
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import ClassVar
@@ -37,7 +37,15 @@ CAPABILITIES = {
 }
 
 
-class Integrator(ABC):
+class _IntegratorType(ABCMeta):
+    """The type of integrators, which prints an integrator with its name and its order."""
+
+    def __repr__(cls) -> str:
+        name, title, order = (getattr(cls, key, "") for key in ("name", "title", "order"))
+        return f"<integrator {name}: {title}, order {order}>" if name else super().__repr__()
+
+
+class Integrator(metaclass=_IntegratorType):
     """How a piecewise-smooth system is integrated.
 
     The contract, in the order in which it matters:

@@ -36,6 +36,18 @@ _PARTS: dict[str, type[Declared]] = {
     "impacts": Impact,
 }
 
+# methods that other parts of the package call; completion does not offer them
+_INTERNAL = {
+    "components_of",
+    "error",
+    "is_known_to_be_sound",
+    "once",
+    "place",
+    "remedy_for_parameter",
+    "structure",
+    "with_values_of",
+}
+
 
 @dataclass(frozen=True)
 class Model(Declared):
@@ -169,6 +181,9 @@ class Model(Declared):
 
     def __hash__(self) -> int:
         return hash(_content(self))
+
+    def __dir__(self) -> list[str]:
+        return sorted(set(super().__dir__()) - _INTERNAL)
 
     def __repr__(self) -> str:
         automata = [contact.name for contact in self.contacts]

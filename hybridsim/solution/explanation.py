@@ -16,6 +16,7 @@ from hybridsim.engine.system import CORNER
 from hybridsim.errors import UsageError
 from hybridsim.expr import assignment
 from hybridsim.model.units import units_of
+from hybridsim.readable import Readable
 from hybridsim.solution.blow import errors_beside, is_struck
 from hybridsim.solution.candidate import candidate, views
 from hybridsim.solution.event import Event
@@ -47,7 +48,7 @@ _SERIES = 24  # events that are looked at to say how they accumulated
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Explanation(Readable):
     """Why an event went as it did; ``print`` it.
 
     Parameters
@@ -82,6 +83,9 @@ class Explanation:
     state: str = ""
     choices: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def __str__(self) -> str:
         lines = [repr(self.event)[1:-1]]

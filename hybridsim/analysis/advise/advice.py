@@ -19,13 +19,14 @@ from hybridsim.analysis.provenance import provenance
 from hybridsim.errors import UsageError, nearest
 from hybridsim.files import json_text, write_text
 from hybridsim.model import Model
+from hybridsim.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep import Sweep
 
 
 @dataclass(frozen=True, eq=False)
-class Advice:
+class Advice(Readable):
     """How little model answers a question within a tolerance.
 
     Parameters

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, duration
 from hybridsim.errors import printable
+from hybridsim.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice
@@ -17,9 +18,9 @@ def table(advice: Advice) -> str:
     """Heading, certificates, ladder, settings, remarks."""
     lines = [f"{advice.quantity} of {advice.model.name} within {advice.tol:g}: {_conclusion(advice)}"]
     lines += [f"  by theory: {text}" for text in advice.certificates]
-    lines += ["", *_columns(_ladder(advice))]
+    lines += ["", *aligned(_ladder(advice))]
     if advice.settings:
-        lines += ["", *_columns(_settings(advice))]
+        lines += ["", *aligned(_settings(advice))]
     if advice.spread is not None:
         lines += ["", _spread(advice)]
     if advice.remarks:
@@ -74,8 +75,3 @@ def _cost(seconds: float) -> str:
 
 def _is_nan(value: float | complex) -> bool:
     return value != value
-
-
-def _columns(rows: list[tuple[str, ...]]) -> list[str]:
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]

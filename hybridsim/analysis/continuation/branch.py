@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.motion import Motion
@@ -69,7 +70,7 @@ class Special:
 
 
 @dataclass(frozen=True)
-class Branch:
+class Branch(Readable):
     """Periodic orbits along a curve.
 
     Parameters

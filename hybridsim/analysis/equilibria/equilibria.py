@@ -15,6 +15,7 @@ from hybridsim.analysis.equilibria.field import INSIDE, Field, is_driven
 from hybridsim.analysis.equilibria.linearize import equilibrium_near
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.readable import Readable, in_numbers
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -25,7 +26,7 @@ _SETTLED = 1e-14
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(Readable):
     """Where nothing moves in one vector of modes: a point, or a set of them where bodies stick.
 
     Parameters
@@ -52,6 +53,13 @@ class Equilibrium:
     low: np.ndarray
     high: np.ndarray
     growth: float
+
+    def __repr__(self) -> str:
+        modes = ", ".join(f"{name} {mode}" for name, mode in self.modes.items()) or "no components"
+        lines = [f"Equilibrium ({modes}), largest growth {self.growth:.6g}"]
+        if self.is_point:
+            return "\n".join([*lines, f"  x = {in_numbers(self.x)}"])
+        return "\n".join([*lines, f"  x from {in_numbers(self.low)} to {in_numbers(self.high)}"])
 
     @property
     def is_point(self) -> bool:

@@ -14,6 +14,7 @@ from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.readable import Readable, in_numbers
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -26,7 +27,7 @@ _ALIKE = 1e-9  # of the terms of a rate: Jacobians that differ by less are one
 
 
 @dataclass(frozen=True)
-class Linearization:
+class Linearization(Readable):
     """The linear system d' = A d for small changes d of the free states about x, in one vector of modes.
 
     Parameters
@@ -55,6 +56,17 @@ class Linearization:
     x: np.ndarray
     is_equilibrium: bool
     admissible: bool
+
+    def __repr__(self) -> str:
+        remarks = [] if self.is_equilibrium else ["not an equilibrium"]
+        remarks += [] if self.admissible else ["the modes do not last there"]
+        return "\n".join(
+            [
+                ", ".join([f"Linearization: {'stable' if self.stable else 'not stable'}", *remarks]),
+                f"  about x = {in_numbers(self.x)}; free states {', '.join(self.states) or 'none'}",
+                f"  eigenvalues {in_numbers(self.eigenvalues)}",
+            ]
+        )
 
     @cached_property
     def _modes(self) -> tuple[np.ndarray, np.ndarray]:

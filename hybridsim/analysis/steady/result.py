@@ -14,6 +14,7 @@ from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit as Stretch
@@ -25,7 +26,7 @@ _NEUTRAL = 1e-9
 _MOST_LISTED = 10_000  # harmonics of each quantity in a record
 
 
-class SteadyState(Measures):
+class SteadyState(Readable, Measures):
     """The motion that a model settles on.
 
     Attributes

@@ -16,6 +16,7 @@ from hybridsim.analysis.suite.verdict import Verdict, verdict
 from hybridsim.analysis.table import setting
 from hybridsim.analysis.wanted import positives
 from hybridsim.files import json_text, whole_file, write_text
+from hybridsim.readable import Readable
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
@@ -46,7 +47,7 @@ class SceneResult:
 
 
 @dataclass(frozen=True)
-class SuiteComparison:
+class SuiteComparison(Readable):
     """All integrators on all scenes.
 
     Parameters
@@ -69,6 +70,9 @@ class SuiteComparison:
     repeat: int
     budget: float
     seconds: float
+
+    def __repr__(self) -> str:
+        return self.table()
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hybridsim.analysis.suite.verdict import COMMON, USELESS
 from hybridsim.analysis.table import differences, milliseconds, setting, turns, versions
 from hybridsim.errors import printable
+from hybridsim.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.suite.result import SuiteComparison
@@ -33,7 +33,7 @@ def _who_is_right(suite: SuiteComparison) -> list[str]:
     )
     return [
         title,
-        *_aligned(rows),
+        *aligned(rows),
         f"off: the modes are right, a state is not to {USELESS:.0%} of its amplitude",
     ]
 
@@ -48,7 +48,7 @@ def _cheapest(suite: SuiteComparison) -> list[str]:
             for row in found.values()
         ]
         rows.append([f"  {scene}", *cells])
-    return ["Cheapest, by the largest error of the states over the run", *_aligned(rows)]
+    return ["Cheapest, by the largest error of the states over the run", *aligned(rows)]
 
 
 def _references(suite: SuiteComparison) -> list[str]:
@@ -58,7 +58,7 @@ def _references(suite: SuiteComparison) -> list[str]:
         second = found.second_reference or "nothing"
         difference = differences(found) if found.difference else "-"
         rows.append([f"  {result.scene.name}", found.reference, second, difference])
-    return ["References", *_aligned(rows)]
+    return ["References", *aligned(rows)]
 
 
 def _notes(suite: SuiteComparison) -> list[str]:
@@ -69,11 +69,4 @@ def _notes(suite: SuiteComparison) -> list[str]:
         f"It took {suite.seconds:.0f} s of {suite.budget:g} s.",
         versions(suite.provenance),
         *(["Not as asked:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
-    ]
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]

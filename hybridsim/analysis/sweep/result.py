@@ -20,6 +20,7 @@ from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.errors import UsageError, nearest
 from hybridsim.files import json_text, whole_file, write_text
 from hybridsim.model import Model
+from hybridsim.readable import Readable
 from hybridsim.tables import library
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Readable):
     """What was measured, over the values of parameters.
 
     Parameters

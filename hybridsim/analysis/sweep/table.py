@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.errors import printable
+from hybridsim.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep.result import Sweep
@@ -44,10 +45,7 @@ def table(sweep: Sweep) -> str:
             shown = f"|{name}|" if np.iscomplexobj(values) else name
             rows.append((shown, *ends, unit))
     header = ("reading", "least", "greatest", "unit")
-    widths = [max(len(row[i]) for row in [header, *rows]) for i in range(4)]
-    lines = [
-        "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in [header, *rows]
-    ]
+    lines = aligned([header, *rows])
     head = [heading(sweep), *statuses(sweep)]
     return printable("\n".join([*head, "", *lines] if rows else head))
 

@@ -17,13 +17,14 @@ from hybridsim.analysis.wanted import words
 from hybridsim.arguments import flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.readable import Readable, aligned
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 
 @dataclass(frozen=True)
-class Sensitivities:
+class Sensitivities(Readable):
     """Derivatives of a run.
 
     Parameters
@@ -59,6 +60,20 @@ class Sensitivities:
     times_by_start: np.ndarray
     times_by_parameter: np.ndarray
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        columns = [f"d/d{name}(0)" for name in self.states] + [f"d/d{name}" for name in self.parameters]
+        values = np.hstack([self.by_start, self.by_parameter])
+        rows = [
+            (name, *(f"{value:.6g}" for value in row)) for name, row in zip(self.states, values, strict=True)
+        ]
+        return "\n".join(
+            [
+                f"Sensitivities of a run: of its end, and of {len(self.times)} event times",
+                *aligned([("at the end", *columns), *rows], indent="  "),
+                *(f"  warning: {text}" for text in self.warnings),
+            ]
+        )
 
 
 @refusing

@@ -1,0 +1,28 @@
+"""How answers show themselves: `Readable` gives a notebook the same text that `print` shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+
+class Readable:
+    """An answer whose `repr` is a text of several lines; notebooks show it with its columns aligned."""
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"
+
+
+def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
+    """Return the rows of a text table as lines, with columns of equal width."""
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        indent + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def in_numbers(values: Iterable[complex]) -> str:
+    """Return real or complex numbers as text with six digits."""
+    return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
