@@ -1,4 +1,4 @@
-"""What is asked of a model beyond one run: comparisons, steady states, sensitivities, sweeps over parameters."""
+"""This package answers questions beyond one run: comparisons, steady states, sensitivities and parameter sweeps."""
 
 from hybridsim.analysis.advise import Advice, advise
 from hybridsim.analysis.compare import compare

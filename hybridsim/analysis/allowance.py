@@ -1,4 +1,4 @@
-"""How long something may take: checked from time to time by what takes the time, compiling apart."""
+"""This module limits the time of a computation through its progress callback; compiling does not count."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from hybridsim.engine.jit import seconds_compiling
 
 
 class OutOfTime(Exception):
-    """Something has used up the time that it was given; the text says how long that was."""
+    """The time limit of a computation has passed; the text says how long it was."""
 
 
 class Stopwatch:
-    """Seconds since it was made, without those that this thread has spent on compiling."""
+    """A stopwatch that starts when made and excludes the time this thread spends compiling."""
 
     def __init__(self) -> None:
         self._began, self._compiled = time.perf_counter(), seconds_compiling()
 
     @property
     def seconds(self) -> float:
-        """Seconds so far."""
+        """The elapsed seconds."""
         return time.perf_counter() - self._began - (seconds_compiling() - self._compiled)
 
 
 class Allowance:
-    """Given as `progress` to what is not to take longer: raises `OutOfTime` when it does.
+    """A progress callback that raises `OutOfTime` after a given time.
 
     Parameters
     ----------
-    seconds : from now on, without those for compiling.
-    told : called at every look, for whoever wants to see that something goes on.
+    seconds : the time limit from now on, without compiling.
+    told : called at each check, to show progress.
     """
 
     def __init__(self, seconds: float, told: Callable[[], None] | None = None) -> None:
@@ -40,4 +40,4 @@ class Allowance:
         if self._told is not None:
             self._told()
         if self._watch.seconds > self.seconds:
-            raise OutOfTime(f"not done after {self.seconds:.2g} s")
+            raise OutOfTime(f"not finished after {self.seconds:.2g} s")

@@ -1,4 +1,4 @@
-"""One model over one span, ready to be run by any line of a comparison and held against its reference."""
+"""This module prepares one model over one span for the runs of a comparison and for its reference."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 
 class _OutOfTime(Exception):
-    """A run has used up the time that it was given."""
+    """A run has passed its time limit."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Runs of a model over a span.
+    """Runs of one model over one span.
 
     Parameters
     ----------
-    model : the model, its parameters and initial values set.
-    t_span, period : what is run; the period of the forcing or None.
+    model : the model with its parameters and initial values.
+    t_span, period : the span of the runs; the period of the forcing or None.
     """
 
     model: Model
@@ -42,22 +42,22 @@ class Bench:
     _forms: dict[tuple[str, float], Model] = field(default_factory=dict, repr=False, compare=False)
 
     def simulate(self, integrator: str, *, model: Model | None = None, **options: Any) -> Solution:
-        """One run; of another form of the model, where one is given."""
+        """Run the model, or another form of it, with an integrator."""
         from hybridsim.simulate import simulate
 
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)
 
     def call(self, line: Series, value: float) -> Callable[[], Solution]:
-        """The run of a line at a value, ready to be timed."""
+        """Return a function that makes the run of a line at a value, for timing."""
         model, options = self._form(line, value), line.options_at(value)
         return lambda: self.simulate(line.integrator, model=model, **options)
 
     def first_run(self, line: Series, value: float, reference: Reference, limit: float = math.inf) -> Row:
-        """The run that warms up, and whose errors and counts are those of the row.
+        """Make the run that warms up; its errors and counts go into the row.
 
         Parameters
         ----------
-        limit : seconds after which it is stopped; what it needs for compiling does not count.
+        limit : seconds after which it is stopped; compiling does not count.
         """
         options = line.options_at(value)
         row = Row(line.integrator, line.label, (line.varied, value), options, "failed", form=line.regularized)
@@ -78,12 +78,12 @@ class Bench:
                 found = as_set_valued(found, {contact.name for contact in self.model.contacts})
             errors = reference.yardstick.measure(found)
         except _OutOfTime:
-            return replace(row, status=STOPPED, message=f"not done after {limit:.2g} s")
+            return replace(row, status=STOPPED, message=f"not finished after {limit:.2g} s")
         except HybridsimError as error:
             return replace(
                 row, status="refused" if isinstance(error, UsageError) else "failed", message=error.message
             )
-        except Exception as error:  # an integrator may be anybody's: it costs its own row only
+        except Exception as error:  # A third-party integrator may raise anything; it costs its own row only.
             return replace(row, message=f"{type(error).__name__}: {error}")
         stats = solution.stats
         rhs, guards, steps = (int(stats[name]) for name in ("rhs_evaluations", "guard_evaluations", "steps"))
@@ -91,7 +91,7 @@ class Bench:
         return replace(row, status=solution.status, errors=errors, cost=cost)
 
     def comparison(self, reference: Reference, rows: Sequence[Row], repeat: int) -> Comparison:
-        """The rows as a result."""
+        """Return the rows as a comparison."""
         return Comparison(
             title=f"{self.model.name}: {self.model.title}" if self.model.title else self.model.name,
             t_span=self.t_span,
@@ -107,7 +107,7 @@ class Bench:
         )
 
     def _form(self, line: Series, value: float) -> Model | None:
-        """The regularised form that a line runs in place of the model."""
+        """Return the regularised model of a line, or None for a line without one."""
         if not line.regularized:
             return None
         key = (line.regularized, value)

@@ -1,4 +1,4 @@
-"""Which integrator buys accuracy cheapest on a model: error and cost of each at several settings."""
+"""This module compares integrators on a model: error and cost of each at several settings."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
-TIME = 10.0  # of a model without a period: a few swings of a mechanism of about 1 Hz
-BUDGET = 120.0  # seconds of a comparison that nobody has given any thought
-# the share of the budget that each run of a reference may take: there are at most three such runs
+TIME = 10.0  # for a model without a period: a few swings of a mechanism of about 1 Hz
+BUDGET = 120.0  # seconds; the default
+# The share of the budget that each run of a reference may take; there are at most three such runs.
 REFERENCE_SHARE = 1 / 4
 
 
@@ -46,48 +46,48 @@ def compare(
 ) -> Comparison:
     """Run a model with several integrators at several settings, and measure error and cost of each run.
 
-    Errors are measured over the whole run, over its last period, and in the times of the events; the sequence
-    of modes is judged apart. A run that fails becomes a row that says so.
+    Errors are measured over the whole run, over its last period, and in the times of the events. The sequence
+    of modes is compared separately. A run that fails becomes a row with the reason.
 
     Parameters
     ----------
     model : str, path or Model
         A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
     t_span : tuple of float, optional
-        (t0, t1), t1 > t0. If not given, from 0 over the model's own duration, else 20 T, else 10 where it has
-        no forcing period T.
+        (t0, t1), t1 > t0. By default from 0 over the model's own duration, else 20 periods T of the forcing,
+        else 10 units of time.
     integrators : sequence of str, tuple or Series, optional
-        Names, (name, options) or `Series`; all registered ones if not given.
+        Names, (name, options) or `Series`; by default all registered ones.
     rtols : sequence of float, optional
-        Tolerances of the integrators that adapt their step.
+        Tolerances of the integrators with adaptive steps.
     steps : sequence of int, optional
-        Steps a period of those that do not; without a period, a tenth of the run counts as one.
+        Steps per period of the fixed-step integrators; without a period, a tenth of the run counts as one.
     params, x0 : mapping of str to float, optional
         Parameter values and initial values by name, in place of the declared ones.
     repeat : int, optional
-        Timed repetitions of each run, in turns over all of them, after one that warms up; runs of seconds are
+        Timed repetitions of each run, in turns over all runs, after one that warms up; runs of seconds are
         repeated less often.
     reference : str, Solution or callable, optional
-        What the errors are relative to: None for a closed form where one is known, else two accurate runs of
-        different kind; "closed form", "multiple precision" or "runs" to insist; a Solution; or a function t
-        -> states.
+        What the errors are relative to. None: a closed form if one is known, else two accurate runs of
+        different kinds. "closed form", "multiple precision" or "runs" require that kind. A Solution or a
+        function t -> states is used as given.
     regularized : str or sequence of str, optional
-        Kinds of `Model.regularized`: runs these forms beside the set-valued law, over several v0 each, by
-        `cvode-bdf` and `dop853` at rtol 1e-9 if nothing else is given. Their errors are those of the form:
-        against the set-valued reference.
+        Kinds of `Model.regularized`. These forms are run as well as the set-valued law, over several v0 each,
+        by default with `cvode-bdf` and `dop853` at rtol 1e-9. Their errors are relative to the set-valued
+        reference.
     v0 : sequence of float, optional
-        Widths of these forms, in the unit of the relative velocity; from 1e-1 to 1e-4 of its nominal size if
-        not given.
+        Widths of these forms, in the unit of the relative velocity; by default 1e-1 to 1e-4 of its nominal
+        size.
     budget : float, optional
-        Seconds that all of it may take. What does not fit is not run, and its row says so: first the
-        repetitions go, then the settings that take longest. A run of the reference may take a quarter of it.
+        Time limit in seconds. Work that does not fit is not run, and its row says so: first the repetitions
+        are dropped, then the settings that take longest. A run of the reference may take a quarter of it.
     progress : callable, optional
-        Called as progress(done, total, what is next).
+        Called as progress(done, total, name of the next item).
 
     Returns
     -------
     Comparison
-        A row for each run, with its errors and costs.
+        One row per run, with its errors and costs.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def compare(
         series = regularised_series(model, kinds, v0, names, rtols)
     elif v0 is not None:
         raise UsageError(
-            "v0 is given without regularized", remedy="say which forms, such as regularized=['tanh']"
+            "v0 is given without regularized", remedy="name the forms, such as regularized=['tanh']"
         )
     else:
         series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])

@@ -1,4 +1,4 @@
-"""The result of a comparison: one row a run, as a table, as CSV and as JSON."""
+"""This module defines the result of a comparison: one row per run, as a table, CSV and JSON."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from hybridsim.readable import Readable
 
 @dataclass(frozen=True)
 class Comparison(Readable):
-    """Integrators on one model, each at several settings, against one reference.
+    """The errors and costs of integrators on one model, each at several settings, against one reference.
 
     Parameters
     ----------
     title : str
-        Of the model.
+        The title of the model.
     t_span, period : tuple of float, float or None
-        What was run; the period of the forcing or None.
+        The span of the runs; the period of the forcing or None.
     reference : str
-        What the errors are relative to, in words.
+        A description of the reference.
     uncertainty : Errors or None
-        How far the reference is from a second of another kind; None where there is none.
+        The distance of the reference from a second one of another kind; None without one.
     rows : tuple of Row
-        In the order of the request.
+        One row per run, in the order of the request.
     repeat : int
         Timed repetitions.
     provenance : mapping of str to object, optional
         Versions, machine, hash of the model.
     warnings : tuple of str, optional
-        What a reader must know before he trusts the numbers.
+        Warnings that affect the reliability of the numbers.
     second_reference : str, optional
-        Another reference, of another kind, that the first was held against; "" where there is none.
+        A reference of another kind that the first was compared with; "" without one.
     difference : Errors, optional
-        How far it is from the first.
+        Its distance from the first reference.
 
     Examples
     --------
@@ -69,12 +69,12 @@ class Comparison(Readable):
         return self.table()
 
     def reading(self, row: Row, quantity: str) -> Reading | None:
-        """An error of a row, one of `QUANTITIES`; None where the row has none.
+        """Return an error of a row, one of `QUANTITIES`; None if the row has none.
 
-        Event times are in periods where there is a period, else in the model's unit of time.
+        Event times are in periods if the model has a period, else in the model's unit of time.
         """
         if not isinstance(row, Row):
-            raise UsageError(f"row is {row!r}", remedy="give one of rows")
+            raise UsageError(f"row is {row!r}", remedy="give one of the comparison's rows")
         value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
@@ -82,7 +82,7 @@ class Comparison(Readable):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The kinds of error that some row has; the error of the states in any case."""
+        """The kinds of error that some row has; the error of the states is always among them."""
         return tuple(
             name
             for name in QUANTITIES
@@ -90,11 +90,11 @@ class Comparison(Readable):
         )
 
     def floor(self, quantity: str) -> float:
-        """The reference's own uncertainty in the units of `reading`; 0 where it is not known."""
+        """Return the reference's own uncertainty in the units of `reading`; 0 if unknown."""
         return self.scaled(self.uncertainty, quantity) or 0.0
 
     def scaled(self, errors: Errors | None, quantity: str) -> float | None:
-        """An error in the units of `reading`."""
+        """Return an error in the units of `reading`."""
         known_name(quantity, QUANTITIES, "a comparison has no quantity", "quantities")
         if errors is not None and not isinstance(errors, Errors):
             raise UsageError(f"errors is {errors!r}", remedy="give the errors of a row, row.errors")
@@ -105,18 +105,18 @@ class Comparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the lines, in order."""
+        """The names of the lines, in order."""
         return tuple(dict.fromkeys(row.label for row in self.rows))
 
     def table(self) -> str:
-        """The comparison as text, for people."""
+        """Return the comparison as text."""
         return table(self)
 
     def __str__(self) -> str:
         return self.table()
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one line a row; times in the model's unit, wall times in seconds."""
+        """Write one line per row; times are in the model's unit, wall times in seconds."""
         records = self.records()
         with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(records[0]) if records else [])
@@ -125,7 +125,7 @@ class Comparison(Readable):
                 writer.writerow({**record, "options": json.dumps(record["options"], default=str)})
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as plain values."""
+        """Return all results as plain values."""
         return {
             "title": self.title,
             "t_span": list(self.t_span),
@@ -141,11 +141,11 @@ class Comparison(Readable):
         }
 
     def records(self) -> list[dict[str, Any]]:
-        """The rows as plain values."""
+        """Return the rows as plain values."""
         return [self._record(row) for row in self.rows]
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
         text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")

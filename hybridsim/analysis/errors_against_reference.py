@@ -1,4 +1,4 @@
-"""How far a run is from a reference: in its states, in the times of its events and in its modes."""
+"""This module measures the errors of a run against a reference: in states, event times and modes."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from hybridsim.analysis.mode_sequence import MatchedEvents, SequenceVerdict, mat
 from hybridsim.analysis.resets import Resets
 from hybridsim.analysis.trajectory import Trajectory
 
-# Prime, so that the points fall at all phases of the steps of a method whose step is a round part of a
-# period: what is between the steps is to be seen too.
+# A prime number, so that the samples fall at all phases of the steps of a fixed-step method, also between its
+# steps.
 SAMPLES_PER_PERIOD = 211
-# A run without a period, and the longest: enough to see every swing, few enough to be asked for many times.
+# For a run without a period, and the largest number: enough to resolve every swing, few enough to repeat
+# often.
 SAMPLES, MOST_SAMPLES = 20_011, 200_003
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a run.
+    """The errors of one run.
 
     Parameters
     ----------
     state : largest error of a state over the run, relative to that state's amplitude in the reference.
     state_last_period : the same over the last period; None without a period.
-    event_time : largest error in time of an event that both have; None if there is none.
-    sequence : how the sequence of modes differs; None for a run that has no modes, as of a regularised law.
+    event_time : largest time error of an event that both runs have; None if there is none.
+    sequence : the difference of the mode sequences; None for a run without modes, as of a regularised law.
     graph : distance of the completed graphs (`hybridsim.analysis.graph_distance`), in periods (without a period, in
-        spans) and amplitudes; None where no state jumps.
+        spans) and amplitudes; None if no state jumps.
     """
 
     state: float
@@ -42,23 +43,23 @@ class Errors:
 
     @property
     def wrong_modes(self) -> bool:
-        """Whether there are modes, and not the right ones."""
+        """Whether the run has modes and their sequence is wrong."""
         return self.sequence is not None and not self.sequence.right
 
 
 class Yardstick:
-    """A reference sampled once, against which any number of runs are measured.
+    """A reference that is sampled once and then compared with any number of runs.
 
     Parameters
     ----------
     trajectory : the reference.
-    resets : which events make the states jump.
-    nominal : (n,) size of each state, for those that do not move in the reference.
+    resets : the events at which the states jump.
+    nominal : (n,) size of each state, for states that do not move in the reference.
     period : for the error over the last period, or None.
 
-    Around an event at which the states jump, a run that jumps a little earlier or later would be off by the
-    whole jump for that little while. So a point between two jumps of the reference is compared at the nearest
-    time between the same two jumps of the run; without jumps, times are compared as they are.
+    Near a jump, a run that jumps slightly earlier or later would be wrong by the whole jump for a short time.
+    So a point between two jumps of the reference is compared at the nearest time between the same two jumps of
+    the run. Without jumps, states are compared at equal times.
     """
 
     def __init__(
@@ -84,7 +85,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Errors of a run from the same start, up to the end of the shorter of the two."""
+        """Return the errors of a run from the same start, up to the end of the shorter of the two."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end
@@ -101,7 +102,7 @@ class Yardstick:
     def _matched_times(
         self, matched: MatchedEvents, t_span: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Where to look at the run: the time, and whether the state just before an event there is meant."""
+        """Return the times at which to evaluate the run, and whether the state before an event is needed."""
         jumps = [(a.t, b.t) for a, b in matched.pairs if a in self.resets]
         if not jumps:
             return self.times, self.before
@@ -120,7 +121,7 @@ class Yardstick:
 def _states(
     trajectory: Trajectory, times: NDArray[np.float64], before: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """States at times, just before or just after what happens there; (n, k)."""
+    """Return the states (n, k) at times, just before or just after events at those times."""
     after = trajectory.states(times[~before], "+")
     states = np.empty((len(after), len(times)))
     states[:, ~before] = after

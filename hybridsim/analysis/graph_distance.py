@@ -1,4 +1,4 @@
-"""The distance between two motions with jumps: that of their completed graphs, jumps drawn as vertical lines."""
+"""This module computes the distance between two motions with jumps, as that of their completed graphs."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from hybridsim.analysis.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-# The graph is looked at where it is sampled: often enough that the largest distance of a smooth stretch is missed
-# by less than 1 % of itself. Prime, so that no step of a method falls on it.
+# The graph is sampled often enough that the largest distance on a smooth interval is found to 1 % of itself.
+# The counts are prime, so that the samples avoid the steps of fixed-step methods.
 SAMPLES_PER_PERIOD, SAMPLES, MOST_SAMPLES = 101, 2003, 20_011
-# Around a jump the distance changes over the time that lies between it and the other motion's jump: 32 points
-# in that time, over twice of it to both sides.
+# Near a jump the distance changes over the time between it and the other motion's jump. There 32 points are
+# used per this time, over twice of it on both sides.
 _NEAR = np.arange(-64, 65) / 32
-_ALONG = np.linspace(0.0, 1.0, 33)[:, None]  # of a vertical line
-_WINDOW = np.linspace(-1.0, 1.0, 65)  # of the other graph, around a point of this one
-_BATCH = 256  # points at a time: some megabytes
-_ROUNDS = 8  # each halves the window, or is the last
+_ALONG = np.linspace(0.0, 1.0, 33)[:, None]  # fractions along a vertical line
+_WINDOW = np.linspace(-1.0, 1.0, 65)  # a window of the other graph around a point of this one
+_BATCH = 256  # points per batch: a few megabytes
+_ROUNDS = 8  # each round halves the window, or is the last
 
 
 class CompletedGraph:
-    """The graph {(t, x(t))} of a motion, with the line from x- to x+ at each jump, in scaled coordinates.
+    """The graph {(t, x(t))} of a motion with the line from x- to x+ at each jump, in scaled coordinates.
 
     Parameters
     ----------
     trajectory : the motion.
     jumps : times at which its states jump.
-    time, amplitude : the length that counts as one in time, and (n,) in each state.
+    time, amplitude : the scale of time, and (n,) the scale of each state.
     """
 
     def __init__(self, trajectory: Trajectory, jumps: Sequence[float], time: float, amplitude: Array) -> None:
@@ -40,13 +40,13 @@ class CompletedGraph:
         self.ends = np.array([self.at(self.jumps, side) for side in "-+"])  # (2, jumps, n)
 
     def at(self, times: Array, side: str) -> Array:
-        """Scaled states (k, n)."""
+        """Return the scaled states (k, n)."""
         if not len(times):
             return np.empty((0, len(self.amplitude)))
         return (self.trajectory.states(times, side) / self.amplitude[:, None]).T
 
     def points(self, other: CompletedGraph, end: float) -> tuple[Array, Array]:
-        """Times (k,) and scaled states (k, n) of the points to look from, up to the time `end`."""
+        """Return times (k,) and scaled states (k, n) of the sample points up to the time `end`."""
         t0 = self.trajectory.t_span[0]
         count = round(SAMPLES_PER_PERIOD * (end - t0) / self.time) if end - t0 > self.time else 0
         smooth = [np.linspace(t0, end, min(max(count, SAMPLES), MOST_SAMPLES))]
@@ -64,11 +64,11 @@ class CompletedGraph:
         )
 
     def distance_from(self, times: Array, states: Array, end: float) -> Array:
-        """Distances (k,) of points from this graph up to the time `end`, given in scaled states."""
+        """Return the distances (k,) of points, in scaled states, from this graph up to the time `end`."""
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:
-        """How far a point is at most: from the state at its time, and from the nearest vertical lines."""
+        """Return an upper bound of each distance: to the state at its time, and to the nearest vertical lines."""
         inside = np.clip(times, self.trajectory.t_span[0], end)
         late = np.abs(times - inside) / self.time
         far = np.min([np.abs(self.at(inside, side) - states).max(axis=1) for side in "-+"], axis=0)
@@ -82,7 +82,7 @@ class CompletedGraph:
         return bound
 
     def _refined(self, times: Array, states: Array, bound: Array, end: float) -> Array:
-        """The distance, from a window of the graph in which the nearest point must lie."""
+        """Return the distances, from a window of the graph that contains the nearest point."""
         for _ in range(_ROUNDS):
             width = bound[:, None] * self.time
             knots = np.clip(times[:, None] + width * _WINDOW, self.trajectory.t_span[0], end)
@@ -103,12 +103,12 @@ class CompletedGraph:
         return bound
 
     def _to_segments(self, t: Array, x: Array, ta: Array, xa: Array, tb: Array, xb: Array) -> Array:
-        """Distance, in the largest coordinate, of points (t, x) from the segments (ta, xa) to (tb, xb)."""
+        """Return the distance, in the largest coordinate, of points (t, x) from the segments (ta, xa) to (tb, xb)."""
         start = np.concatenate([((ta - t) / self.time)[..., None], xa - x], axis=-1)
         along = np.concatenate([((tb - ta) / self.time)[..., None], xb - xa], axis=-1)
         least = np.minimum(np.abs(start).max(axis=-1), np.abs(start + along).max(axis=-1))
-        # Along the segment the distance is the upper envelope of the lines +-(start_i + u along_i): its minimum
-        # is at an end or where two of them meet.
+        # Along the segment the distance is the upper envelope of the lines +-(start_i + u along_i). Its
+        # minimum is at an end or at an intersection of two lines.
         size = start.shape[-1]
         meetings = [(i, j, sign) for i, j in itertools.combinations(range(size), 2) for sign in (1, -1)]
         meetings += [(i, i, -1) for i in range(size)]
@@ -123,19 +123,20 @@ class CompletedGraph:
 
 
 def graph_distance(first: CompletedGraph, second: CompletedGraph) -> float:
-    """The Hausdorff distance of two completed graphs in the same scaling, up to the end of the shorter one.
+    """Return the Hausdorff distance of two completed graphs in the same scaling, up to the shorter end.
 
-    max over the points of either graph of the distance to the other one, where points are as far apart as their
-    largest coordinate: |t - t'| / time or |x_i - x_i'| / amplitude_i. To about 1 % of itself.
+    It is the maximum over the points of either graph of the distance to the other graph. The distance of two
+    points is their largest coordinate difference: |t - t'| / time or |x_i - x_i'| / amplitude_i. The result
+    is accurate to about 1 %.
 
-    An event that is late by d costs d / time, however large its jump, and not the whole jump.
+    An event that is late by d contributes d / time, however large its jump.
     """
     end = min(first.trajectory.t_span[1], second.trajectory.t_span[1])
     return max(_farthest(first, second, end), _farthest(second, first, end))
 
 
 def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
-    """The largest distance of a point of one graph from the other: worst candidates first, until none can be worse."""
+    """Return the largest distance of a point of one graph from the other; the worst candidates are tried first."""
     times, states = one.points(other, end)
     bound = other._bound(times, states, end)
     order = np.argsort(-bound)
@@ -150,7 +151,7 @@ def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
 
 
 def _nearest_gap(times: Array, others: Array) -> Array:
-    """How far each of the times is from the nearest of the others; 0 where there are none."""
+    """Return the distance of each time from the nearest of the others; 0 if there are none."""
     if not len(others):
         return np.zeros(len(times))
     after = np.clip(np.searchsorted(others, times), 0, len(others) - 1)

@@ -1,4 +1,4 @@
-"""Matches the events of a run to those of a reference, in order, and judges the sequence of modes."""
+"""This module matches the events of a run with those of a reference in order, and compares the mode sequences."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from hybridsim.analysis.trajectory import EventLike, Trajectory
 
-# Cost of an event that one side lacks, and of a mode that is another: two events matched under a wrong name
-# are cheaper than one missed and one spurious. The distance in time only decides between equal choices.
+# Costs of an event that one side lacks, and of a wrong mode: two events matched under a wrong name cost less
+# than one missed and one spurious event. The distance in time only decides between equal costs.
 _LACKING, _WRONG, _FAR = 1.0, 1.0, 0.5
 _MISSED, _MATCHED, _SPURIOUS = 0, 1, 2
 
 
 @dataclass(frozen=True)
 class SequenceVerdict:
-    """How the sequence of modes differs from the reference's."""
+    """The difference of a mode sequence from the reference's, as counts."""
 
     missed: int = 0
     spurious: int = 0
@@ -36,7 +36,7 @@ class SequenceVerdict:
 
 @dataclass(frozen=True)
 class MatchedEvents:
-    """Pairs of events (reference's, run's), and the verdict over the mode changes; None if the run has no modes."""
+    """Pairs of events (reference's, run's), and the verdict on the modes; None if the run has no modes."""
 
     pairs: tuple[tuple[EventLike, EventLike], ...]
     verdict: SequenceVerdict | None
@@ -44,7 +44,7 @@ class MatchedEvents:
 
 @dataclass(frozen=True)
 class _Entry:
-    """One step of a sequence; the first mode of all stands at the start and has no event."""
+    """One step of a sequence; the first mode comes at the start and has no event."""
 
     t: float
     label: str
@@ -52,12 +52,12 @@ class _Entry:
 
 
 def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
-    """Match event by event in each component, each monitor and each schedule that the reference knows.
+    """Match the events of each component, monitor and schedule of the reference with those of a run.
 
-    Sequences of different components are not woven into one: which of two independent events comes first by a
-    rounding error is no mistake. An event is matched to one displaced by at most half of the longest stretch
-    without an event; beyond, it is another one. A component that the run does not have at all, as a regularised
-    contact, is not judged.
+    The sequences of different components are matched separately, because the order of independent events may
+    differ by rounding. Matched events are at most half of the longest event-free interval apart; beyond that
+    they are different events. A component that the run does not have, such as a regularised contact, is not
+    compared.
     """
     ours, theirs = _sequences(reference), _sequences(run)
     components = {channel for channel in ours if channel[0] == "transition"}
@@ -83,7 +83,7 @@ def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
         if channel[0] == "transition":
             missed += _left_over(expected, {i for i, _ in matched})
             spurious += _left_over(found, {j for _, j in matched})
-    # Close to the end, an event may fall on the other side of it by its error alone.
+    # Close to the end, an event's error may move it past the end.
     last = t1 - max((abs(a.t - b.t) for a, b in pairs), default=0.0)
     verdict = SequenceVerdict(sum(t < last for t in missed), sum(t < last for t in spurious), wrong)
     judged = None if absent and absent == components else verdict
@@ -95,7 +95,7 @@ def _left_over(entries: Sequence[_Entry], matched: set[int]) -> list[float]:
 
 
 def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
-    """The events by channel; a channel of mode changes starts with the first mode."""
+    """Return the events by channel; a channel of mode changes starts with the first mode."""
     t0 = trajectory.t_span[0]
     sequences = {
         ("transition", component): [_Entry(t0, mode, None)]
@@ -116,25 +116,25 @@ def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
 
 
 def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
-    """A sequence of modes without those that last for no time at all."""
+    """Return a sequence of modes without those of zero duration."""
     kept: list[_Entry] = []
     for _, group in itertools.groupby(entries, key=lambda entry: entry.t):
         *passing, last = group
-        if not (passing and kept and kept[-1].label == last.label):  # else it came back at once
+        if not (passing and kept and kept[-1].label == last.label):  # otherwise the mode returned at once
             kept.append(last)
     return kept
 
 
 def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -> list[tuple[int, int]]:
-    """Index pairs of the cheapest alignment in order, where nothing is matched farther off than the window.
+    """Return the index pairs of the cheapest ordered alignment, with matches only within the window.
 
-    The edit distance, row by row over the expected entries and, in each row, only over the found ones within
-    the window: the work grows with the number of events and not with its square.
+    This is the edit distance, row by row over the expected entries and, in each row, over the found entries
+    within the window only. The work therefore grows linearly with the number of events.
     """
     a, b = np.array([entry.t for entry in expected]), np.array([entry.t for entry in found])
     lows, highs = np.searchsorted(b, a - window), np.searchsorted(b, a + window, side="right")
     choices: list[NDArray[np.int8]] = []
-    # cost of having aligned the entries so far with the first `low`, low + 1, ... found
+    # Cost of aligning the entries so far with the first `low`, low + 1, ... found entries.
     low, cost = (
         0,
         np.zeros(1),

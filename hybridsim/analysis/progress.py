@@ -1,15 +1,15 @@
-"""Counts the steps of long work for whoever wants to see how far it has come."""
+"""This module counts the steps of long computations for progress callbacks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int, str], None]
-"""Called as progress(done, total, what is next)."""
+"""The type of progress callbacks, called as progress(done, total, name of the next item)."""
 
 
 class Steps:
-    """Called with what is next before each of `total` steps; passes that on with the count."""
+    """Counts `total` steps; call it with the name of each step, and it passes that on with the count."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._done, self._progress = total, 0, progress
@@ -20,6 +20,6 @@ class Steps:
         self._done += 1
 
     def finish(self) -> None:
-        """Say that all is done, also where some of the steps fell away."""
+        """Report that everything is done, even if some steps were skipped."""
         if self._progress is not None:
             self._progress(self._total, self._total, "done")

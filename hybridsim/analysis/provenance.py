@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, the machine in plain facts, and a hash of the model."""
+"""This module describes the origin of a result: versions, machine, and a hash of the model."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 
 
 def provenance(model: Model) -> dict[str, Any]:
-    """Versions, machine and model of a result, ready for JSON.
+    """Return the versions, the machine and the model of a result, ready for JSON.
 
-    The hash is that of the model written out, with the parameters and initial values of this run; None for a model of
-    Python functions, which has no text.
+    The hash covers the model as text with the parameters and initial values of this run. It is None for a
+    model of Python functions, which has no text.
     """
     from hybridsim import __version__
 

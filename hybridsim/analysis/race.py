@@ -1,4 +1,4 @@
-"""All runs of one or several benches within a budget of time: first runs, then repetitions in turns over all."""
+"""This module makes all runs of one or several scenes within a time budget: first runs, then timed repetitions."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.series import Series
 from hybridsim.analysis.timing import timed_in_turns
 
-# Of its equal share of the budget, a run may take this much: most runs take far less than theirs.
+# A run may take this multiple of its equal share of the budget, because most runs take far less.
 _SHARES = 10
-# The shares are made for so many repetitions: more of them are the first to go.
+# The shares allow for this many repetitions; further ones are dropped first.
 _TURNS = 3
-# A run that turns out longer than was predicted is stopped at this many times what it may take.
+# A run that takes longer than predicted is stopped at this multiple of its limit.
 _PATIENCE = 2
 
 
 class Budget:
-    """Seconds that may be spent, from now on; what is compiled, once for all, does not count."""
+    """A time budget in seconds from now on; compiling does not count."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds, self._watch = seconds, Stopwatch()
 
     @property
     def spent(self) -> float:
-        """Seconds since the start."""
+        """The seconds since the start."""
         return self._watch.seconds
 
     @property
     def left(self) -> float:
-        """Seconds that remain, at least zero."""
+        """The remaining seconds, at least zero."""
         return max(self.seconds - self.spent, 0.0)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A bench, its reference, and the lines that are to be run on it."""
+    """A scene, its reference, and the lines to run on it."""
 
     bench: Bench
     reference: Reference
@@ -58,16 +58,17 @@ class _Run:
 def race(
     entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> list[tuple[Row, ...]]:
-    """Rows of each entry, in the order of its lines.
+    """Make all runs, and return the rows of each entry in the order of its lines.
 
-    First everything is run once, the loosest setting of every line before the second of any. From two settings of
-    a line follows what its next will take. One that would take more than ten times its equal share of the budget is
-    not started; where all of the next ones do not fit, the longest are not. With the time that is left, all is
-    repeated in turns, and where that is short the repetitions go first. A row says what became of it.
+    First everything is run once, the loosest setting of every line before the second of any. The time of the
+    next setting of a line is predicted from its last two. A run that would take more than ten times its equal
+    share of the budget is not started; if the next runs do not all fit, the longest are dropped. The
+    remaining time goes to timed repetitions in turns, which are dropped first if it is short. Each row states
+    the outcome.
 
     Parameters
     ----------
-    step : called with what comes next, once for each first run and each repetition, done or not.
+    step : called with the name of the next item, for each first run and each repetition, done or not.
     """
     rows: dict[_Run, Row] = {}
     runs = [
@@ -112,12 +113,12 @@ def race(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Seconds that a run will take, from two settings before it on its line; 0 where nothing is known."""
+    """Return the predicted seconds of a run, from two settings before it on its line; 0 if unknown."""
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):
         return math.inf
-    if len(done) < 2:  # and the time of the very first may hold what is only done once
+    if len(done) < 2:  # the first time may also include one-time set-up
         return 0.0
     (earlier, cheaper), (value, cost) = done[-2:]
     line = entries[run.entry].lines[run.line]
@@ -126,7 +127,7 @@ def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> fl
 
 
 def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:
-    """The longest runs, as many as must go for the others to fit."""
+    """Return the longest runs whose removal lets the others fit."""
     gone = []
     total = sum(predicted.values())
     for run in sorted(predicted, key=lambda run: -predicted[run]):

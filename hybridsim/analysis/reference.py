@@ -1,4 +1,4 @@
-"""What the errors of a comparison are relative to, and how well it is known itself."""
+"""This module finds the reference of a comparison, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 
 class _TooLong(SimulationError):
-    """A run of a reference has used up its time."""
+    """A run of a reference has passed its time limit."""
 
 
 Run = Callable[..., "Solution"]
-"""Runs the model over the span: (integrator, **options) -> Solution."""
+"""The type of a function that runs the model over the span: (integrator, **options) -> Solution."""
 
 CLOSED_FORM, MULTIPLE_PRECISION, RUNS = "closed form", "multiple precision", "runs"
 KINDS = (CLOSED_FORM, MULTIPLE_PRECISION, RUNS)
-# The most accurate integrator, close to the least tolerance that it can keep in double precision.
+# The most accurate integrator, near the tightest tolerance possible in double precision.
 _BEST: tuple[str, Mapping[str, Any]] = ("dop853", {"rtol": 1e-13})
-# Two methods of different kind (one step against many steps, our location of events against SUNDIALS' own).
+# Two methods of different kinds: one-step with our event location, and multistep with SUNDIALS' own.
 _FIRST: tuple[str, Mapping[str, Any]] = ("scipy-dop853", {"rtol": 1e-13})
 _SECOND: tuple[str, Mapping[str, Any]] = ("cvode-adams", {"rtol": 1e-12})
-# Two more, for a model on which these take too long: it may be stiff.
+# Two more, for a model on which these take too long, because it may be stiff.
 _STIFF: tuple[str, Mapping[str, Any]] = ("rodas5p", {"rtol": 1e-10})
 _SECOND_STIFF: tuple[str, Mapping[str, Any]] = ("cvode-bdf", {"rtol": 1e-10})
 DIGITS = 32
@@ -41,16 +41,16 @@ DIGITS = 32
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference.
+    """The reference of a comparison.
 
     Parameters
     ----------
-    title : what it is, in words.
+    title : its description.
     yardstick : measures runs against it.
-    uncertainty : how far off it may be itself; None where that is not known.
-    warnings : what makes it doubtful.
-    second : a reference of another kind, in words, and
-    difference : how far it is from this one; "" and None where there is none.
+    uncertainty : the estimated error of the reference; None if unknown.
+    warnings : reasons for doubt.
+    second : the description of a reference of another kind; "" without one.
+    difference : the distance of the second from this one; None without one.
     """
 
     title: str
@@ -70,20 +70,21 @@ def find_reference(
     progress: Callable[[float], None] | None = None,
     seconds: float = math.inf,
 ) -> Reference:
-    """The reference of a comparison.
+    """Find the reference of a comparison.
 
     Parameters
     ----------
-    wanted : None for a closed form where one is known, else two runs; "closed form", "multiple precision" or
-        "runs" to insist; several of these to take the first that there is; or the reference itself: a Solution,
-        a Trajectory, or a function of times (k,) that gives states (n, k).
+    wanted : None for a closed form if one is known, else two runs; "closed form", "multiple precision" or
+    "runs" to require that kind; several of these for the first one available; or the reference itself: a
+    Solution, a Trajectory, or a function of times (k,) that returns states (n, k).
     run : runs the model with an integrator and its options.
     progress : called with the finished fraction of a reference in multiple precision.
-    seconds : that each run may take; where the first of two takes longer, two by stiff methods stand in for them.
+    seconds : the time limit of each run; if the first of two takes longer, two stiff methods replace them.
 
-    A closed form and a motion in multiple precision owe nothing to the engine; they are held against the most
-    accurate integrator, which does. Of two runs the first is the reference, and the distance of the second its
-    uncertainty. Both follow the engine's decisions at events: what it got wrong would not show.
+    A closed form and a multiple-precision run are independent of the engine; as a check they are compared
+    with the most accurate integrator. With two runs the first is the reference, and the distance of the
+    second its uncertainty. Both follow the engine's decisions at events, so that an error in these decisions
+    would not show.
     """
 
     def yardstick(trajectory: Trajectory) -> Yardstick:
@@ -109,7 +110,7 @@ def find_reference(
     for kind in kinds:
         if kind not in KINDS:
             raise UsageError(
-                f"reference {kind!r} is unknown", remedy=f"say one of {', '.join(map(repr, KINDS))}"
+                f"reference {kind!r} is unknown", remedy=f"use one of {', '.join(map(repr, KINDS))}"
             )
         try:
             if kind == CLOSED_FORM:
@@ -146,7 +147,7 @@ def _multiple_precision(
 
 
 def _checked(reference: Reference, run: Run) -> Reference:
-    """The reference held against the most accurate integrator."""
+    """Return the reference after a comparison with the most accurate integrator."""
     difference, warnings = _held_against(reference.yardstick, run, _BEST)
     return replace(
         reference,
@@ -178,7 +179,7 @@ def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Referen
 def _held_against(
     best: Yardstick, run: Run, second: tuple[str, Mapping[str, Any]]
 ) -> tuple[Errors | None, tuple[str, ...]]:
-    """How far a second reference is from the best one, and what is to be said about it."""
+    """Return the distance of a second reference from the best one, and warnings about it."""
     try:
         solution = run(second[0], **second[1])
     except HybridsimError as error:

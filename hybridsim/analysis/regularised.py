@@ -1,4 +1,4 @@
-"""Lines that run a regularised form of a model, and how such a run is held against the set-valued law."""
+"""This module runs regularised forms of a model and compares them with the set-valued law."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from hybridsim.analysis.comparison import Comparison
     from hybridsim.model import Model
 
-# A stiff method and an explicit one: which of them pays for a small v0, and how, is half of the question.
+# A stiff and an explicit method, because the cost of a small v0 differs between them.
 INTEGRATORS = ("cvode-bdf", "dop853")
-# Tight enough that the error of the method does not show beside that of the form.
+# Tight enough that the error of the method is small compared with that of the form.
 RTOLS = (1e-9,)
-# Of the velocity's nominal size: from a form that one sees to one whose steps are counted in thousands a period.
+# Of the velocity's nominal size: from a visible error to thousands of steps per period.
 FRACTIONS = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
-# The exponent is that for small v0: of the last decade. Closer than this to the error of the method itself, the error
-# of the form is no longer seen alone.
+# The exponents hold for small v0 and are fitted to the last decade. Errors within this factor of the method's
+# own error are left out.
 _FITTED, _CLEAR = 3, 3.0
 
-# Modes of Karnopp's form that the set-valued law calls slip: broken loose, and not yet out of the dead band.
+# Modes of Karnopp's form that count as slip: broken loose, but still inside the dead band.
 _BREAKING = {"break+": "slip+", "break-": "slip-"}
 _SMOOTH = "smooth"
 
@@ -39,12 +39,12 @@ def regularised_series(
     integrators: Sequence[str] | None = None,
     rtols: Sequence[float] | None = None,
 ) -> tuple[Series, ...]:
-    """For each integrator and tolerance the set-valued law as it is, then each regularised form over the values of v0.
+    """Return, per integrator and tolerance, a line for the set-valued law and one per regularised form over v0.
 
     Parameters
     ----------
-    kinds : of `Model.regularized`.
-    v0 : widths, in the unit of the relative velocity; fractions of its nominal size if not given.
+    kinds : kinds of `Model.regularized`.
+    v0 : widths, in the unit of the relative velocity; by default fractions of its nominal size.
     """
     if not model.contacts:
         raise UsageError(
@@ -72,7 +72,7 @@ def regularised_series(
 
 
 def _velocity_size(model: Model) -> float:
-    """Nominal size of the relative velocities: the smallest of the contacts."""
+    """Return the nominal size of the relative velocities, the smallest of all contacts."""
     nominal = {state.name: state.nominal or 1.0 for state in model.states}
     sizes = [
         [nominal[name] for name in contact.velocity.names if name in nominal] for contact in model.contacts
@@ -81,7 +81,7 @@ def _velocity_size(model: Model) -> float:
 
 
 def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
-    """A run of a regularised form in the words of the set-valued law; a contact without modes has none to judge."""
+    """Return a run of a regularised form with the set-valued law's names of modes, without smooth contacts."""
     modes = {
         name: _BREAKING.get(mode, mode) if name in contacts else mode
         for name, mode in run.initial_modes.items()
@@ -99,11 +99,11 @@ def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
 
 
 def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float | None]]:
-    """For each line over v0 the exponents p of error ~ v0^p and of work ~ v0^p as v0 falls; None if unknown.
+    """Return, for each line over v0, the exponents p of error ~ v0^p and work ~ v0^p; None if unknown.
 
-    Fitted by least squares of the logarithms over the three smallest v0 that ran; for the error, over those where it
-    is at least three times the one that the same integrator makes on the set-valued law at the same tolerance. Work
-    is counted in evaluations, which are the same on every machine.
+    They are fitted by least squares of the logarithms over the three smallest v0 that ran. For the error only
+    those count whose error is at least three times that of the same integrator on the set-valued law at the
+    same tolerance. Work is counted in evaluations, which are the same on every machine.
     """
     own = {
         (row.integrator, row.setting[1]): row.errors.state
@@ -130,8 +130,8 @@ def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float 
 
 
 def exponent_text(power: float | None) -> str:
-    """An exponent with two decimals."""
-    return "?" if power is None else f"{round(power, 2) + 0.0:.2f}"  # -0.001 is 0.00
+    """Return an exponent with two decimals."""
+    return "?" if power is None else f"{round(power, 2) + 0.0:.2f}"  # so that -0.001 becomes 0.00
 
 
 def _exponent(points: Sequence[tuple[float, float]]) -> float | None:

@@ -1,4 +1,4 @@
-"""Which events of a model make its states jump."""
+"""This module finds the events of a model that make its states jump."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.model.impact import CLOSED, OPEN
 
 @dataclass(frozen=True)
 class Resets:
-    """The events with a declared reset of a state; ``event in resets``.
+    """The events with a declared reset of a state; test with ``event in resets``.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Resets:
 
 
 def resets_of(model: Model) -> Resets:
-    """The events that reset a state, as the model declares them."""
+    """Return the events that reset a state according to the model."""
     states = {state.name for state in model.states}
     transitions = frozenset(
         (component.name, mode.name, choice.to)

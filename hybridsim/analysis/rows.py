@@ -1,4 +1,4 @@
-"""One run in a comparison: what it was, how far off, and what it cost."""
+"""This module defines the row of one run in a comparison: its setting, its errors and its cost."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from hybridsim.analysis.errors_against_reference import Errors
 
 QUANTITIES = ("state", "state_last_period", "event_time", "graph")
 
-# How a run ended that the budget of time did not allow.
+# Statuses of runs that did not fit into the time budget.
 NOT_STARTED, STOPPED = "not started", "stopped"
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run cost.
+    """The cost of a run.
 
     Parameters
     ----------
-    wall_times : seconds of each timed repetition; of the run that warmed up, where there was no time for more.
+    wall_times : seconds of each timed repetition; of the warm-up run if there was no time for more.
     rhs_evaluations, guard_evaluations, steps : counts of one run.
-    compile_time : seconds that the first run spent on making and compiling the model's functions, apart.
-    repetitions : how many of the wall times are of a run that others had warmed up.
+    compile_time : seconds of the first run for building and compiling the model's functions; not in wall_times.
+    repetitions : the number of wall times that were measured after a warm-up.
     """
 
     wall_times: tuple[float, ...]
@@ -36,12 +36,12 @@ class Cost:
 
     @property
     def work(self) -> int:
-        """Evaluations and steps: what grows as the tolerance falls, and is the same on every machine."""
+        """The count of evaluations and steps, which is the same on every machine."""
         return max(self.rhs_evaluations + self.guard_evaluations, self.steps, 1)
 
     @property
     def wall_time(self) -> float:
-        """The median."""
+        """The median wall time."""
         return statistics.median(self.wall_times)
 
 
@@ -52,10 +52,10 @@ class Row:
     Parameters
     ----------
     integrator, label : its registered name, and the name of its line in the table and the chart.
-    setting : name and value of what is varied along the line, such as ("rtol", 1e-9).
-    options : everything it was called with.
-    status, message : how the run ended; of a failure there is no error and no cost.
-    form : the regularised form that was run in place of the model, or "".
+    setting : name and value of the option varied along the line, such as ("rtol", 1e-9).
+    options : all options of the call.
+    status, message : how the run ended; a failed run has no errors and no cost.
+    form : the regularised form that was run instead of the model, or "".
     """
 
     integrator: str
@@ -69,7 +69,7 @@ class Row:
     form: str = ""
 
     def timed(self, wall_times: tuple[float, ...]) -> Row:
-        """The row with the wall times of its repetitions; as it is, where there are none."""
+        """Return the row with the wall times of its repetitions; unchanged if there are none."""
         if self.cost is None or not wall_times:
             return self
         return replace(self, cost=replace(self.cost, wall_times=wall_times, repetitions=len(wall_times)))
@@ -77,7 +77,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Reading:
-    """An error as it can be known: a value, or only that it is below the reference's own uncertainty."""
+    """An error as far as the reference determines it: a value, or a bound given by the reference's uncertainty."""
 
     value: float
     is_bound: bool

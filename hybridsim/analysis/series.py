@@ -1,4 +1,4 @@
-"""Which runs make up a comparison: a line for each integrator, a run for each setting on it."""
+"""This module chooses the runs of a comparison: a line per integrator, and a run for each of its settings."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from hybridsim.errors import UsageError
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 STEPS_PER_PERIOD = (300, 600, 1200, 2400, 4800)
-# SciPy's own event finding is shown of its default method and of its best one for the task; of all six it would
-# hide the rest.
+# SciPy's own event finding is shown for its default method and its best one only, to keep the chart readable.
 _ALSO_NATIVE = ("scipy-rk45", "scipy-dop853")
-_PERIODS = 10  # that a run without a period counts as, where a step is a share of one
+_PERIODS = 10  # periods assumed for a run without a period, if the step is a fraction of one
 
 
 @dataclass(frozen=True)
@@ -25,11 +24,11 @@ class Series:
     Parameters
     ----------
     integrator : a registered name.
-    varied : name of the option that is varied, such as "rtol" or "steps_per_period"; "v0" of a regularised form.
+    varied : name of the varied option, such as "rtol" or "steps_per_period"; "v0" for a regularised form.
     values : its values.
-    options : further options; a function of the value where they go with it.
-    label : name in the table and the chart; the integrator's and the options if not given.
-    regularized : kind of the regularised form (see `Model.regularized`) that is run in place of the model.
+    options : further options; an option may be a function of the varied value.
+    label : name in the table and the chart; by default the integrator and its options.
+    regularized : kind of the regularised form (see `Model.regularized`) that is run instead of the model.
     """
 
     integrator: str
@@ -54,7 +53,7 @@ class Series:
             object.__setattr__(self, "label", f"{name} ({details})" if details else name)
 
     def options_at(self, value: float) -> dict[str, Any]:
-        """Options that the integrator is run with where the varied one is at a value."""
+        """Return the options of the run at a value of the varied option."""
         others = {name: item(value) if callable(item) else item for name, item in self.options.items()}
         return others if self.regularized else {self.varied: value, **others}
 
@@ -71,14 +70,14 @@ def choose_series(
     steps: Sequence[int] | None = None,
     untimed_span: float | None = None,
 ) -> tuple[Series, ...]:
-    """The lines of a comparison.
+    """Return the lines of a comparison.
 
     Parameters
     ----------
-    wanted : names, (name, options) or `Series`; all registered integrators if not given.
-    rtols : tolerances of the integrators that adapt their step.
-    steps : steps a period of those that do not.
-    untimed_span : length of the run where the model has no period; its tenth then stands for one.
+    wanted : names, (name, options) or `Series`; by default all registered integrators.
+    rtols : tolerances of the integrators with adaptive steps.
+    steps : steps per period of the others.
+    untimed_span : length of the run if the model has no period; a tenth of it then counts as one.
     """
     line = functools.partial(_line, rtols=rtols, steps=steps, untimed_span=untimed_span)
     chosen: list[Series] = []
@@ -97,7 +96,7 @@ def choose_series(
     labels = [series.label for series in chosen]
     repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
-        raise UsageError(f"two lines are called {repeated[0]!r}", remedy="give one of them another label")
+        raise UsageError(f"two lines have the label {repeated[0]!r}", remedy="give one of them another label")
     return tuple(chosen)
 
 
@@ -121,7 +120,7 @@ def _line(
 
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
-    """Options and label of each line of an integrator; more than one where a choice decides what it is worth."""
+    """Return the options and labels of an integrator's lines; several if an option decides its accuracy."""
     if name in _ALSO_NATIVE:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":
@@ -133,6 +132,6 @@ def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
     def eps_v(steps: float) -> float:
         return published.eps_v * (published.steps_per_period / steps) ** 2
 
-    # As published, a body in stick creeps, and the zone of zero velocity is as wide however short the step.
+    # In the published form a sticking body creeps, and the zero-velocity zone does not shrink with the step.
     refined = {"stick_velocity": "zero", "eps_v": eps_v}
     return [({}, ""), (refined, f"{name}, refined")]

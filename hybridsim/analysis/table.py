@@ -1,4 +1,4 @@
-"""A comparison as a text for people: a table that fits a terminal, with what one must know to read it."""
+"""This module writes a comparison as a table of text for a terminal, with notes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _VERSIONS = ("numpy", "scipy", "numba", "scikit-sundae")
 
 
 def table(comparison: Comparison) -> str:
-    """Heading, a block of rows for each line of the comparison, and notes."""
+    """Return the heading, a block of rows for each line of the comparison, and the notes."""
     names = {**_NAMES, "state": "state error"} | (
         {"event_time": "event time / T"} if comparison.period else {}
     )
@@ -41,7 +41,7 @@ def table(comparison: Comparison) -> str:
 
 
 def setting(row: Row) -> str:
-    """What was varied, short: "rtol 1e-06", or "T/1200" for the step."""
+    """Return the varied setting in short form: "rtol 1e-06", or "T/1200" for the step."""
     name, value = row.setting
     if name == "steps_per_period":
         return f"T/{value:g}"
@@ -50,12 +50,12 @@ def setting(row: Row) -> str:
 
 
 def milliseconds(seconds: float) -> str:
-    """A wall time, three digits."""
+    """Return a wall time as text with three digits."""
     return f"{seconds * 1e3:.3g} ms" if seconds < 0.9995 else f"{seconds:.3g} s"
 
 
 def versions(facts: Mapping[str, Any]) -> str:
-    """Versions and machine of a result, in a line."""
+    """Return versions and machine of a result in one line."""
     packages = ", ".join(f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name))
     machine = f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs"
     return f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {packages}; {machine}"
@@ -66,7 +66,7 @@ def _failure(row: Row) -> str:
 
 
 def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
-    """What stands in a row; nothing for a failure."""
+    """Return the cells of a row; empty for a failure."""
     if row.errors is None or row.cost is None:
         return ()
     readings = [comparison.reading(row, quantity) for quantity in comparison.quantities]
@@ -104,7 +104,7 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def differences(comparison: Comparison, errors: Errors | None = None) -> str:
-    """Errors in the units of the table, in words; those of the second reference, if none are given."""
+    """Return errors as text in the units of the table; by default those of the second reference."""
     readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
     return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
 
@@ -128,7 +128,7 @@ def _form_notes(comparison: Comparison) -> list[str]:
 
 
 def turns(count: int) -> str:
-    """How many turns a time is the median of, in words."""
+    """Describe the number of repetitions behind a median time."""
     return "one turn" if count == 1 else f"median over {count} turns"
 
 

@@ -1,4 +1,4 @@
-"""Wall times that can be compared: repetitions in turns over all runs, so that a slow spell hits them all."""
+"""This module measures comparable wall times: runs are repeated in turns, so that disturbances affect all alike."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-# A run that has been timed for this long in all is not repeated: it has averaged over the machine's moods itself.
+# Seconds; a run timed for this long in total is not repeated, because it already averages over disturbances.
 ENOUGH = 2.0
-# A run that is shorter than this has several calls in each of its turns, as many as fill the time but at most five.
+# A shorter run is called several times per turn, to fill this time, but at most five times.
 _TURN, _MOST_CALLS = 0.05, 5
-_LONG = 0.5  # a run whose first call took longer is not called once more before it is timed
-_MOST_BEFORE = (
-    30  # calls of a short run that are not timed: what it takes again and again is compiled in one of them
-)
+_LONG = 0.5  # a run whose first call took longer is not called again before timing
+_MOST_BEFORE = 30  # untimed calls of a short run, in which remaining compilation happens
 
 
 def timed_in_turns(
@@ -24,18 +22,18 @@ def timed_in_turns(
     expected: Sequence[float] | None = None,
     until: float = math.inf,
 ) -> list[tuple[float, ...]]:
-    """Seconds of each call of each run, round by round: a call in each of `repeat` rounds, fewer of long runs.
+    """Return the seconds of each call of each run, one call in each of `repeat` rounds, fewer for long runs.
 
-    The runs have been called once before; short ones are called for a while more before the first round. The collection
-    of garbage is left out, as `timeit` does: it strikes whom it happens to strike. What is alive at the start is left
-    alone, so that the collections in between cost little.
+    Each run must have been called once; short ones are called several more times before the first round.
+    Garbage collection is off, as in `timeit`, because it would disturb random runs. Objects alive at the
+    start are frozen, so that collections between the runs are cheap.
 
     Parameters
     ----------
-    progress : called with the index of a run before it has its turn, also where the turn is passed over.
-    expected : seconds that each run is likely to take; with it, a short run has several calls in its turn, and a
-        round that would not be over in time is shortened by its longest runs.
-    until : time of `time.monotonic` at which all has to be over.
+    progress : called with the index of a run before its turn, even if the turn is skipped.
+    expected : likely seconds of each run. With it a short run has several calls per turn, and the longest runs are
+        left out of a round that would take too long.
+    until : the `time.monotonic` deadline.
     """
     times: list[list[float]] = [[] for _ in runs]
     likely = [0.0] * len(runs) if expected is None else list(expected)
@@ -70,7 +68,7 @@ def timed_in_turns(
 
 
 def _warmed_up(run: Callable[[], object], expected: float, until: float) -> float:
-    """Seconds that a call is likely to take, once what is done only in the first ones is over."""
+    """Return the likely seconds of a call, after the one-time work of the first calls."""
     calls, spent, likely = 0, 0.0, expected
     while likely < (_TURN if calls else _LONG) and spent < _TURN and calls < _MOST_BEFORE:
         if time.monotonic() + likely > until:
@@ -83,7 +81,7 @@ def _warmed_up(run: Callable[[], object], expected: float, until: float) -> floa
 
 
 def _fitting(expected: Sequence[float], seconds: float) -> list[int]:
-    """Indices of as many runs, cheapest first, as fit in the seconds that are left."""
+    """Return the indices of the runs, cheapest first, that fit into the remaining seconds."""
     chosen, left = [], seconds
     for i in sorted(range(len(expected)), key=lambda i: expected[i]):
         if expected[i] > left:

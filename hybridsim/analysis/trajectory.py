@@ -1,4 +1,4 @@
-"""What a comparison reads of a run, of an exact motion or of a reference of the user's own."""
+"""This module defines the data that a comparison needs of a run, an exact motion or a user's reference."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class EventLike(Protocol):
 
 @dataclass(frozen=True)
 class ExactEvent:
-    """A mode change that a closed form knows."""
+    """A change of mode of a closed form."""
 
     t: float
     component: str
@@ -50,7 +50,7 @@ class Trajectory:
 
     Parameters
     ----------
-    states : function of times (k,) and a side "+" or "-" (which of the two states at an event), gives (n, k).
+    states : function of times (k,) and a side "+" or "-" (after or before an event) that returns (n, k).
     t_span : first and last time.
     events : in order of time.
     initial_modes : mode of each component just after the first time.
@@ -63,7 +63,7 @@ class Trajectory:
 
 
 def trajectory_of(solution: Solution) -> Trajectory:
-    """What a comparison reads of a run."""
+    """Return the trajectory of a run."""
     return Trajectory(
         states=solution,
         t_span=(solution.t_start, solution.t_end),
@@ -73,7 +73,7 @@ def trajectory_of(solution: Solution) -> Trajectory:
 
 
 def as_trajectory(value: Any, t_span: tuple[float, float]) -> Trajectory:
-    """A trajectory from a Trajectory, from something like a Solution, or from a function t -> states."""
+    """Return a trajectory from a Trajectory, an object like a Solution, or a function t -> states."""
     if isinstance(value, Trajectory):
         return value
     if all(hasattr(value, name) for name in ("t_end", "events", "modes")):

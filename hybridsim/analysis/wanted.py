@@ -1,4 +1,4 @@
-"""What a comparison is asked for, checked: every fault is a UsageError that names the argument and its value."""
+"""This module checks the arguments of comparisons; every error names the argument and its value."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 from hybridsim.arguments import is_row, number
 from hybridsim.errors import UsageError
 
-MOST = 10**6  # of what is counted one by one: periods, samples, repetitions
-MOST_STEPS = 10**9  # in a period
+MOST = 10**6  # for quantities that are counted one by one: periods, samples, repetitions
+MOST_STEPS = 10**9  # per period
 
 
 def positive(value: Any, what: str) -> float:
-    """A number above zero."""
+    """Return a number above zero."""
     remedy = "give a number above zero"
     found = number(value, what, remedy)
     if not found > 0:
@@ -22,7 +22,7 @@ def positive(value: Any, what: str) -> float:
 
 
 def whole(value: Any, what: str, most: int = MOST) -> int:
-    """A whole number above zero, up to one beyond which no memory and no time suffices."""
+    """Return a whole number above zero, up to a limit beyond which memory and time do not suffice."""
     remedy = f"give a whole number above zero, {most} at most"
     found = number(value, what, remedy)
     if not (1 <= found <= most and found.is_integer()):
@@ -31,17 +31,17 @@ def whole(value: Any, what: str, most: int = MOST) -> int:
 
 
 def positives(values: Any, what: str) -> tuple[float, ...] | None:
-    """Numbers above zero; None stays None."""
+    """Return numbers above zero; None stays None."""
     return None if values is None else tuple(positive(value, what) for value in _row(values, what))
 
 
 def wholes(values: Any, what: str) -> tuple[int, ...] | None:
-    """Whole numbers above zero; None stays None."""
+    """Return whole numbers above zero; None stays None."""
     return None if values is None else tuple(whole(value, what, MOST_STEPS) for value in _row(values, what))
 
 
 def mapping(value: Any, what: str) -> Mapping[str, Any]:
-    """A mapping from names; None is an empty one."""
+    """Return a mapping from names; None becomes an empty one."""
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
@@ -50,7 +50,7 @@ def mapping(value: Any, what: str) -> Mapping[str, Any]:
 
 
 def words(values: Any, what: str) -> tuple[str, ...]:
-    """Names; a single one becomes a tuple of one."""
+    """Return names; a single one becomes a tuple of one."""
     found = (values,) if isinstance(values, str) else tuple(_row(values, what, "give names"))
     for value in found:
         if not isinstance(value, str):
@@ -59,7 +59,7 @@ def words(values: Any, what: str) -> tuple[str, ...]:
 
 
 def named_options(item: Any) -> tuple[str, Mapping[str, Any]]:
-    """The name of an integrator and its options, from a name or a pair."""
+    """Return the name of an integrator and its options, from a name or a pair."""
     if isinstance(item, str):
         return item, {}
     if isinstance(item, tuple | list) and len(item) == 2 and isinstance(item[0], str):
@@ -71,7 +71,7 @@ def named_options(item: Any) -> tuple[str, Mapping[str, Any]]:
 
 
 def row_of_integrators(value: Any) -> tuple[Any, ...]:
-    """The items of a choice of integrators; a single name becomes a tuple of one."""
+    """Return the items of a choice of integrators; a single name becomes a tuple of one."""
     return (value,) if isinstance(value, str) else tuple(_row(value, "integrators", "give a list of names"))
 
 

@@ -1,1 +1,1 @@
-"""Mechanical systems with many dry contacts as data: matrices, contact directions and laws for compiled kernels."""
+"""This package runs mechanical systems with many dry contacts, given as matrices, contact directions and laws."""

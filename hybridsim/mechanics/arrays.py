@@ -1,4 +1,4 @@
-"""The arrays that the kernels of a mechanical system read and write, by name."""
+"""This module defines the named arrays that the kernels of a mechanical system read and write."""
 
 from __future__ import annotations
 
@@ -6,67 +6,62 @@ from typing import NamedTuple
 
 import numpy as np
 
-# mode of a contact at rest (+1, -1: slip forward, backward); no event in sight
+# The mode of a contact at rest (+1, -1: slip forward, backward), and the time of an event that does not
+# exist.
 STICK, OPEN_END = (
     0,
     2.0**1000,
 )
-VELOCITY, UPPER, LOWER, EXPIRY = 0, 1, 2, 3  # what ends a mode; a series that reaches no further
-DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST, LIMITED = range(7)  # why the loop came back, or was left
+VELOCITY, UPPER, LOWER, EXPIRY = (
+    0,
+    1,
+    2,
+    3,
+)  # causes of the end of a mode; EXPIRY: the series reaches no further
+DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST, LIMITED = range(7)  # reasons for the return of the loop
 
 
-# numbers that a kernel reached by its address is given; FIRST: where a run of neighbours begins, -1 where it is none
+# Integer arguments of a kernel that is called by address; FIRST: start of a run of neighbours, or -1.
 COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
-AT, LONGEST, RTOL, LENGTH = range(4)  # and real ones; the length of a stretch comes back
-# these kernels; then series to Bernstein form, for ever fewer terms
+AT, LONGEST, RTOL, LENGTH = range(4)  # real arguments; LENGTH returns the length of a stretch
+# Indices of these kernels; BERNSTEIN and later: conversion to Bernstein form, for decreasing numbers of
+# terms.
 EXPAND, STRETCH, DECIDE, BERNSTEIN = range(4)
 
 
 class State(NamedTuple):
-    """Where a run is; P1 = order + 1.
+    """The state of a run; P1 = order + 1, n coordinates, m contacts, nn nodes."""
 
-    x: (2, n) positions and velocities at the origin of the present step. series (P1, n): of each coordinate, from
-    the node's origin (within the step); both in whole vectors. mode (m,): 0 stick, else direction of slip. held
-    (m,): -1 or +1 where the force of a contact at rest stays at its limit because others hold it. decree (m, 2),
-    stamp (m,): leading coefficients of its guards that are zero just after an event, and when. until, guard (m,):
-    next exit and its kind. pinv: pseudo-inverses of the Delassus matrices of what sticks, node by node. holds
-    (nn,): how many stick. pin (n,): contact that fixes a coordinate, or -1. anchor (m,): coordinate that is
-    evaluated from a contact's constraint, or -1. tree: tournament of the next times. clock: origin of the step
-    (high, low), its length, last event. phase: angles at the origin. flags: see `loop`. counts: steps, events,
-    restarts of patches, nodes restarted, undecided, grazings. kernels, whole, real: addresses of the large
-    kernels, and what they are given.
-    """
-
-    x: np.ndarray
-    series: np.ndarray
-    origin: np.ndarray
-    mode: np.ndarray
-    held: np.ndarray
-    decree: np.ndarray
-    stamp: np.ndarray
-    until: np.ndarray
-    guard: np.ndarray
-    pinv: np.ndarray
-    holds: np.ndarray
-    pin: np.ndarray
-    anchor: np.ndarray
-    tree: np.ndarray
-    clock: np.ndarray
-    phase: np.ndarray
-    flags: np.ndarray
-    counts: np.ndarray
-    tolerance: np.ndarray
-    kernels: np.ndarray
-    whole: np.ndarray
-    real: np.ndarray
+    x: np.ndarray  # (2, n) positions and velocities at the origin of the present step
+    series: np.ndarray  # (P1, n) series of each coordinate, padded to whole vectors
+    origin: np.ndarray  # (nn,) origin of each node's series within the step
+    mode: np.ndarray  # (m,) 0 stick, else the direction of slip
+    held: np.ndarray  # (m,) -1 or +1 if other contacts hold this one, with its force at that limit; else 0
+    decree: np.ndarray  # (m, 2) leading coefficients of its guards that an event has made zero
+    stamp: np.ndarray  # (m,) time of that event
+    until: np.ndarray  # (m,) time of the next exit
+    guard: np.ndarray  # (m,) kind of the next exit
+    pinv: np.ndarray  # pseudo-inverses of the Delassus matrices of sticking contacts, node by node
+    holds: np.ndarray  # (nn,) number of sticking contacts
+    pin: np.ndarray  # (n,) contact that fixes a coordinate, or -1
+    anchor: np.ndarray  # (m,) coordinate that is evaluated from a contact's constraint, or -1
+    tree: np.ndarray  # tournament tree of the next exit times
+    clock: np.ndarray  # origin of the step (high, low), its length, time of the last event
+    phase: np.ndarray  # angles of forcing and bases at the origin
+    flags: np.ndarray  # see `loop`
+    counts: np.ndarray  # steps, events, restarts of patches, nodes restarted, undecided, grazings
+    tolerance: np.ndarray  # (2, n) absolute tolerances
+    kernels: np.ndarray  # addresses of the large kernels
+    whole: np.ndarray  # their integer arguments
+    real: np.ndarray  # their real arguments
 
 
 class Room(NamedTuple):
-    """Scratch: the patch under work (nodes, coordinates, contacts and where these are), its series, and polynomials.
+    """Scratch arrays: the present patch, its series, and polynomials.
 
-    Q, R, F and sums have rows of one length, in whole vectors. lane, lane_ptr, place, V: registers of the tapes, see
-    `expansion`. strips, W, laid: what `runs` lays out for each eight neighbours, their registers, and for whom (number
-    of the first, and one). line: a series about another point, see `polynomials`.
+    Rows of Q, R, F and sums have equal lengths, in whole vectors. lane, lane_ptr, place, V: registers of the
+    tapes, see `expansion`. strips, W, laid: the layout of `runs` for each eight neighbours, their registers,
+    and the numbers of the eight. line: a series about another point, see `polynomials`.
     """
 
     nodes: np.ndarray
@@ -106,7 +101,7 @@ class Room(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is kept: pieces (node, row of the first series; start as high, low, local), their series, and events."""
+    """The record of a run: pieces (node, row; start as high, low, local), their series, and events."""
 
     piece: np.ndarray
     start: np.ndarray

@@ -1,4 +1,4 @@
-"""A mechanical system as an ordinary model, in text: the independent way to run a small one."""
+"""This module writes a mechanical system as an ordinary model, as an independent way to run a small one."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def as_model(system: MechanicalSystem) -> Model:
-    """Accelerations written out, M^-1 multiplied in; contacts with their velocities and laws.
+    """Return a model with explicit accelerations, M^-1 multiplied in, and contacts with their velocities and laws.
 
-    An angular frequency becomes a parameter, so that its angles keep their digits over any time.
+    An angular frequency becomes a parameter, so that its angle stays accurate over any time.
     """
     import numpy as np
 

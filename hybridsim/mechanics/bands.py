@@ -1,7 +1,7 @@
-"""The matrices of blocks that stand in a row, by their diagonals.
+"""This module stores the matrices of a row of blocks by their diagonals.
 
-Where each coordinate is a node with a contact of its own, and K and C have few diagonals (a chain, a row of masses),
-series are worked out for eight neighbours at once: `hybridsim.mechanics.runs`.
+If each coordinate is a node with its own contact, and K and C have few diagonals (a chain of masses), series
+are computed for eight neighbours at once: `hybridsim.mechanics.runs`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from hybridsim.engine.eight import WIDTH
 
 # rows: w; M^-1 w; 1/(w M^-1 w); base; acceleration; constants of laws
 WEIGHT, MOBILITY, HOLDING, BASE, STILL, VALUES = range(6)
-_FULL = 1 / 3  # of the entries of the diagonals, that are not zero at the least
+_FULL = 1 / 3  # least fraction of non-zero entries in the diagonals
 
 
 def in_bands(
     K: Any, C: Any, B: Any, W: Any, single: bool, base: np.ndarray, still: np.ndarray, par: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets of the diagonals, and rows: those named above, constants of the laws, diagonals of K, those of C if any.
+    """Return the offsets of the diagonals, and rows: those named above, constants of laws, diagonals of K, then of C.
 
-    No offsets where the system is not of this kind. single: each coordinate is a node with one contact; nothing
-    depends on time; there is one law.
+    There are no offsets if the system is not of this kind. single: each coordinate is a node with one
+    contact, nothing depends on time, and there is one law.
     """
     none = np.zeros(0, dtype=np.int64), np.zeros((1, WIDTH))
     if not single:
@@ -43,5 +43,5 @@ def in_bands(
     wide = -(-n // WIDTH) * WIDTH + WIDTH  # a run may begin anywhere
     out = np.zeros((len(rows), wide))
     out[:, :n] = rows
-    out[VALUES : VALUES + par.shape[1], n:] = par[-1][:, None]  # a law has a value there, too
+    out[VALUES : VALUES + par.shape[1], n:] = par[-1][:, None]  # a law needs valid constants there, too
     return offsets, out

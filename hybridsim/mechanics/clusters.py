@@ -1,9 +1,8 @@
-"""What sticks together: the pseudo-inverse of its Delassus matrix, and velocities that meet its constraints.
+"""This module handles sticking contacts: the pseudo-inverse of their Delassus matrix, and consistent velocities.
 
-A set of contacts that stick may be redundant (two in one direction, more than there are coordinates). The motion is
-unique all the same; of the forces those of least norm are taken, f = G^+ g (A. Ben-Israel, T. N. E. Greville,
-Generalized Inverses, 2nd ed., Springer 2003, section 7.6: full-rank factors).
-"""
+A set of sticking contacts may be redundant (two in one direction, or more contacts than coordinates). The
+motion is still unique. Of the possible forces those of least norm are used, f = G^+ g (A. Ben-Israel, T. N.
+E. Greville, Generalized Inverses, 2nd ed., Springer 2003, section 7.6: full-rank factors)."""
 
 from __future__ import annotations
 
@@ -15,15 +14,16 @@ from hybridsim.engine.timepair import two_product, two_sum
 from hybridsim.mechanics.arrays import STICK
 from hybridsim.mechanics.expansion import base_speed
 
-# A pivot below this share of its diagonal, times the size, is what rounding leaves of zero in a positive semidefinite
-# elimination (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., section 10.3.2).
+# A pivot below this fraction of its diagonal, times the size, is a rounding error of zero in a positive
+# semidefinite elimination (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., section
+# 10.3.2).
 _RANK = 64 * 2.0**-53
-_CORRECTIONS = 2  # the first leaves the rounding of G^+, the second that of the velocities
+_CORRECTIONS = 2  # the first removes the rounding of G^+, the second that of the velocities
 
 
 @kernel
 def factorise(plant: Any, state: Any, room: Any, j: int) -> None:
-    """Pseudo-inverse of G over the contacts of node j that stick, pins and anchors of its coordinates."""
+    """Compute the pseudo-inverse of G over the sticking contacts of node j, and the pins and anchors."""
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m, size = last - first, 0
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
@@ -53,9 +53,9 @@ def factorise(plant: Any, state: Any, room: Any, j: int) -> None:
 
 @kernel
 def _anchors(plant: Any, state: Any, first: int, last: int) -> None:
-    """For each contact that sticks and has several weights the coordinate of the largest, if it shares none.
+    """Choose an anchor coordinate for each sticking contact with several weights that shares no coordinate.
 
-    The contacts that share a coordinate are met by least squares alone.
+    It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """
     for c in range(first, last):
         if state.mode[c] != STICK or plant.unit[c]:
@@ -76,15 +76,15 @@ def _anchors(plant: Any, state: Any, first: int, last: int) -> None:
 
 @kernel
 def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int:
-    """P = (G over `order`)^+ for a positive semidefinite G (m*m,); returns its rank. L, P: (m, m) scratch and result.
+    """Set P = (G over `order`)^+ for a positive semidefinite G (m*m,) and return its rank; L and P are (m, m) arrays.
 
-    Cholesky with pivots gives G = L L^T with L of full column rank; then G^+ = L (L^T L)^-2 L^T.
+    Pivoted Cholesky gives G = L L^T with L of full column rank; then G^+ = L (L^T L)^-2 L^T.
     """
     for a in range(size):
         for b in range(size):
             P[a, b] = G[order[a] * m + order[b]]
     rank = 0
-    for _ in range(size):  # the pivots stay where they are; a used row is marked by a negative diagonal
+    for _ in range(size):  # the pivots are not moved; a used row is marked by a negative diagonal
         pivot, best = -1, 0.0
         for a in range(size):
             scale = G[order[a] * m + order[a]]
@@ -113,8 +113,8 @@ def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int
 
 @kernel
 def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
-    """P = L (L^T L)^-2 L^T, with L in the first `rank` columns; the columns after them are scratch."""
-    # S = L^T L = R R^T, in the upper-left of P
+    """Set P = L (L^T L)^-2 L^T, with L in the first `rank` columns; later columns are scratch."""
+    # Compute S = L^T L = R R^T in the upper-left of P.
     for a in range(rank):
         for b in range(a + 1):
             total = 0.0
@@ -127,7 +127,7 @@ def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
             for k in range(b):
                 total -= P[a, k] * P[b, k]
             P[a, b] = math.sqrt(max(total, 0.0)) if a == b else total / P[b, b]
-    # rows of L become rows of L S^-1
+    # Replace the rows of L by rows of L S^-1.
     for i in range(size):
         for a in range(rank):
             total = L[i, a]
@@ -149,7 +149,7 @@ def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
 
 @inlined
 def misfit(plant: Any, c: int, v: Any, base: float) -> float:
-    """w . v - base of a contact, summed in twice the precision."""
+    """Return w . v - base of a contact, summed in doubled precision."""
     high, low = -base, 0.0
     for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
         product, error = two_product(plant.w_val[e], v[plant.w_col[e]])
@@ -160,10 +160,10 @@ def misfit(plant: Any, c: int, v: Any, base: float) -> float:
 
 @kernel
 def project(plant: Any, state: Any, room: Any, j: int, tau: float, v: Any) -> None:
-    """Make the velocities v (n,) meet the constraints of what sticks in node j, which `factorise` knows.
+    """Make the velocities v (n,) satisfy the constraints of the sticking contacts of node j, after `factorise`.
 
-    Single coordinates are set exactly. The others take the least change in kinetic energy, v -= M^-1 W^T f with
-    f = G^+ (W v - base), where the misfit is worked out in twice the precision; what is left is the rounding of v.
+    Single coordinates are set exactly. The others get the least change in kinetic energy, v -= M^-1 W^T f
+    with f = G^+ (W v - base), with the misfit in doubled precision; the remaining error is the rounding of v.
     """
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m, several = last - first, False

@@ -1,12 +1,13 @@
-"""Which contacts of a node stick, slip or release: one complementarity problem, decided by the derivatives that tell.
+"""This module decides which contacts of a node stick, slip or release, as one complementarity problem.
 
-A candidate gives each contact at zero relative velocity a mode. It is admissible when, just after the instant,
-the force of everything that sticks stays within its limits and everything that slips moves the way it says;
-the signs come from short series by the rules of `hybridsim.engine.decide`, with zeros by decree. From "all
-hold" the contacts that violate are changed together (block principal pivoting, J. J. Judice and F. M. Pires,
-Computers & Operations Research 21 (1994) 587, doi:10.1016/0305-0548(94)90106-6), and one by one where that
-does not settle, which cannot cycle for positive definite Delassus matrices (K. G. Murty, Mathematical
-Programming 7 (1974) 26). Nothing is enumerated.
+A candidate gives each contact at zero relative velocity a mode. It is admissible if, just after the instant,
+the forces of all sticking contacts stay within their limits and all slipping contacts move in their
+directions. The signs follow from short series by the rules of `hybridsim.engine.decide`, with exact zeros
+known from the event. Starting with all contacts in stick, the contacts that violate a condition are changed
+together (block principal pivoting, J. J. Judice and F. M. Pires, Computers & Operations Research 21 (1994)
+587, doi:10.1016/0305-0548(94)90106-6), and one by one if that does not settle. The latter cannot cycle for
+positive definite Delassus matrices (K. G. Murty, Mathematical Programming 7 (1974) 26). No combinations are
+enumerated.
 """
 
 from __future__ import annotations
@@ -20,25 +21,27 @@ from hybridsim.mechanics.clusters import factorise, project
 from hybridsim.mechanics.expansion import base_coefficient, base_speed, expanded, gather
 from hybridsim.mechanics.polynomials import state_at
 
-_SHORT = 4  # order of the series in q that decide: accelerations and their first two derivatives
+_SHORT = 4  # order of the short series in q: accelerations and their first two derivatives
 _UNIT = 2.0**-53
-_TERMS = 8.0  # rounding of a sum of products, in units of the sum of their sizes: the state's own and some of the sum's
-_BLOCK = 8  # rounds in which all violations are changed at once
+_TERMS = (
+    8.0  # rounding of a sum of products, in units of the sum of their sizes, for the state and for the sum
+)
+_BLOCK = 8  # rounds in which all violations are changed together
 DECIDED = 0
 
 
 @inlined
 def decided(plant: Any, laws: Any, state: Any, room: Any, j: int, tau: float, fired: int) -> int:
-    """Settle node j at tau, where contact `fired` (-1: none) has reached the end of its mode; DECIDED or INCONSISTENT.
+    """Decide node j at tau, where contact `fired` (-1: none) ended its mode; return DECIDED or INCONSISTENT.
 
-    The node's series are replaced by its positions and velocities at tau, velocities exact.
+    The node's series are replaced by its positions and exact velocities at tau.
     """
     state.whole[NODE], state.whole[FIRED], state.real[AT] = j, fired, tau
     return call_kernel(state.kernels[DECIDE], (plant, laws, state, room))
 
 
 def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """See `decided`."""
+    """Run `decided` with the arguments in the state."""
     j, fired, tau = state.whole[NODE], state.whole[FIRED], state.real[AT]
     first, last = plant.node_con[j], plant.node_con[j + 1]
     _stop_at(plant, state, j, tau)
@@ -52,7 +55,7 @@ def decide(plant: Any, laws: Any, state: Any, room: Any) -> int:
             state.mode[c] = STICK
     _set_velocities(plant, state, room, j, tau)
     count = 0
-    for c in range(first, last):  # what has come to rest with the others is known only now
+    for c in range(first, last):  # contacts that came to rest with the others are known only now
         if state.mode[c] == STICK or _is_zero(plant, state, c, tau):
             room.zero[count] = c
             count += 1
@@ -90,7 +93,7 @@ def _stop_at(plant: Any, state: Any, j: int, tau: float) -> None:
 
 @kernel
 def _is_zero(plant: Any, state: Any, c: int, tau: float) -> bool:
-    """Whether the relative velocity of a contact is zero as far as rounding tells."""
+    """Return whether the relative velocity of a contact is zero to rounding."""
     base = base_speed(plant, state, c, tau)
     total, size = -base, abs(base)
     for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
@@ -102,7 +105,7 @@ def _is_zero(plant: Any, state: Any, c: int, tau: float) -> bool:
 
 @kernel
 def _set_velocities(plant: Any, state: Any, room: Any, j: int, tau: float) -> None:
-    """Make the velocities of a node meet the constraints of what is in stick."""
+    """Make the velocities of a node satisfy the constraints of its sticking contacts."""
     factorise(plant, state, room, j)
     for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
         state.x[1, x] = state.series[1, x]
@@ -113,10 +116,10 @@ def _set_velocities(plant: Any, state: Any, room: Any, j: int, tau: float) -> No
 
 @kernel
 def _bounds(plant: Any, state: Any, room: Any, j: int, nd: int, tau: float) -> None:
-    """Bounds of the rounding errors of accelerations, forces and relative velocities of one node, in the short series.
+    """Bound the rounding errors of accelerations, forces and relative velocities of a node, in the short series.
 
-    err[k, a] of coefficient k of the accelerations; err_f[k, c] of the forces; err_f[_SHORT + k, c] of the relative
-    velocities. The instant is known to some ulps of the step.
+    err[k, a]: coefficient k of the accelerations; err_f[k, c]: of the forces; err_f[_SHORT + k, c]: of the
+    relative velocities. The instant is known to a few ulps of the step.
     """
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m, instant = last - first, 4.0 * 2.0**-52 * max(abs(tau), state.clock[2])
@@ -168,7 +171,7 @@ def _bounds(plant: Any, state: Any, room: Any, j: int, nd: int, tau: float) -> N
 
 @kernel
 def _judge(plant: Any, state: Any, room: Any, count: int) -> int:
-    """Number of violations; room.next[c] is the mode that a violating contact asks for, else its own."""
+    """Return the number of violations; room.next[c] is the required mode of a violating contact, else its own."""
     violations, is_continuous = 0, True
     for z in range(count):
         c = room.zero[z]
@@ -202,7 +205,7 @@ def _judge(plant: Any, state: Any, room: Any, count: int) -> int:
                 g[k], e[k] = -sigma * room.F[k, i], room.err_f[k, c]
             g[0] += plant.limits[c, side]
             e[0] += _UNIT * plant.limits[c, side]
-            # a force that another one's jump changes is no longer at the limit that it was located at
+            # a force that another contact's jump changes is no longer exactly at its limit
             decreed = 1 if is_continuous and room.at_limit[c] == sigma else 0
             sign, order = side_after(g[: _SHORT - 1], e[: _SHORT - 1], decreed)
             state.decree[c, side] = order if order < _SHORT - 1 else 0
@@ -216,7 +219,7 @@ def _judge(plant: Any, state: Any, room: Any, count: int) -> int:
 
 @kernel
 def _change(state: Any, room: Any, count: int, together: bool) -> None:
-    """Give the contacts that violate their next mode: all of them, or the last one in the order of the contacts."""
+    """Set the next modes of the violating contacts: of all, or of the last one in order."""
     if not together:
         kept = -1
         for z in range(count):
@@ -235,7 +238,7 @@ def _change(state: Any, room: Any, count: int, together: bool) -> None:
 
 @kernel
 def _hold_at_limits(plant: Any, state: Any, room: Any, j: int, count: int) -> None:
-    """What would slip and is held by others sticks, its force at the limit; what others no longer hold slips."""
+    """Hold slipping contacts that other contacts fix, with the force at its limit, and release the others."""
     for z in range(count):
         c = room.zero[z]
         if state.mode[c] == STICK and state.held[c] == 0:
@@ -249,7 +252,7 @@ def _hold_at_limits(plant: Any, state: Any, room: Any, j: int, count: int) -> No
 
 @kernel
 def _is_held(plant: Any, state: Any, j: int, c: int) -> bool:
-    """Whether the direction of a contact lies in the span of those that stick: what is left of its G is rounding."""
+    """Return whether the direction of a contact lies in the span of the sticking ones, to rounding."""
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m, at = last - first, plant.g_ptr[j]
     own = plant.g_val[at + (c - first) * m + (c - first)]

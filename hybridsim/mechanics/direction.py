@@ -1,4 +1,4 @@
-"""Numbers and directions of the contacts of a mechanical system, as they are declared."""
+"""This module checks the numbers and directions in the declaration of a mechanical system."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from hybridsim.model.declared import Declared
 
 
-_MOVES = "; what depends on time or place is for a Model, to which system.to_model() is a beginning"
+_MOVES = "; for coefficients that vary in time or space write an hs.Model, starting from system.to_model()"
 
 
 def finite(part: Declared, what: str, value: Any) -> float:
-    """A finite number, or the part's error that names it."""
+    """Return a finite number, or raise an error that names the part."""
     number = as_real(value)
     if number is None or not math.isfinite(number):
         raise part._fault(f"{what} is {value!r}", "give finite numbers" + _MOVES * isinstance(value, str))
@@ -25,7 +25,7 @@ def finite(part: Declared, what: str, value: Any) -> float:
 
 
 def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ...], int]:
-    """(coordinate, weight) of a row of weights or a mapping, zeros left out; how many were given in a row, else 0."""
+    """Return the non-zero (coordinate, weight) pairs, and the length of a row (0 for a mapping)."""
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(

@@ -1,8 +1,8 @@
-"""Taylor series of a patch of nodes: coordinates, relative velocities and friction forces, order by order.
+"""This module computes Taylor series of a patch of nodes: coordinates, relative velocities, friction forces.
 
-Within a patch everything is expanded together; the nodes around it enter by the series they already have. With
-q to order k + 1 known, the relative velocities have their coefficient k, the laws give the forces of what
-slips, and those of what sticks follow from w . q'' = base'. That gives coefficient k + 2 of q.
+All nodes of a patch are expanded together; the nodes around it enter by their existing series. When q is
+known to order k + 1, the relative velocities have their coefficient k and the laws give the slip forces. The
+forces of sticking contacts follow from w . q'' = base'. This gives coefficient k + 2 of q.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from hybridsim.mechanics.runs import clear_beside, expand_run
 
 @kernel
 def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) -> tuple[int, int]:
-    """Number the coordinates and contacts of the nodes room.nodes[:count], and put their values at tau in place.
+    """Number the coordinates and contacts of the nodes room.nodes[:count], and store their values at tau.
 
-    The nodes around them get their series about tau. Returns how many coordinates and contacts the patch has.
+    The nodes around them get series about tau. Returns the numbers of coordinates and contacts of the patch.
     """
     state.whole[FIRST] = -1
     room.stamp[-1] += 1
@@ -59,7 +59,7 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
 
 @kernel
 def whole(plant: Any, state: Any, room: Any, top: int) -> tuple[int, int]:
-    """The patch of all nodes, at the origin of the step."""
+    """Make the patch of all nodes, at the origin of the step."""
     state.whole[FIRST] = -1
     if plant.offsets.shape[0] > 0:
         state.whole[FIRST] = 0
@@ -77,7 +77,7 @@ def whole(plant: Any, state: Any, room: Any, top: int) -> tuple[int, int]:
 
 @kernel
 def _angles(plant: Any, state: Any, room: Any, tau: float, top: int) -> None:
-    """Series of sine and cosine of every rate about tau."""
+    """Compute the series of sine and cosine of every angle about tau."""
     for r in range(plant.rates.shape[0]):
         rate = plant.rates[r]
         angle = state.phase[r] + rate * tau
@@ -89,7 +89,7 @@ def _angles(plant: Any, state: Any, room: Any, tau: float, top: int) -> None:
 
 @inlined
 def base_coefficient(plant: Any, room: Any, c: int, k: int) -> float:
-    """Coefficient k of the speed of a contact's base."""
+    """Return coefficient k of the speed of a contact's base."""
     r = plant.base_rate[c]
     if r >= 0:
         return plant.base[c, 1] * room.trig[r, 0, k] + plant.base[c, 2] * room.trig[r, 1, k]
@@ -98,7 +98,7 @@ def base_coefficient(plant: Any, room: Any, c: int, k: int) -> float:
 
 @inlined
 def base_speed(plant: Any, state: Any, c: int, tau: float) -> float:
-    """Speed of a contact's base at a time within the step."""
+    """Return the speed of a contact's base at a time within the step."""
     r = plant.base_rate[c]
     if r < 0:
         return plant.base[c, 0]
@@ -124,7 +124,7 @@ def _lanes(plant: Any, laws: Any, state: Any, room: Any, nc: int, orders: int) -
 
 @kernel
 def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) -> int:
-    """Put the constants of the contacts in lanes lane_ptr[t]..last - 1 into a tape's registers; where these end."""
+    """Store the constants of lanes lane_ptr[t]..last - 1 in a tape's registers; return the end of these registers."""
     first, at, block = room.lane_ptr[t], room.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
     end = at + whole_vectors(count) // WIDTH * block
@@ -141,7 +141,7 @@ def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) 
 
 @inlined
 def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k: int) -> None:
-    """Coefficient k of the forces of all that slips, from that of the relative velocities."""
+    """Compute coefficient k of all slip forces from that of the relative velocities."""
     for t in range(laws.registers.shape[0]):
         first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
         block = laws.registers[t] * orders * WIDTH
@@ -159,7 +159,7 @@ def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k
 
 @inlined
 def _relative(plant: Any, state: Any, room: Any, nc: int, k: int) -> None:
-    """Coefficient k of the relative velocities; exactly zero in stick."""
+    """Compute coefficient k of the relative velocities, exactly zero in stick."""
     cons, loc, mode, ptr, col, val = room.cons, room.loc, state.mode, plant.w_ptr, plant.w_col, plant.w_val
     q, r, f = room.Q[k + 1], room.R[k], room.F[k]
     for i in range(nc):
@@ -176,7 +176,7 @@ def _relative(plant: Any, state: Any, room: Any, nc: int, k: int) -> None:
 
 @inlined
 def _accelerate(plant: Any, room: Any, nd: int, k: int) -> None:
-    """Coefficient k of the accelerations, with the forces of what slips and none of what sticks."""
+    """Compute coefficient k of the accelerations, with slip forces but without those of sticking contacts."""
     dofs, loc, lcon, acc = room.dofs, room.loc, room.lcon, room.acc
     q, v, f = room.Q[k], room.Q[k + 1], room.F[k]
     k_ptr, k_col, k_val, b_ptr, b_col, b_val = (
@@ -206,7 +206,7 @@ def _accelerate(plant: Any, room: Any, nd: int, k: int) -> None:
 
 @inlined
 def _advance(plant: Any, state: Any, room: Any, nd: int, k: int) -> None:
-    """Coefficient k + 2 of the positions from the accelerations; that of a coordinate that sticks from its base."""
+    """Compute coefficient k + 2 of the positions from the accelerations, or from the base for a pinned coordinate."""
     dofs, acc, pin, q, divisor = room.dofs, room.acc, state.pin, room.Q[k + 2], float((k + 1) * (k + 2))
     for a in range(nd):
         c = pin[dofs[a]]
@@ -220,7 +220,7 @@ def _advance(plant: Any, state: Any, room: Any, nd: int, k: int) -> None:
 
 @inlined
 def _hold_one(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
-    """`_hold` for a node whose only contact sticks."""
+    """Do the work of `_hold` for a node whose only contact sticks."""
     c, total = plant.node_con[j], 0.0
     for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
         total += plant.w_val[e] * room.acc[room.loc[plant.w_col[e]]]
@@ -233,7 +233,7 @@ def _hold_one(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
 
 @kernel
 def _hold(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
-    """Forces of what sticks in a node, f = (W M^-1 W^T)^+ (W a - base'), and what they do to the accelerations."""
+    """Compute the forces of sticking contacts of a node, f = (W M^-1 W^T)^+ (W a - base'), and add their effect."""
     first, last = plant.node_con[j], plant.node_con[j + 1]
     m = last - first
     for c in range(first, last):
@@ -257,7 +257,7 @@ def _hold(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
 
 
 def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Series of the gathered patch: Q (positions), R (relative velocities), F (forces); see `expanded`."""
+    """Compute the series of the gathered patch, Q, R and F; see `expanded`."""
     count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau = state.real[AT]
     if state.whole[FIRST] >= 0:
@@ -285,7 +285,7 @@ def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
 def expanded(
     plant: Any, laws: Any, state: Any, room: Any, count: int, nd: int, nc: int, tau: float, top: int
 ) -> None:
-    """Expand the patch of so many nodes, coordinates and contacts about tau, to order `top` of its positions."""
+    """Expand the patch with these counts of nodes, coordinates and contacts about tau, to order `top`."""
     state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER] = count, nd, nc, top
     state.real[AT] = tau
     call_kernel(state.kernels[EXPAND], (plant, laws, state, room))

@@ -1,4 +1,4 @@
-"""A unilateral contact of a mechanical system: a gap that is linear in the coordinates, with restitution."""
+"""This module defines a unilateral contact of a mechanical system: a linear gap with restitution."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from hybridsim.model.impact import ROUNDING
 
 @dataclass(frozen=True)
 class MechanicalImpact(Declared):
-    """A unilateral contact of a `MechanicalSystem`: a stop, a clearance, two neighbours that collide.
+    """A unilateral contact of a `MechanicalSystem`, such as a stop, a clearance, or two colliding neighbours.
 
     ::
 
         g = gap + direction . q >= 0,   its force p >= 0 acts as + direction p,
-        0 <= P,   u+ >= e max(-u-, 0),  one of the two with equality, u = direction . q'  (`hybridsim.Impact`)
+        0 <= P,   u+ >= e max(-u-, 0),  at least one of the two with equality, u = direction . q'  (`hybridsim.Impact`)
 
     Parameters
     ----------
     name : str
-        Of the normal force.
+        The name of the normal force.
     direction : array or mapping of int to float
         The weights (n,), or a mapping from numbers of coordinates to weights: +1 for the body that the force
         pushes along its coordinate, -1 for the one behind it.
     gap : float
-        How wide it is at q = 0.
+        The gap at q = 0.
     restitution : float
-        E, from 0 (no rebound) to 1 (no loss).
+        The coefficient e, from 0 (no rebound) to 1 (no loss).
     place : Place, optional
-        Where it is written, for the messages of errors.
+        The place of the declaration, for error messages.
 
     Raises
     ------
     UsageError
-        For what is no finite number, a direction of zeros, a restitution outside of [0, 1].
+        For a number that is not finite, a zero direction, or a restitution outside [0, 1].
 
     Notes
     -----
-    For many contacts that close, by time stepping: ``hs.simulate(system, t_span, integrator="moreau",
+    For many contacts that close, use time stepping: ``hs.simulate(system, t_span, integrator="moreau",
     step=...)``.
 
     Examples
@@ -53,7 +53,7 @@ class MechanicalImpact(Declared):
     direction: Any
     gap: float
     restitution: float
-    weights: int = field(init=False, default=0, repr=False, compare=False)  # as many as were given in a row
+    weights: int = field(init=False, default=0, repr=False, compare=False)  # number of weights given in a row
 
     def __post_init__(self) -> None:
         self._texts("name")

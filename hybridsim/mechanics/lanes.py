@@ -1,8 +1,8 @@
-"""A tape run for many contacts at once: one interpreter, one row of numbers for each register and order.
+"""This module evaluates a tape for many contacts at once: one row of numbers per register and order.
 
-The recurrences are those of `hybridsim.engine.taylor`; here each operation is done for eight contacts (lanes), so that
-the interpreter's own cost is shared among them. Each eight have a block of their own: its registers one behind the
-other, of each its coefficients. Lanes beyond the last contact are copies of its own.
+The recurrences are those of `hybridsim.engine.taylor`. Each operation works on eight contacts (lanes), so
+that the interpreter's overhead is shared. Each group of eight has a block with its registers one after the
+other, and within a register its coefficients. Lanes beyond the last contact are copies of it.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ from hybridsim.engine.tape import (
 
 @inlined
 def clear(V: Any, at: int, length: int) -> None:
-    """Zeros from a place on, in whole vectors."""
+    """Write zeros from a place on, in whole vectors."""
     for i in range(at, at + length, WIDTH):
         store(V, i, splat(0.0))
 
 
 @inlined
 def lane_place(at: int, block: int, register: int, orders: int, k: int, lane: int) -> int:
-    """Where coefficient k of a register has its number for a lane."""
+    """Return the index of coefficient k of a register for a lane."""
     return at + (lane >> 3) * block + (register * orders + k) * WIDTH + (lane & 7)
 
 
 @inlined
 def _product(V: Any, a: int, b: int, first: int, last: int) -> Any:
-    """sum_{i=first}^{last} a_i b_{first + last - i}; a: place of coefficient `first`, b: of `last`."""
+    """Return sum_{i=first}^{last} a_i b_{first + last - i}; a, b: indices of coefficients `first` and `last`."""
     total = splat(0.0)
     for _ in range(first, last + 1):
         total = total + load(V, a) * load(V, b)
@@ -65,7 +65,7 @@ def _product(V: Any, a: int, b: int, first: int, last: int) -> Any:
 
 @inlined
 def _weighted(V: Any, a: int, b: int, k: int, last: int) -> Any:
-    """sum_{i=1}^{last} i a_i b_{k-i}; a, b: places of coefficient 0."""
+    """Return sum_{i=1}^{last} i a_i b_{k-i}; a, b: indices of coefficient 0."""
     total = splat(0.0)
     for i in range(1, last + 1):
         total = total + splat(float(i)) * (load(V, a + i * WIDTH) * load(V, b + (k - i) * WIDTH))
@@ -74,7 +74,7 @@ def _weighted(V: Any, a: int, b: int, k: int, last: int) -> Any:
 
 @kernel
 def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: int) -> None:
-    """Order 0 of the operations that follow a differential equation."""
+    """Compute order 0 of the operations that are defined by a differential equation."""
     for j in range(WIDTH):
         u = V[a + j]
         if op == EXP:
@@ -103,7 +103,7 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int) -> None:
-    """Order k >= 1 of the operations that follow a differential equation; places of coefficient 0."""
+    """Compute order k >= 1 of the operations defined by a differential equation, from indices of coefficient 0."""
     o, o2, share = out + k * WIDTH, out2 + k * WIDTH, splat(1.0 / k)
     if op == EXP:
         store(V, o, share * _weighted(V, a, out, k, k))
@@ -126,10 +126,10 @@ def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: 
 
 @inlined
 def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
-    """(V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: places of coefficient 0.
+    """Return (V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: indices of coefficient 0.
 
-    The newest coefficient of b comes last, and nothing is divided by b_0 after it: a processor that works ahead has all
-    else done by then.
+    The newest coefficient of b is used last, and no division by b_0 follows it. A processor with out-of-order
+    execution has then finished everything else.
     """
     inverse, total = splat(1.0) / load(V, b), load(V, x)
     b += WIDTH
@@ -141,7 +141,7 @@ def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
 
 @inlined
 def _with_constant(op: int, x: Any, c: Any) -> Any:
-    """Order 0 of a series and a constant."""
+    """Return order 0 of a series and a constant."""
     if op == ADD_CONSTANT:
         return x + c
     return x - c if op == SUB_CONSTANT else c - x
@@ -151,9 +151,9 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 def advance_lanes(
     rows: Any, first: int, last: int, V: Any, begin: int, end: int, block: int, orders: int, k: int
 ) -> None:
-    """Coefficient k of the operations first..last - 1 in all blocks of eight lanes from `begin` to `end` in V.
+    """Compute coefficient k of operations first..last - 1 in all blocks of eight lanes from `begin` to `end` in V.
 
-    Register r has its coefficient k at (r*orders + k)*WIDTH of a block.
+    Coefficient k of register r is at (r*orders + k)*WIDTH of a block.
     """
     length = orders * WIDTH
     for base in range(begin, end, block):
@@ -190,7 +190,7 @@ def advance_lanes(
 
 @kernel
 def clear_constants(laws: Any, V: Any, t: int, base: int, orders: int) -> None:
-    """Zeros in the registers of a block that do not move with the orders, and its numbers."""
+    """Clear the constant registers of a block, and store its numbers."""
     length = orders * WIDTH
     for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
         pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1

@@ -1,9 +1,9 @@
-"""The compiled loop over steps and events: all nodes step together, an event restarts those that it touches.
+"""This module is the compiled loop: all nodes step together, and an event restarts the nodes that it affects.
 
-The series of a node far from an event are the same before and after it: a jump of an acceleration changes coefficient
-2 + 2 r of the positions r couplings away, so that beyond half the order nothing changes at all, and nearer what changes
-is soon below the tolerance. So an event expands again a patch around it, with the series of its surroundings as they
-are; the patch is made larger until what it would change outside is below a share of the tolerance.
+The series of a node far from an event does not change: a jump of an acceleration changes coefficient 2 + 2 r
+of the positions r couplings away. Beyond half the order nothing changes, and nearer nodes soon change by less
+than the tolerance. An event therefore expands only a patch around it again, with the existing series of the
+surroundings. The patch grows until its effect on the outside is below a fraction of the tolerance.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from hybridsim.mechanics.polynomials import shift, states_at
 from hybridsim.mechanics.runs import gather_run
 from hybridsim.mechanics.steps import first_leaf, set_time, stretched
 
-# flags: a step is to be begun; it is the last; radius of patches; events at one instant; node of the last event
+# flags: a step must begin; it is the last; radius of patches; events at one instant; node of the last event
 FRESH, LAST, RADIUS, ROUNDS, WHERE = range(5)
-_SHARE = 0.1  # of the tolerance, that a patch may change outside
+_SHARE = 0.1  # of the tolerance; the change that a patch may cause outside
 _ROUNDS = 1000  # events of one node at one instant
 
 
 @kernel
 def _hold(plant: Any, state: Any, room: Any) -> None:
-    """Phases of bases and forcing at the clock, and velocities there that meet the constraints of what sticks."""
+    """Compute the phases of bases and forcing at the clock, and make velocities satisfy the stick constraints."""
     for r in range(plant.rates.shape[0]):
         state.phase[r] = phase_of(state.clock[0], state.clock[1], plant.rates[r], 0.0)
     for j in range(plant.node_dof.shape[0] - 1):
@@ -39,7 +39,7 @@ def _hold(plant: Any, state: Any, room: Any) -> None:
 
 @kernel
 def _begin_step(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, left: float) -> bool:
-    """Expand all nodes at the origin of a step, and set its length."""
+    """Expand all nodes at the origin of a step, and set the length of the step."""
     rtol, longest, top, keep, _ = control
     _hold(plant, state, room)
     count = plant.node_dof.shape[0] - 1
@@ -85,9 +85,9 @@ def _keep(plant: Any, state: Any, room: Any, record: Any, count: int, tau: float
 
 @kernel
 def _grow(plant: Any, room: Any, j: int, radius: int, most: int) -> tuple[int, int]:
-    """Nodes within `radius` couplings of node j, to room.nodes; their number, and where the outermost begin.
+    """Write the nodes within `radius` couplings of j to room.nodes; return their number and the first outer one.
 
-    (-1, 0) where they are more than `most`.
+    Returns (-1, 0) if there are more than `most`.
     """
     room.stamp[-1] += 1
     now, count, outer = room.stamp[-1], 1, 0
@@ -106,7 +106,7 @@ def _grow(plant: Any, room: Any, j: int, radius: int, most: int) -> tuple[int, i
                     room.nodes[count] = other
                     count += 1
         if end == count:
-            return count, count  # the whole component: nothing outside
+            return count, count  # the whole component: nothing is outside
         outer = end
     return count, outer
 
@@ -124,7 +124,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """What the new series of the outermost nodes change outside the patch over a time h, in tolerances."""
+    """Return the change that the new series of the outermost nodes cause outside over a time h, in tolerances."""
     worst = 0.0
     for i in range(outer, count):
         j = room.nodes[i]
@@ -137,7 +137,7 @@ def _changes_outside(
                 velocity += k * difference * power * h
                 power *= h
                 position += difference * power * h
-            # what it does to a coordinate y outside: |d a_y| <= |K_yx| position + |C_yx| velocity
+            # effect on an outside coordinate y: |d a_y| <= |K_yx| position + |C_yx| velocity
             for e in range(plant.near_ptr[j], plant.near_ptr[j + 1]):
                 other = plant.near[e]
                 if room.loc[plant.node_dof[other]] < nd:
@@ -160,7 +160,7 @@ def _changes_outside(
 def _restart(
     plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
-    """Expand a patch around node j at tau: 1 done, 0 it would be most of the system, -1 there are no series."""
+    """Expand a patch around node j at tau; return 1 if done, 0 if it is too large, -1 without a series."""
     rtol, _, top, keep, _ = control
     nodes = plant.node_dof.shape[0] - 1
     left = state.clock[2] - tau
@@ -195,7 +195,7 @@ def _restart(
         set_time(state.tree, c, state.until[c])
     for i in range(count):
         state.origin[room.nodes[i]] = tau
-    if h < left:  # the step ends for all where the first series ends
+    if h < left:  # the step of all nodes ends where the first series ends
         state.clock[2], state.flags[LAST] = tau + h, 0
     if keep:
         _keep(plant, state, room, record, count, tau)
@@ -220,7 +220,7 @@ def _note(plant: Any, state: Any, room: Any, record: Any, j: int, tau: float, fi
 
 @kernel
 def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
-    """All positions and velocities at tau, which becomes the origin."""
+    """Move all positions and velocities to tau, which becomes the origin."""
     for x in range(plant.dof_node.shape[0]):
         room.acc[x] = tau - state.origin[plant.dof_node[x]]
     for x in range(0, plant.dof_node.shape[0], WIDTH):
@@ -230,7 +230,7 @@ def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
     for x in range(plant.dof_node.shape[0]):
         state.x[0, x], state.x[1, x] = room.sums[0, x], room.sums[1, x]
     for c in range(plant.con_node.shape[0]):
-        state.stamp[c] = 0.0 if state.stamp[c] == tau else -1.0  # zeros by decree hold at this instant only
+        state.stamp[c] = 0.0 if state.stamp[c] == tau else -1.0  # exact zeros hold at this instant only
     high, error = two_sum(state.clock[0], tau)
     state.clock[0], state.clock[1] = two_sum(high, error + state.clock[1])
     state.clock[3] = 0.0
@@ -239,9 +239,9 @@ def _end_step(plant: Any, state: Any, room: Any, tau: float) -> None:
 
 @kernel
 def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any, target: Any) -> int:
-    """Go on to the target (high, low), or until nothing can follow (see `arrays`).
+    """Continue to the target (high, low), or until no continuation exists (see `arrays`).
 
-    FULL says that the record is full, or that as many steps or events are done as one call may take.
+    It returns FULL if the record is full, or after the largest number of steps and events of one call.
     """
     nodes, m, n = plant.node_dof.shape[0] - 1, plant.con_node.shape[0], plant.dof_node.shape[0]
     while True:
@@ -254,7 +254,7 @@ def run(plant: Any, laws: Any, state: Any, room: Any, record: Any, control: Any,
         if state.flags[FRESH]:
             left = (target[0] - state.clock[0]) + (target[1] - state.clock[1])
             if not left > 0.0:
-                _hold(plant, state, room)  # the series of the last step meets them to its tolerance only
+                _hold(plant, state, room)  # the series of the last step satisfy them only to the tolerance
                 return DONE
             if not _begin_step(plant, laws, state, room, record, control, left):
                 return LOST

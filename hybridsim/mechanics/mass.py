@@ -1,4 +1,4 @@
-"""The mass matrix is checked when a mechanical system is declared: symmetric and positive definite."""
+"""This module checks that a mass matrix is symmetric and positive definite."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from hybridsim.errors import UsageError
 
 _PIVOT = (
     2.0**-49
-)  # for each coordinate: a pivot below this share of its diagonal entry is the rounding of zero
-_ASYMMETRY = 1e-12  # of the largest entry: what assembling a matrix in doubles leaves
+)  # per coordinate: a smaller pivot, relative to its diagonal entry, is a rounding error of zero
+_ASYMMETRY = 1e-12  # relative to the largest entry; the asymmetry that assembly in doubles may leave
 
 
 def require_positive_definite(M: Any, name: str) -> None:
@@ -23,7 +23,7 @@ def require_positive_definite(M: Any, name: str) -> None:
     Raises
     ------
     UsageError
-        For a matrix that is not symmetric and one that is not positive definite.
+        For a matrix that is not symmetric, or not positive definite.
     """
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu

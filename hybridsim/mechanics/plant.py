@@ -1,8 +1,8 @@
-"""A mechanical system as arrays for the kernels: accelerations, Delassus matrices of clusters, laws as tapes.
+"""This module converts a mechanical system to arrays for the kernels: accelerations, Delassus matrices, law tapes.
 
-Coordinates that are coupled in the mass matrix, or by a common contact, form a *node*; coordinates and contacts are
-renumbered so that those of a node are neighbours. Accelerations jump within a node only, so that an event is
-decided there.
+Coordinates that are coupled by the mass matrix, or by a common contact, form a *node*. Coordinates and
+contacts are renumbered so that those of a node are consecutive. Accelerations jump within a node only, so
+that an event is decided there.
 """
 
 from __future__ import annotations
@@ -21,59 +21,50 @@ from hybridsim.expr.evaluate import evaluate
 from hybridsim.mechanics.bands import in_bands
 from hybridsim.mechanics.system import Harmonic, MechanicalContact, MechanicalSystem
 
-MOST_COUPLED = 3000  # coordinates coupled in the mass matrix whose inverse is made: 72 MB
+MOST_COUPLED = 3000  # largest number of coordinates in a dense inverse of the mass matrix: 72 MB
 
 
 class Plant(NamedTuple):
-    """What does not change in a run; sparse matrices are (ptr, col, val), rows in the plant's own order.
+    """The arrays that are constant in a run; sparse matrices are (ptr, col, val), rows in the order of the nodes."""
 
-    node_dof, node_con: first coordinate and contact of each node. k, c: M^-1 K and M^-1 C; b: M^-1 W^T (rows:
-    coordinates, columns: contacts); w: W (rows: contacts); g: W M^-1 W^T of each node, dense, one after
-    another. near: neighbours. still: constant acceleration. h: harmonics of each coordinate: number of the
-    rate, amplitudes of sine and cosine. base: (m, 3) constant, sine, cosine of the base's speed; base_rate: -1
-    where it is constant. limits (m, 2), smooth (m, 2): most force in stick, forward and backward, and whether
-    that at the onset of slip agrees with it by algebra. tape (m, 2): number of the tape of slip. par (m, p):
-    its constants. unit: contacts with one weight only. offsets, bands: `hybridsim.mechanics.bands`.
-    """
-
-    node_dof: np.ndarray
-    node_con: np.ndarray
-    dof_node: np.ndarray
-    con_node: np.ndarray
-    k_ptr: np.ndarray
+    node_dof: np.ndarray  # first coordinate of each node
+    node_con: np.ndarray  # first contact of each node
+    dof_node: np.ndarray  # node of each coordinate
+    con_node: np.ndarray  # node of each contact
+    k_ptr: np.ndarray  # k: M^-1 K
     k_col: np.ndarray
     k_val: np.ndarray
-    c_ptr: np.ndarray
+    c_ptr: np.ndarray  # c: M^-1 C
     c_col: np.ndarray
     c_val: np.ndarray
-    b_ptr: np.ndarray
+    b_ptr: np.ndarray  # b: M^-1 W^T (rows: coordinates, columns: contacts)
     b_col: np.ndarray
     b_val: np.ndarray
-    w_ptr: np.ndarray
+    w_ptr: np.ndarray  # w: W (rows: contacts)
     w_col: np.ndarray
     w_val: np.ndarray
-    g_ptr: np.ndarray
+    g_ptr: np.ndarray  # g: W M^-1 W^T of each node, dense, one after another
     g_val: np.ndarray
-    near_ptr: np.ndarray
+    near_ptr: np.ndarray  # neighbours of each node
     near: np.ndarray
-    still: np.ndarray
-    h_ptr: np.ndarray
-    h_rate: np.ndarray
-    h_val: np.ndarray
-    rates: np.ndarray
-    base: np.ndarray
-    base_rate: np.ndarray
-    limits: np.ndarray
-    smooth: np.ndarray
-    tape: np.ndarray
-    par: np.ndarray
-    unit: np.ndarray
-    offsets: np.ndarray
+    still: np.ndarray  # (n,) constant acceleration
+    h_ptr: np.ndarray  # harmonics of each coordinate
+    h_rate: np.ndarray  # number of the angular rate
+    h_val: np.ndarray  # amplitudes of sine and cosine
+    rates: np.ndarray  # angular rates
+    base: np.ndarray  # (m, 3) constant, sine, cosine of the speed of each base
+    base_rate: np.ndarray  # (m,) number of its rate, or -1 if it is constant
+    limits: np.ndarray  # (m, 2) stick limits, forward and backward
+    smooth: np.ndarray  # (m, 2) whether the slip force at v = 0 is algebraically equal to the limit
+    tape: np.ndarray  # (m, 2) number of the tape of the slip force
+    par: np.ndarray  # (m, p) constants of the law
+    unit: np.ndarray  # (m,) whether the contact has one weight only
+    offsets: np.ndarray  # see `hybridsim.mechanics.bands`
     bands: np.ndarray
 
 
 class Laws(NamedTuple):
-    """The tapes of all laws: rows of each one after another, registers of what goes in and comes out."""
+    """The tapes of all laws: their rows one after another, and the registers of inputs and outputs."""
 
     rows: np.ndarray
     row_ptr: np.ndarray
@@ -91,7 +82,7 @@ class Laws(NamedTuple):
 
 @dataclass(frozen=True)
 class Built:
-    """The arrays, and where the system's coordinates and contacts are in them (new number -> old)."""
+    """The arrays, and the declared numbers of their coordinates and contacts."""
 
     plant: Plant
     laws: Laws
@@ -101,12 +92,12 @@ class Built:
 
 
 def build(system: MechanicalSystem) -> Built:
-    """Arrange a system for the kernels.
+    """Convert a system to arrays for the kernels.
 
     Raises
     ------
     UsageError
-        Where the mass matrix couples too many coordinates.
+        If the mass matrix couples too many coordinates.
     """
     n, m = system.n, len(system.contacts)
     rows = np.repeat(np.arange(m), [len(c.direction) for c in system.contacts]).astype(np.int64)
@@ -152,20 +143,20 @@ def build(system: MechanicalSystem) -> Built:
 
 
 def rates_of(system: MechanicalSystem) -> list[float]:
-    """All angular frequencies, ascending."""
+    """Return all angular frequencies in ascending order."""
     of_forces = {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
     return sorted(of_forces | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})
 
 
 def _inverse(system: MechanicalSystem) -> Any:
-    """M^-1, block by block: sparse where M falls into small blocks."""
+    """Return M^-1 block by block, sparse if M consists of small blocks."""
     M = system.M
     count, label = connected_components(M, directed=False)
     largest = np.bincount(label).max()
     if largest > MOST_COUPLED:
         raise UsageError(
-            f"{system.name}: the mass matrix couples {largest} coordinates, {MOST_COUPLED} are allowed",
-            remedy="lump the masses, so that M is diagonal or falls into blocks",
+            f"{system.name}: the mass matrix couples {largest} coordinates; at most {MOST_COUPLED} are supported",
+            remedy="lump the masses, so that M is diagonal or has small diagonal blocks",
         )
     if count == system.n:
         return sparse.csr_array(sparse.diags_array(1.0 / M.diagonal()))
@@ -179,12 +170,12 @@ def _inverse(system: MechanicalSystem) -> Any:
 
 
 def integers(values: Any) -> np.ndarray:
-    """Whole numbers for kernels."""
+    """Return an array of integers for kernels."""
     return np.ascontiguousarray(values, dtype=np.int64)
 
 
 def parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A sparse matrix by rows: (ptr, col, val)."""
+    """Return a sparse matrix by rows: (ptr, col, val)."""
     matrix = sparse.csr_array(matrix)
     matrix.eliminate_zeros()
     matrix.sort_indices()
@@ -192,7 +183,7 @@ def parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes that act on each other through stiffness or damping."""
+    """Return the nodes that act on each other through stiffness or damping."""
     entries = sparse.coo_array(coupling)
     kept = entries.data != 0
     a, b = node_of[entries.row[kept]], node_of[entries.col[kept]]
@@ -206,7 +197,7 @@ def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndar
 def forcing(
     system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]
 ) -> tuple[Any, tuple[Any, Any, Any]]:
-    """Constant acceleration (n,), and (ptr, rate, [sine, cosine]) of each coordinate; forces if M is 1."""
+    """Return the constant acceleration (n,), and (ptr, rate, [sine, cosine]) of harmonics."""
     n, place = system.n, np.argsort(dofs)
     still = np.zeros(n)
     entries: dict[tuple[int, int], np.ndarray] = {}
@@ -232,7 +223,7 @@ def forcing(
 
 
 def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 3) constant, sine, cosine of the speed of each base, and the number of its rate, -1 where it is constant."""
+    """Return (m, 3) constant, sine, cosine of the speed of each base, and the number of its rate (-1 if constant)."""
     base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
     for i, contact in enumerate(contacts):
         if isinstance(contact.base, Harmonic):
@@ -243,7 +234,7 @@ def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.nda
 
 
 def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
-    """Most force in stick, forward and backward, and whether the force at the onset of slip is the same."""
+    """Return the stick limits, forward and backward, and whether they equal the force at the onset of slip."""
     limits = np.zeros((len(contacts), 2))
     smooth = np.zeros((len(contacts), 2), dtype=np.int64)
     for i, contact in enumerate(contacts):
@@ -255,18 +246,18 @@ def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndar
             if limits[i, side] < 0.0 or onset < 0.0:
                 raise ModelError(
                     f"contact {contact.name}: the law '{law.name}' gives a negative force at rest",
-                    remedy="give magnitudes: slip and stick are >= 0",
+                    remedy="write slip and stick as magnitudes, which are >= 0",
                 )
     return limits, smooth
 
 
 def sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-    """(slip, stick), forward and backward."""
+    """Return (slip, stick) forward and backward."""
     return (law.slip, law.stick), (law.slip_backward or law.slip, law.stick_backward or law.stick)
 
 
 def law_tapes(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
-    """Tapes, their number for each contact and side, and the constants of each contact."""
+    """Return the tapes, their number for each contact and side, and the constants of each contact."""
     tapes: list[ScalarTape] = []
     known: dict[tuple[str, str], int] = {}
     number = np.zeros((len(contacts), 2), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Polynomials by their coefficients: values, and the same about another point."""
+"""This module evaluates polynomials given by their coefficients, and shifts them to another point."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from hybridsim.engine.eight import WIDTH, load, splat, store
 from hybridsim.engine.jit import inlined, kernel
 
-TERMS = 32  # the most that a series has: 31 for a relative tolerance of 1e-15
+TERMS = 32  # the largest number of terms: 31 for a relative tolerance of 1e-15
 _CHOICES = np.array([[float(comb(i, k)) for k in range(TERMS)] for i in range(TERMS)])
 
 
 @inlined
 def value_and_slope(series: Any, d: float) -> tuple[float, float]:
-    """A polynomial and its derivative at d (Horner)."""
+    """Return a polynomial and its derivative at d (Horner)."""
     value, slope = series[series.shape[0] - 1], 0.0
     for k in range(series.shape[0] - 2, -1, -1):
         slope = slope * d + value
@@ -26,7 +26,7 @@ def value_and_slope(series: Any, d: float) -> tuple[float, float]:
 
 @inlined
 def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
-    """The polynomial in a column, and its derivative, at d (Horner)."""
+    """Return the polynomial in a column and its derivative at d (Horner)."""
     value, slope = series[series.shape[0] - 1, x], 0.0
     for k in range(series.shape[0] - 2, -1, -1):
         slope = slope * d + value
@@ -36,7 +36,7 @@ def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
 
 @inlined
 def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
-    """The same for eight columns, each at its own d."""
+    """Return the polynomials and derivatives in eight columns, each at its own d."""
     wide = series.shape[1]
     value, slope = load(series, (series.shape[0] - 1) * wide + x), splat(0.0)
     for k in range(series.shape[0] - 2, -1, -1):
@@ -47,16 +47,16 @@ def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
 
 @kernel
 def shift(series: Any, x: int, d: float, top: int, out: Any) -> None:
-    """Coefficients 0..top of the polynomial in column x about d: sum_i series_i C(i, k) d**(i - k).
+    """Compute coefficients 0..top of the polynomial in column x about d: sum_i series_i C(i, k) d**(i - k).
 
-    out: room for 3 TERMS numbers; behind the result are the powers, d**(last - m) at TERMS + m, and last d itself.
+    out: an array of 3 TERMS numbers. Behind the result it caches the powers d**(last - m) at TERMS + m, and d last.
     """
     last = series.shape[0] - 1
     if d == 0.0:
         for k in range(last + 1):
             out[k] = series[k, x]
         return
-    if out[3 * TERMS - 1] != d:  # neighbours often begin at one time
+    if out[3 * TERMS - 1] != d:  # neighbours often have equal d
         power = 1.0
         for m in range(last, -1, -1):
             out[TERMS + m] = power

@@ -1,4 +1,4 @@
-"""What the results of mechanical systems have in common: names, tables, and what they leave to ordinary models."""
+"""This module defines the common parts of the results of mechanical systems: names, tables, and missing features."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from hybridsim.mechanics.system import MechanicalSystem
     from hybridsim.solution import ModeInterval
 
-_ALONE = "run to_model() of the system, whose Solution has it (for contacts whose velocities are independent)"
+_ALONE = "simulate system.to_model(), whose Solution has it (if the contact velocities are independent)"
 _INSTEAD = {
-    "save": "to_npz() writes its table and events; or run to_model() of the system, whose Solution can be saved",
-    "resume": "simulate the rest from x0=sol.x_end, as a run of its own; or run to_model() of the system",
-    "corners": "laws with corners are no part of a MechanicalSystem",
+    "save": "to_npz() writes its table and events; to save all of it, simulate system.to_model()",
+    "resume": "start a new run from x0=sol.x_end, or simulate system.to_model()",
+    "corners": "a MechanicalSystem has no laws with corners",
 }
 
 
 class ArraysResult(InTables):
-    """A run of a system that is given as arrays."""
+    """The base class of results of a system given as arrays."""
 
     model: MechanicalSystem
     integrator: str
@@ -65,29 +65,29 @@ class ArraysResult(InTables):
     @property
     @abstractmethod
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """For each component its modes in order, with the stretch of time of each."""
+        """The modes of each component in order, with the time interval of each."""
 
     @property
     @abstractmethod
     def quantities(self) -> tuple[str, ...]:
-        """Names of what `output` knows beside the states."""
+        """Names of the quantities of `output` in addition to the states."""
 
     @abstractmethod
     def _values(self, name: str, t: np.ndarray, right: bool) -> np.ndarray:
-        """A quantity just after some times, or just before them."""
+        """Return a quantity just after some times, or just before them."""
 
     def table(self, points: int | None = None) -> Table:
-        """Times, states, forces, relative velocities and modes in columns.
+        """Return times, states, forces, relative velocities and modes as columns.
 
         Parameters
         ----------
-        points : how many equal steps of time to take, both ends included; without it ``sol.t``: each event time twice,
-            on both its sides, or the grid of `simulate`.
+        points : the number of equally spaced times, both ends included; without it ``sol.t``, with both sides
+        of each event time, or the grid of `simulate`.
         """
         from hybridsim.solution.tabulated import equal_steps
 
         t = self.t if points is None else equal_steps(self.t_start, self.t_end, points)
-        before = np.append(np.diff(t) == 0.0, False)[: len(t)]  # of a time that stands twice, the first
+        before = np.append(np.diff(t) == 0.0, False)[: len(t)]  # the first of two equal times
         columns = {}
         for name in (*self.names, *self.quantities):
             columns[name] = self._values(name, t, True)
@@ -104,19 +104,19 @@ class ArraysResult(InTables):
         return Table(t, columns, modes, {}, about)
 
     def _within(self, t: Any) -> np.ndarray:
-        """Times (k,) out of a number or an array of them, all of which lie in the run."""
+        """Return times (k,) from a number or an array, after checking that they lie in the run."""
         times = as_times(t)
         inside = (times >= self.t_start) & (times <= self.t_end)
         if not inside.all():
             bad = float(times[~inside][0])
             raise UsageError(
-                f"t = {bad!r} is outside of the run, which goes from {self.t_start!r} to {self.t_end!r}",
+                f"t = {bad!r} is outside of the run, which covers t = {self.t_start!r} to {self.t_end!r}",
                 remedy="give times within it",
             )
         return times
 
     def _asked(self, component: Any, kind: Any, names: list[str]) -> None:
-        """Refuse a component that the run does not have, and a kind that is no word."""
+        """Refuse an unknown component, or a kind that is not a string."""
         self._require_events()
         known_name(component, names, f"{self.model.name} has no component", "components")
         if kind is not None:
@@ -132,11 +132,12 @@ class ArraysResult(InTables):
     def _require_events(self) -> None:
         if self._save == "nothing":
             raise UsageError(
-                "the run was made with save='nothing', which keeps no events", remedy="save='events'"
+                "the run was made with save='nothing', which keeps no events",
+                remedy="run it with save='events'",
             )
 
     def __getattr__(self, name: str) -> NoReturn:
-        """What a `Solution` has and this has not: an AttributeError that says what to do instead."""
+        """Raise an AttributeError that names the alternative for a feature that only `Solution` has."""
         kind = type(self).__name__
         if name.startswith("_") or not hasattr(Solution, name):
             raise AttributeError(f"{kind} has no {name!r}", name=name, obj=self)

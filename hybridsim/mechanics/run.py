@@ -1,4 +1,4 @@
-"""Runs a mechanical system: arrays out, kernels called until the end, pieces and events collected."""
+"""This module runs a mechanical system: it prepares the arrays, calls the kernels, and collects pieces and events."""
 
 from __future__ import annotations
 
@@ -49,18 +49,16 @@ STATUS = {
     LIMITED: "limit",
 }  # fmt: skip
 _ROOM = 1 << 20  # doubles for the series of one call
-_EVENTS = 4096  # events that one call has room for, beside those of one node
-_WORK = (
-    1 << 20
-)  # coordinates times steps and events of one call: about 0.1 s, after which limits are looked at
+_EVENTS = 4096  # events per call, in addition to those of one node
+_WORK = 1 << 20  # coordinates times (steps + events) per call: about 0.1 s between checks of the limits
 _TIGHTEST = 1e-15
-_RADIUS = 2  # of the first patch; it adapts
-_RANGE = 280  # decades of a double, some left for what the powers are multiplied with
-_LEAST = 10  # order below which a series is not worth its steps
+_RADIUS = 2  # radius of the first patch; it adapts
+_RANGE = 280  # decades of a double, less a margin for the factors of the powers
+_LEAST = 10  # a lower order makes series useless
 
 
 def _order_in_range(built: Built, span: tuple[float, float]) -> int:
-    """The order up to which rates and times to its power are doubles, whatever the unit of time is."""
+    """Return the order up to which powers of rates and times are doubles, whatever the unit of time."""
     plant = built.plant
     rates = [abs(plant.k_val).max(initial=0.0) ** 0.5, abs(plant.c_val).max(initial=0.0), *plant.rates]
     sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
@@ -68,20 +66,20 @@ def _order_in_range(built: Built, span: tuple[float, float]) -> int:
     order = int(_RANGE / max(decades, 1.0))
     if order < _LEAST:
         raise UsageError(
-            f"rates up to {max(rates):.3g} over a span of {span[1] - span[0]:.3g} leave the range of numbers",
-            remedy="choose a unit of time in which they are nearer to one",
+            f"rates up to {max(rates):.3g} over a span of {span[1] - span[0]:.3g} exceed the range of numbers",
+            remedy="choose a unit of time in which the rates are closer to 1",
         )
     return order
 
 
 class MechanicalRun:
-    """One run; `go` carries it out."""
+    """One run of a mechanical system; `go` carries it out."""
 
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
                  max_step: float, keep: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
         self.built, self.span = built, span
         self.rtol, self.keep = max(rtol, _TIGHTEST), keep
-        # coupled coordinates make the linear part of a series the dearer one, as where there is no convolution at all
+        # the linear part of a series is the more expensive one for coupled coordinates
         self.order = min(series_order(self.rtol, linear=True), _order_in_range(built, span))
         self.max_step, self.limits = max_step, limits
         self.state = new_state(built, self.order)
@@ -97,7 +95,7 @@ class MechanicalRun:
         self.counters, self.compile_time = Counters(), 0.0
 
     def go(self, progress: Callable[[float], None] | None) -> None:
-        """Run to the end of the span, or to where nothing can follow."""
+        """Run to the end of the span, or until no continuation exists."""
         plant, laws = packed(self.built.plant), packed(self.built.laws)
         state, room = packed(self.state), packed(self.room)
         began, compiled = perf_counter(), seconds_compiling()
@@ -128,11 +126,11 @@ class MechanicalRun:
         self.kernel_time = perf_counter() - began - self.compile_time
 
     def _count(self) -> None:
-        """Bring the counters of steps and events up to date."""
+        """Update the counters of steps and events."""
         self.counters.steps, self.counters.events = self.state.counts[:2].tolist()
 
     def _settle_start(self, *packs: Any) -> int:
-        """Modes at the start: by the sign of what moves, decided where it does not."""
+        """Find the modes at the start: by sign for moving contacts, by decision for resting ones."""
         plant, state = self.built.plant, self.state
         state.series[:2, : len(plant.dof_node)] = state.x
         for r, rate in enumerate(plant.rates):
@@ -150,18 +148,18 @@ class MechanicalRun:
 
     @property
     def time(self) -> float:
-        """Where the run is."""
+        """The time that the run has reached."""
         clock = self.state.clock
         return float(clock[0] + clock[1] + (0.0 if self.state.flags[FRESH] else clock[3]))
 
     @property
     def node_contacts(self) -> list[int]:
-        """The contacts (old numbers) of the node where the run stopped."""
+        """The contacts (declared numbers) of the node at which the run stopped."""
         j, plant = int(self.state.flags[WHERE]), self.built.plant
         return [int(self.built.contacts[c]) for c in range(plant.node_con[j], plant.node_con[j + 1])]
 
     def start_piece(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A piece for each node that holds the start alone: all there is of a run that ends where it begins."""
+        """Return a piece per node with the start only, for a run that ends where it begins."""
         node_dof = self.built.plant.node_dof
         nodes = len(node_dof) - 1
         start = np.zeros((nodes, 3))
@@ -196,7 +194,7 @@ class MechanicalRun:
 
 @kernel
 def _settle_nodes(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Decide the nodes at the start, one after another, up to the first that has no decision."""
+    """Decide the nodes at the start one by one, up to the first without a decision."""
     for j in range(plant.node_dof.shape[0] - 1):
         state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
         code = call_kernel(state.kernels[DECIDE], (plant, laws, state, room))
@@ -207,12 +205,12 @@ def _settle_nodes(plant: Any, laws: Any, state: Any, room: Any) -> int:
 
 
 def reach_kernels(arrays: State, *packs: Any) -> None:
-    """Compile the large kernels if need be, and put their addresses where the others find them."""
+    """Compile the large kernels if necessary, and store their addresses for other kernels."""
     arrays.kernels[:BERNSTEIN] = [kernel_address(function, *packs) for function in (expand, stretch, decide)]
 
 
 def new_state(built: Built, order: int) -> State:
-    """A state of zeros."""
+    """Return a state of zeros."""
     plant = built.plant
     nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
     leaves = 1 << max(m, 1).bit_length()
@@ -229,14 +227,14 @@ def new_state(built: Built, order: int) -> State:
 
 
 def new_room(built: Built, order: int) -> Room:
-    """Scratch arrays."""
+    """Return the scratch arrays."""
     plant, laws = built.plant, built.laws
     nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
     widest = max(int(np.diff(plant.node_con).max(initial=0)), 2)
     columns, tapes = order + 1, len(laws.registers)
     registers = int(laws.registers.max(initial=0))
     ints: dict[str, Any] = {"dtype": np.int64}
-    beside = WIDTH + int(abs(plant.offsets).max(initial=0))  # lanes of what stands beside a run
+    beside = WIDTH + int(abs(plant.offsets).max(initial=0))  # lanes next to a run
     wide = -(-(max(n, m) + 2 * beside) // WIDTH) * WIDTH
     return Room(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),

@@ -1,7 +1,8 @@
-"""Taylor series of a run of neighbours, eight at once: `hybridsim.mechanics.expansion` for blocks that stand in a row.
+"""This module computes Taylor series of a run of neighbouring blocks, eight at a time.
 
-Coordinate and contact a of the patch are number first + a of the system. The series of what is beside the run stand in
-the lanes before the first and after the last; what acts on nothing is zero there.
+It does the work of `hybridsim.mechanics.expansion` for blocks in a row. Coordinate and contact a of the patch
+have number first + a in the system. The lanes before and after the run hold the series of its neighbours, or
+zeros.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from hybridsim.mechanics.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WE
 from hybridsim.mechanics.lanes import advance_lanes, clear
 from hybridsim.mechanics.polynomials import shift, state_at
 
-# Rows of a strip: direction of slip of what is in the run; what stands beside it; what a velocity is forward, and the
-# base; what a force does; what holds; constant acceleration; diagonals.
+# Rows of a strip: direction of slip inside the run; series of the neighbours; sign of the velocity and the
+# base; effect of a force; holding; constant acceleration; diagonals.
 _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range(8)
 
 
 @kernel
 def gather_run(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) -> bool:
-    """Put the values at tau of a patch in place, as `gather` does, if it is a run of neighbours."""
+    """Store the values of a patch at tau as `gather` does, if it is a run of neighbours."""
     first, last = room.nodes[0], room.nodes[0]
     for i in range(count):
         first, last = min(first, room.nodes[i]), max(last, room.nodes[i])
@@ -49,9 +50,9 @@ def gather_run(plant: Any, state: Any, room: Any, count: int, tau: float, top: i
 
 @kernel
 def clear_beside(plant: Any, room: Any, count: int, top: int) -> None:
-    """Zeros in the lanes around a run, as far as anything acts."""
+    """Write zeros into the lanes around a run, as far as coupling reaches."""
     wide, offsets = room.Q.shape[1], plant.offsets
-    before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # the rest of the last vector among them
+    before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including the rest of the last vector
     for k in range(top + 1):
         clear(room.Q, k * wide - whole_vectors(before), before)
         clear(room.Q, k * wide + count, after)
@@ -64,10 +65,10 @@ def _height(plant: Any) -> int:
 
 @kernel
 def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: int, orders: int) -> None:
-    """Put what belongs to each eight of the run side by side: strips, and the constants of the law.
+    """Lay out strips and law constants for each eight of the run.
 
-    All contacts are lanes. Of what does not move the higher coefficients are zero from the beginning, and what was laid
-    out for the same eight before is there still.
+    Every contact is a lane. Higher coefficients of constants are zero from the start, and the layout of the
+    same eight is reused.
     """
     length, block, height = plant.bands.shape[1], laws.registers[0] * orders * WIDTH, _height(plant)
     strips, bands, W = room.strips, plant.bands, room.W
@@ -99,8 +100,8 @@ def _lay_out(plant: Any, laws: Any, state: Any, room: Any, first: int, count: in
 
 @kernel
 def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: int) -> None:
-    """Series of the run that was gathered: Q (positions), R (relative velocities), F (forces)."""
-    orders = room.Q.shape[0]  # the same whatever is asked for, so that what was laid out stays
+    """Compute the series of the gathered run: Q (positions), R (relative velocities), F (forces)."""
+    orders = room.Q.shape[0]  # the same for every request, so that the layout remains valid
     _lay_out(plant, laws, state, room, state.whole[FIRST], count, orders)
     Q, R, F, W, strips, offsets = room.Q, room.R, room.F, room.W, room.strips, plant.offsets
     wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
@@ -149,7 +150,7 @@ def expand_run(plant: Any, laws: Any, state: Any, room: Any, count: int, top: in
 
 @kernel
 def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, share: float) -> bool:
-    """Whether the forces in room.sums are what the law says at the velocities there, to a share of their terms."""
+    """Return whether the forces in room.sums agree with the law at the velocities there, relative to their terms."""
     sums, W, strips = room.sums, room.W, room.strips
     orders, wide, height = room.Q.shape[0], sums.shape[1], _height(plant)
     block = laws.registers[0] * orders * WIDTH
@@ -168,7 +169,7 @@ def law_holds_in_run(plant: Any, laws: Any, room: Any, count: int, share: float)
         a, slip = g * WIDTH, load(strips, g * height + _SLIP * WIDTH)
         off = size(load(sums, wide + a) - slip * load(W, g * block + out))
         beyond = off - splat(share) * load(sums, 2 * wide + a)
-        # no number where that is none
+        # NaN if a value is NaN
         worst = worst + choose(slip, larger(beyond, zero) + zero * beyond, zero)
     store(sums, 0, worst)
     for i in range(WIDTH):

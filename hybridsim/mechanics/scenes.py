@@ -1,4 +1,4 @@
-"""Known systems of several blocks with friction, with the number of blocks and their values as arguments."""
+"""This module builds known systems of several blocks with friction, with adjustable numbers and values."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def chain_on_belt(
     coupling, leaf : float, optional
         Stiffness between neighbours, and of each block to the frame.
     delta, belt : float, optional
-        How fast friction falls with speed, and the belt's speed.
+        Decrease of friction with speed, and the belt's speed.
     spread, seed : float, int, optional
-        The blocks start at rest, at random within +-spread.
+        The blocks start at rest, at random places within +-spread.
     gap, restitution : float, optional
-        Given, neighbours collide where they come closer by so much than they are with all springs slack.
+        If given, neighbours collide when their distance is smaller by this gap than with slack springs.
 
     Returns
     -------
@@ -55,11 +55,11 @@ def chain_on_belt(
     Raises
     ------
     UsageError
-        For a gap that the start may overlap: spread has to be below gap/2.
+        For a gap in which the start may overlap: spread must be below gap/2.
 
     Notes
     -----
-    Events that run along the chain; with one block it is the model ``belt``.
+    Events travel along the chain. With one block it is the model ``belt``.
 
     References
     ----------
@@ -90,7 +90,7 @@ def chain_on_belt(
     ]
     if gap is not None and not 2.0 * spread < gap:
         raise UsageError(
-            f"gap is {gap!r}, and the blocks start within +-{spread!r}", remedy="give a spread below gap/2"
+            f"gap is {gap!r}, but the blocks start within +-{spread!r}", remedy="give a spread below gap/2"
         )
     stops = range(n - 1) if gap is not None else ()
     return MechanicalSystem(
@@ -121,7 +121,7 @@ def two_blocks_on_belt(
     second : float, optional
         Load of the second block, that of the first is 1.
     delta, belt : float, optional
-        How fast friction falls with speed, and the belt's speed.
+        Decrease of friction with speed, and the belt's speed.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def two_blocks_on_belt(
 
     Notes
     -----
-    Both stick together, the first is pulled off, and what it does then decides when the second follows.
+    Both blocks stick together, the first is pulled off, and its motion then determines when the second follows.
 
     References
     ----------
@@ -166,10 +166,10 @@ def three_coupled_blocks(
     Parameters
     ----------
     mu : tuple of float, optional
-        Of the contacts from below; the blocks have mass 1 each and g = 10, so that the loads are 30, 20 and
-        10.
+        Coefficients of friction from the lowest contact up; the blocks have mass 1 and g = 10, so that the
+        loads are 30, 20 and 10.
     amplitude, omega : float, optional
-        Of the force on the middle block.
+        Amplitude and angular frequency of the force on the middle block.
 
     Returns
     -------
@@ -178,8 +178,8 @@ def three_coupled_blocks(
 
     Notes
     -----
-    Which of the three contacts slip is one question, since each force acts on two blocks; where two of them stick the
-    blocks have one velocity.
+    The slip of the three contacts is decided jointly, because each force acts on two blocks. Two blocks whose
+    contact sticks have one velocity.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""`hs.simulate` for mechanical systems: arguments checked, arrays built, the kernels run."""
+"""This module runs `hs.simulate` for mechanical systems: it checks the arguments and runs the kernels."""
 
 from __future__ import annotations
 
@@ -17,17 +17,15 @@ if TYPE_CHECKING:
     from hybridsim.mechanics.stepped_solution import SteppedSolution
     from hybridsim.mechanics.system import MechanicalSystem
 
-# Of `simulate`, and without a meaning here; with what to do instead.
+# Arguments of `simulate` that are not supported here, with the alternatives.
 _OF_MODELS = {
-    "params": "put the values into its arrays, or run to_model()",
-    "z0": "leave it out: who sticks at the start follows from x0",
-    "first_step": "leave it out: a series knows its own step",
+    "params": "put the values into the arrays of the system, or simulate system.to_model()",
+    "z0": "leave it out: x0 determines which contacts stick at the start",
+    "first_step": "leave it out: the Taylor series determines the step size",
 }
 _OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
 
-_INDEPENDENT = (
-    "(if the directions of its contacts and gaps are independent: else no model holds them all at once)"
-)
+_INDEPENDENT = "(possible if the directions of its contacts and gaps are linearly independent)"
 
 
 def simulate_mechanical(
@@ -50,7 +48,7 @@ def simulate_mechanical(
     Raises
     ------
     UsageError
-        For what a mechanical system does not take: other integrators, params, z0, a first step, time backward.
+        For unsupported arguments: other integrators, params, z0, a first step, or a backward run.
     """
     from hybridsim.engine.jit import announce_compilation
     from hybridsim.engine.keep import ALL
@@ -62,15 +60,15 @@ def simulate_mechanical(
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
-        integrator_class(name)  # what is no integrator at all is refused as such
+        integrator_class(name)  # refuses unknown integrators
         raise UsageError(
             f"{name} does not run a MechanicalSystem",
-            remedy=f"choose taylor, or run to_model() with {name} {_INDEPENDENT}",
+            remedy=f"choose taylor, or simulate system.to_model() with {name} {_INDEPENDENT}",
         )
     if system.impacts and name != "moreau":
         raise UsageError(
             f"{name} does not run a MechanicalSystem with impacts",
-            remedy=f'choose integrator="moreau", step=..., or run to_model() of a small one {_INDEPENDENT}',
+            remedy=f'choose integrator="moreau", step=..., or simulate to_model() of a small one {_INDEPENDENT}',
         )
     method: Any = None
     if name == "moreau":
@@ -84,18 +82,20 @@ def simulate_mechanical(
         if argument not in _OF_MODELS:
             taken = (*(simulate_mechanical.__kwdefaults__ or ()), *_OF_MOREAU)
             raise UsageError(
-                f"{argument!r} is no argument for a MechanicalSystem",
+                f"simulate() has no argument {argument!r} for a MechanicalSystem",
                 remedy=keyword_elsewhere(argument) or nearest(argument, taken, kind="arguments"),
             )
         if value is not None:
-            raise UsageError(f"a MechanicalSystem takes no {argument}", remedy=_OF_MODELS[argument])
+            raise UsageError(f"a MechanicalSystem does not support {argument}", remedy=_OF_MODELS[argument])
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(
-            f"t_span is {t_span!r}", remedy="a MechanicalSystem runs forward only; to_model() backward"
+            f"t_span is {t_span!r}", remedy="give t1 >= t0, or simulate system.to_model() backward"
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
-        raise UsageError(f"save is {save!r}", remedy="a MechanicalSystem keeps 'all', 'events' or 'nothing'")
+        raise UsageError(
+            f"save is {save!r}", remedy="for a MechanicalSystem give 'all', 'events' or 'nothing'"
+        )
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
     longest = arguments.step_bound(max_step, "max_step")
@@ -131,7 +131,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
         for name, value in x0.items():
             if name not in names:
                 raise UsageError(
-                    f"x0 names {name!r}, which is no state of {system.name}",
+                    f"x0 contains {name!r}, which is not a state of {system.name}",
                     remedy=nearest(str(name), names, kind="states"),
                 )
             start[names.index(name)] = arguments.number(value, f"x0 of {name}")
@@ -145,7 +145,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
 
 
 def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
-    """atol (2n,): a number, one for each state, or rtol * 1e-3 * |x0| (1 where that is zero)."""
+    """Return atol (2n,): a number, one for each state, or rtol * 1e-3 * |x0| (1 if that is zero)."""
     if atol is None:
         return 1e-3 * rtol * np.where(start == 0.0, 1.0, abs(start))
     remedy = f"give a number >= 0, or {len(start)} of them"

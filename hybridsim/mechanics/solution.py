@@ -1,4 +1,4 @@
-"""What a run of a mechanical system gives back."""
+"""This module defines the result of a Taylor run of a mechanical system."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class MechanicalSolution(ArraysResult):
     Attributes
     ----------
     t, y : array
-        Times (k,) and states (2n, k): the positions in the order of declaration, then the velocities; an
-        event time stands twice, with x- and x+.
+        Times (k,) and states (2n, k): the positions in the order of declaration, then the velocities. An
+        event time appears twice, with x- and x+.
     events, modes, stats, status, success, message, warnings : object
-        As of a `Solution`.
+        As in a `Solution`.
 
     Other Parameters
     ----------------
     model, run, grid, save, wall_time, compile_time : object
-        What `simulate` passes on; not made by hand.
+        Passed on by `simulate`; do not construct it by hand.
 
     Examples
     --------
@@ -64,7 +64,9 @@ class MechanicalSolution(ArraysResult):
         self.model, self._run, self._grid, self._save = model, run, grid, save
         self._cost = (wall_time, compile_time)
         n, place = model.n, np.argsort(run.built.dofs)
-        self._columns = np.concatenate([place, n + place])  # of the plant's order, for each declared state
+        self._columns = np.concatenate(
+            [place, n + place]
+        )  # in the order of the arrays, for each declared state
         event = np.concatenate([*run.events, np.zeros((0, 4), dtype=np.int64)])
         self._event = np.ascontiguousarray(event)
         self._when = instants(np.concatenate([*run.when, np.zeros((0, 3))]))
@@ -94,7 +96,7 @@ class MechanicalSolution(ArraysResult):
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times (k,): the requested grid as far as the run went, else where series begin, every event time twice."""
+        """Times (k,): the requested grid, else the starts of series, with every event time twice."""
         if self._grid is not None:
             return self._grid[(self._grid >= self.t_start) & (self._grid <= self.t_end)]
         return np.sort(np.concatenate([self._starts, *([self._event_times] * 2), [self.t_end]]))
@@ -119,7 +121,7 @@ class MechanicalSolution(ArraysResult):
         return out.T
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
-        """States at time t: (2n,) for a number, (2n, k) for k times; side "-" gives x- at an event."""
+        """Return the states at time t: (2n,) for a number, (2n, k) for k times; side "-" gives x- at an event."""
         if side not in ("+", "-"):
             raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
         x = self._states(self._within(t), side == "+")
@@ -135,7 +137,7 @@ class MechanicalSolution(ArraysResult):
     def _quantities(
         self, times: np.ndarray, right: bool, states: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and relative velocities (k, m) of the contacts; the states are made to meet what sticks."""
+        """Return forces and relative velocities (k, m); the states are made to satisfy the stick constraints."""
         built, (state, room) = self._run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.model.contacts)))
         order = np.argsort(times, kind="stable")
@@ -148,7 +150,7 @@ class MechanicalSolution(ArraysResult):
         return forces, velocities
 
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
-        """A state, a friction force by the name of its contact, or its relative velocity, ``v_rel(f)``, over time.
+        """Return a state, a friction force by its contact's name, or ``v_rel(f)``, the slip velocity, over time.
 
         Parameters
         ----------
@@ -172,7 +174,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of what `output` knows beside the states: friction forces, relative velocities."""
+        """Names of the quantities of `output` in addition to the states: friction forces and relative velocities."""
         contacts = [c.name for c in self.model.contacts]
         return (*contacts, *(f"v_rel({c})" for c in contacts))
 
@@ -183,12 +185,12 @@ class MechanicalSolution(ArraysResult):
 
     @cached_property
     def events(self) -> Sequence[Event]:
-        """All changes of mode in order of time; the states of each are worked out when it is asked for."""
+        """All changes of mode in order of time; the states of an event are computed on demand."""
         self._require_events()
         return _Events(self)
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
-        """Times of the events of one contact."""
+        """Return the times of the events of one contact."""
         self._asked(component, kind, [contact.name for contact in self.model.contacts])
         numbers = [i for i, c in enumerate(self.model.contacts) if c.name == component]
         chosen = np.isin(self._contact_of[self._event[:, 0]], numbers) & (kind in (None, "transition"))
@@ -196,7 +198,7 @@ class MechanicalSolution(ArraysResult):
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """For each contact its modes in order, with the stretch of time of each."""
+        """The modes of each contact in order, with the time interval of each."""
         self._require_events()
         found = ByName[tuple[ModeInterval, ...]]()
         place = np.argsort(self._contact_of)
@@ -213,7 +215,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) where the run ended, whatever was kept of it."""
+        """States (2n,) at the end of the run, whatever was kept of it."""
         run = self._run
         return run.state.x.reshape(-1)[self._columns].copy()
 
@@ -224,7 +226,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def success(self) -> bool:
-        """Whether the run did what was asked."""
+        """Whether the run reached its end."""
         return self._run.code == DONE
 
     @property
@@ -238,17 +240,17 @@ class MechanicalSolution(ArraysResult):
         names = [self.model.contacts[i].name for i in self._run.node_contacts]
         shown = ", ".join(names[:8]) + (f", ... ({len(names)} contacts)" if len(names) > 8 else "")
         reasons = {
-            INCONSISTENT: "no combination of stick and slip is admissible just after it: each asks for a force "
-            "beyond its limit or for a motion against its direction; look for a law whose slip force at v = 0 is "
-            "above its stick limit",
-            CASCADE: "events follow each other without time going on",
-            LOST: "the series have no step from here: a law is no number, or changes too fast at v = 0",
+            INCONSISTENT: "no combination of stick and slip is admissible just after it: each needs a force beyond a "
+            "friction limit or a motion against a friction force. Check that no law has a slip force at v = 0 above "
+            "its stick limit",
+            CASCADE: "events follow each other without time advancing",
+            LOST: "no step is possible from here: a friction law is not a number, or changes too fast at v = 0",
         }
         return f"stopped at t = {t!r} at contacts {shown}: {reasons[code]}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know: decisions inside rounding, touches of a limit."""
+        """Warnings of the run: undecided events, and touches of a limit."""
         *_, undecided, touches = self._run.state.counts.tolist()
         texts = {
             f"undecided at rounding ({undecided} times)": undecided,
@@ -258,7 +260,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def stats(self) -> dict[str, float]:
-        """Cost: steps of the whole system, events, restarts of patches and coordinates' nodes in them, seconds."""
+        """Cost: steps of the whole system, events, restarts of patches, restarted nodes, seconds."""
         steps, events, restarts, nodes, *_ = self._run.state.counts.tolist()
         return {
             "steps": steps, "events": events, "restarts": restarts, "nodes_restarted": nodes,
@@ -279,7 +281,7 @@ class MechanicalSolution(ArraysResult):
 
 
 class _Events(Sequence[Event]):
-    """The events of a solution."""
+    """The events of a solution, created on demand."""
 
     def __init__(self, solution: MechanicalSolution) -> None:
         self._solution = solution

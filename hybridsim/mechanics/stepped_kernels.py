@@ -1,4 +1,4 @@
-"""Kernels of time stepping for mechanical systems: the impulses of a step by projected Gauss-Seidel, and the steps."""
+"""This module holds the kernels of time stepping: impulses of a step by projected Gauss-Seidel, and the steps."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from hybridsim.engine.eight import WIDTH, whole_vectors
 from hybridsim.engine.jit import inlined, kernel
 from hybridsim.mechanics.lanes import advance_lanes, clear_constants, lane_place
 
-HOLDS, ABOVE, BELOW = 0, 1, -1  # of a contact: stick, slip forward, slip backward; of an impact: closed, open
-FORCING, DAMPING, FRICTION, BASES, IMPACTS = range(5)  # works
-SWEEPS, BOUNCES, UNSETTLED, STEPS = range(4)  # counts
-_PATIENCE = 50  # sweeps after which what slips comes to rest by kinetic friction alone
+HOLDS, ABOVE, BELOW = (
+    0,
+    1,
+    -1,
+)  # modes of a contact: stick, slip forward, slip backward; of an impact: closed, open
+FORCING, DAMPING, FRICTION, BASES, IMPACTS = range(5)  # indices of works
+SWEEPS, BOUNCES, UNSETTLED, STEPS = range(4)  # indices of counts
+_PATIENCE = 50  # sweeps after which slipping contacts come to rest by kinetic friction only
 _SWEEPS = 20_000
-_NOTHING = 1e-2  # of the tolerance: a change of an impulse that need not be told to its neighbours
+_NOTHING = 1e-2  # of the tolerance; a smaller change of an impulse is not passed on to its neighbours
 
 
 class Stand(NamedTuple):
-    """Where a run is: q, v (n,); mode, impulse (m,) of contacts and impacts; works (5,), counts (4,), residual (1,)."""
+    """The state of a run: q, v (n,), mode, impulse (m,), works (5,), counts (4,), residual (1,)."""
 
     q: np.ndarray
     v: np.ndarray
@@ -32,36 +36,31 @@ class Stand(NamedTuple):
 
 
 class Bench(NamedTuple):
-    """Scratch for n coordinates, nc contacts and m of both kinds.
+    """Scratch arrays for n coordinates, nc contacts, and m contacts and impacts."""
 
-    force, force_after, b, free, solved (n,). y (m,): rates at the end of the step without impulses; u (m,): at its
-    start. speed (nc,), base (nc, 3): relative velocity, speed of the base at the start, the end and in the mean. up,
-    down, up_before, down_before (nc,): forces of slip. active, dirty, next, rebound (m,). lane (nc,), V: of the tapes.
-    """
-
-    force: np.ndarray
-    force_after: np.ndarray
-    b: np.ndarray
-    free: np.ndarray
-    solved: np.ndarray
-    y: np.ndarray
-    u: np.ndarray
-    speed: np.ndarray
-    base: np.ndarray
-    up: np.ndarray
-    down: np.ndarray
-    up_before: np.ndarray
+    force: np.ndarray  # (n,) forcing at the start
+    force_after: np.ndarray  # (n,) forcing at the end
+    b: np.ndarray  # (n,) right-hand side
+    free: np.ndarray  # (n,) change without impulses
+    solved: np.ndarray  # (n,) scratch of `solve_step`
+    y: np.ndarray  # (m,) rates at the end of the step without impulses
+    u: np.ndarray  # (m,) rates at its start
+    speed: np.ndarray  # (nc,) relative velocity
+    base: np.ndarray  # (nc, 3) speed of the base at the start, at the end, and its mean
+    up: np.ndarray  # (nc,) slip forces forward
+    down: np.ndarray  # (nc,) slip forces backward
+    up_before: np.ndarray  # (nc,) of the previous iteration
     down_before: np.ndarray
-    active: np.ndarray
-    dirty: np.ndarray
-    next: np.ndarray
-    rebound: np.ndarray
-    lane: np.ndarray
-    V: np.ndarray
+    active: np.ndarray  # (m,)
+    dirty: np.ndarray  # (m,)
+    next: np.ndarray  # (m,)
+    rebound: np.ndarray  # (m,)
+    lane: np.ndarray  # (nc,) lanes of the tapes
+    V: np.ndarray  # registers of the tapes
 
 
 class Kept(NamedTuple):
-    """What is kept: states (k, 2n) and forces (k, m) of steps; events (step, which, mode before, after); how many."""
+    """The record: states (k, 2n), forces (k, m), events (step, which, mode before, after), counts used."""
 
     states: np.ndarray
     forces: np.ndarray
@@ -71,7 +70,7 @@ class Kept(NamedTuple):
 
 @inlined
 def product(ptr: Any, col: Any, val: Any, k: int, x: Any) -> float:
-    """Row k of a sparse matrix times x."""
+    """Return the product of row k of a sparse matrix and x."""
     total = 0.0
     for e in range(ptr[k], ptr[k + 1]):
         total += val[e] * x[col[e]]
@@ -80,7 +79,7 @@ def product(ptr: Any, col: Any, val: Any, k: int, x: Any) -> float:
 
 @kernel
 def solve_step(plant: Any, x: Any, work: Any) -> None:
-    """x becomes A^-1 x."""
+    """Replace x by A^-1 x."""
     n = x.shape[0]
     for i in range(n):
         work[plant.row[i]] = x[i]
@@ -100,7 +99,7 @@ def solve_step(plant: Any, x: Any, work: Any) -> None:
 
 @kernel
 def forces_at(plant: Any, t: float, out: Any) -> None:
-    """The forcing at a time."""
+    """Compute the forcing at a time."""
     for x in range(out.shape[0]):
         total = plant.still[x]
         for e in range(plant.h_ptr[x], plant.h_ptr[x + 1]):
@@ -111,7 +110,7 @@ def forces_at(plant: Any, t: float, out: Any) -> None:
 
 @inlined
 def base_at(plant: Any, c: int, t: float) -> float:
-    """The speed of a contact's base."""
+    """Return the speed of a contact's base."""
     r = plant.base_rate[c]
     if r < 0:
         return plant.base[c, 0]
@@ -120,7 +119,7 @@ def base_at(plant: Any, c: int, t: float) -> float:
 
 @kernel
 def slip_forces(plant: Any, laws: Any, room: Any) -> None:
-    """Forces of slip, forward and backward, at the relative velocities; at rest on the side where these are not."""
+    """Compute the slip forces, forward and backward, at the relative velocities; at v = 0 the forces at onset."""
     nc = room.speed.shape[0]
     for c in range(nc):
         room.up[c], room.down[c] = plant.onset[c, 0], plant.onset[c, 1]
@@ -154,9 +153,10 @@ def slip_forces(plant: Any, laws: Any, room: Any) -> None:
 
 @kernel
 def sweep(plant: Any, state: Any, room: Any, h: float, tolerance: float) -> bool:
-    """Impulses at given forces of slip, by projected Gauss-Seidel sweeps over what a neighbour has moved.
+    """Compute impulses for given slip forces by projected Gauss-Seidel sweeps; return whether they converged.
 
-    A friction impulse counts as positive along its direction: force f gives - h f. True: they have settled.
+    Only contacts with a changed neighbour are swept. A friction impulse is positive along its direction, so that a
+    force f gives - h f.
     """
     nc, m = room.speed.shape[0], room.y.shape[0]
     scale = 0.0
@@ -214,7 +214,7 @@ def sweep(plant: Any, state: Any, room: Any, h: float, tolerance: float) -> bool
 def impulses(
     plant: Any, laws: Any, state: Any, room: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
-    """Impulses of a step; the forces of slip belong to the relative velocities at its end. True: they have settled."""
+    """Compute the impulses of a step, with slip forces at its end velocities; return whether they converged."""
     nc = room.speed.shape[0]
     slip_forces(plant, laws, room)
     for _ in range(iterations):
@@ -241,7 +241,7 @@ def impulses(
 
 @kernel
 def begin(plant: Any, state: Any, room: Any, h: float, theta: float, t: float, t_after: float) -> None:
-    """What a step needs before its impulses: free velocities and rates, and which gaps may push."""
+    """Prepare a step: free velocities and rates, and the gaps that may exert a force."""
     n, nc = state.q.shape[0], room.speed.shape[0]
     forces_at(plant, t_after, room.force_after)
     for x in range(n):
@@ -273,7 +273,7 @@ def begin(plant: Any, state: Any, room: Any, h: float, theta: float, t: float, t
 
 @kernel
 def finish(plant: Any, state: Any, room: Any, h: float, theta: float) -> None:
-    """Velocities and positions at the end of a step from its impulses, and the works in it.
+    """Compute velocities and positions at the end of a step from its impulses, and the works in it.
 
     An impulse does the work of the mean of the velocities before and after, whatever theta is.
     """
@@ -285,7 +285,7 @@ def finish(plant: Any, state: Any, room: Any, h: float, theta: float) -> None:
     solve_step(plant, change, room.solved)
     for x in range(n):
         change[x] += state.v[x]
-    for c in range(nc):  # what sticks has the velocity of its base, to the bit
+    for c in range(nc):  # a sticking contact has exactly the velocity of its base
         first = plant.w_ptr[c]
         if room.next[c] == HOLDS and plant.w_ptr[c + 1] == first + 1:
             change[plant.w_col[first]] = room.base[c, 1] / plant.w_val[first]
@@ -315,7 +315,7 @@ def finish(plant: Any, state: Any, room: Any, h: float, theta: float) -> None:
 
 @kernel
 def put_impulses(plant: Any, state: Any, room: Any) -> None:
-    """b grows by what the impulses give to each coordinate."""
+    """Add the effect of the impulses to b."""
     for k in range(room.y.shape[0]):
         for e in range(plant.w_ptr[k], plant.w_ptr[k + 1]):
             room.b[plant.w_col[e]] += plant.w_val[e] * state.impulse[k]
@@ -325,9 +325,9 @@ def put_impulses(plant: Any, state: Any, room: Any) -> None:
 def steps(
     plant: Any, laws: Any, state: Any, room: Any, kept: Any, settings: Any, t0: float, first: int, count: int
 ) -> int:
-    """So many steps after the first ones; how many were done: fewer where there is no room for events, or no number.
+    """Make `count` steps; return the number done, which is smaller if the record is full or a state is NaN.
 
-    settings: step, theta, tolerance, iterations. kept.used: rows of states, events.
+    settings: step, theta, tolerance, iterations. kept.used: numbers of rows of states and of events.
     """
     h, theta, tolerance, iterations = settings
     n, m = state.q.shape[0], room.y.shape[0]

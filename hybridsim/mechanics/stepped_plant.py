@@ -1,8 +1,8 @@
-"""A mechanical system as arrays for time stepping: the matrix of a step, factored once, and what impulses do in it.
+"""This module converts a mechanical system to arrays for time stepping, including the factored step matrix.
 
-For a step h of the theta scheme A = M + h theta C + h^2 theta^2 K takes forces to changes of the velocities. A is close
-to M, so that the entries of W A^-1 W^T fall by some (h omega)^2 from neighbour to neighbour: those below rounding of
-rounding are dropped, and a sweep over all contacts costs a few products each.
+For a step h of the theta scheme A = M + h theta C + h^2 theta^2 K maps forces to changes of the velocities. A
+is close to M, so that the entries of W A^-1 W^T decrease by about (h omega)^2 from neighbour to neighbour.
+Entries far below rounding are dropped, so that a sweep costs a few products per contact.
 """
 
 from __future__ import annotations
@@ -28,62 +28,55 @@ from hybridsim.mechanics.plant import (
 )
 from hybridsim.mechanics.system import MechanicalSystem
 
-_DROPPED = 1e-18  # relative to what the impulses do to their own contacts
-_CHUNK = 256  # right sides that are solved for at a time
+_DROPPED = 1e-18  # relative to the diagonal entries
+_CHUNK = 256  # right-hand sides solved at a time
 
 
 class Stepped(NamedTuple):
-    """What does not change in a run; sparse matrices are (ptr, col, val) by rows, in the order of declaration.
+    """The arrays that are constant in a run; sparse matrices are (ptr, col, val) by rows, as declared."""
 
-    k, c: K and C. w: directions of the contacts, then of the impacts. g: W A^-1 W^T. l, u: factors of A by columns,
-    rows of u up to its diagonal, which comes last; l without its diagonal of ones. row, column: where the permutations
-    of the factors take each coordinate. still, h, rates, base, base_rate: as of `Plant`, but forces. limits, onset
-    (m, 2): most force in stick, and of slip at v = 0, forward and backward. tape (m, 2), par: as of `Plant`. gap,
-    restitution: of the impacts.
-    """
-
-    k_ptr: np.ndarray
+    k_ptr: np.ndarray  # k: K
     k_col: np.ndarray
     k_val: np.ndarray
-    c_ptr: np.ndarray
+    c_ptr: np.ndarray  # c: C
     c_col: np.ndarray
     c_val: np.ndarray
-    w_ptr: np.ndarray
+    w_ptr: np.ndarray  # w: directions of the contacts, then of the impacts
     w_col: np.ndarray
     w_val: np.ndarray
-    g_ptr: np.ndarray
+    g_ptr: np.ndarray  # g: W A^-1 W^T
     g_col: np.ndarray
     g_val: np.ndarray
-    l_ptr: np.ndarray
+    l_ptr: np.ndarray  # l: lower factor of A by columns, without its unit diagonal
     l_row: np.ndarray
     l_val: np.ndarray
-    u_ptr: np.ndarray
+    u_ptr: np.ndarray  # u: upper factor of A by columns, with the diagonal last
     u_row: np.ndarray
     u_val: np.ndarray
-    row: np.ndarray
+    row: np.ndarray  # permutations of the factors
     column: np.ndarray
-    still: np.ndarray
+    still: np.ndarray  # this and the next six as in `Plant`, but forces
     h_ptr: np.ndarray
     h_rate: np.ndarray
     h_val: np.ndarray
     rates: np.ndarray
     base: np.ndarray
     base_rate: np.ndarray
-    limits: np.ndarray
-    onset: np.ndarray
-    tape: np.ndarray
-    par: np.ndarray
-    gap: np.ndarray
-    restitution: np.ndarray
+    limits: np.ndarray  # (m, 2) stick limits, forward and backward
+    onset: np.ndarray  # (m, 2) slip forces at v = 0
+    tape: np.ndarray  # as in `Plant`
+    par: np.ndarray  # as in `Plant`
+    gap: np.ndarray  # of the impacts
+    restitution: np.ndarray  # of the impacts
 
 
 def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[Stepped, Laws]:
-    """Arrange a system for steps of one length.
+    """Convert a system to arrays for steps of one length.
 
     Raises
     ------
     UsageError
-        Where the matrix of the step is not regular.
+        If the matrix of the step is singular.
     """
     n, contacts = system.n, list(system.contacts)
     A = sparse.csc_array(system.M + step * theta * system.C + (step * theta) ** 2 * system.K)
@@ -111,7 +104,7 @@ def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[
 
 
 def directions(system: MechanicalSystem) -> Any:
-    """Weights of the contacts, then of the impacts (m, n), sparse."""
+    """Return the weights of the contacts, then of the impacts (m, n), as a sparse matrix."""
     every = [c.direction for c in system.all_contacts]
     rows = np.repeat(np.arange(len(every)), [len(d) for d in every]).astype(np.int64)
     cols = np.array([i for d in every for i, _ in d], dtype=np.int64)
@@ -121,7 +114,7 @@ def directions(system: MechanicalSystem) -> Any:
 
 
 def _delassus(W: Any, factors: Any) -> Any:
-    """W A^-1 W^T without what is nothing beside the diagonal."""
+    """Return W A^-1 W^T without entries that are negligible relative to the diagonal."""
     m = W.shape[0]
     columns, diagonal = [], np.zeros(m)
     for first in range(0, m, _CHUNK):

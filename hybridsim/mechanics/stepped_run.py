@@ -1,4 +1,4 @@
-"""Runs a mechanical system by time stepping: arrays out, kernels called until the end, states and events collected."""
+"""This module runs a mechanical system by time stepping: it prepares arrays, calls kernels and collects results."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from hybridsim.mechanics.system import MechanicalSystem
 
 _ROOM = 1 << 21  # doubles for the states of one call
-_EVENTS = 4096  # that one call has room for, beside those of one step
-_EQUAL = 1e-9  # a span that is a whole number of steps, to rounding, is cut into these
+_EVENTS = 4096  # events per call, in addition to those of one step
+_EQUAL = 1e-9  # tolerance for a span that is a whole number of steps
 
 
 class SteppedRun:
-    """One run; `go` carries it out.
+    """One run by time stepping; `go` carries it out.
 
-    The span is cut into equal steps, none longer than asked for, so that one matrix serves all.
+    The span is divided into equal steps, none longer than requested, so that one factored matrix serves all.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class SteppedRun:
         self.limits, self.counters, self.limit_message = limits, Counters(), ""
 
     def go(self, progress: Callable[[float], None] | None) -> None:
-        """Step to the end of the span, or to where states are no numbers."""
+        """Step to the end of the span, or until a state is NaN."""
         self._begin()
         if self.overlaps:
             self.status = "inconsistent"
@@ -102,7 +102,7 @@ class SteppedRun:
         self.kernel_time = perf_counter() - began - self.compile_time
 
     def _begin(self) -> None:
-        """Modes at the start, by what moves; gaps that are negative there."""
+        """Find the modes at the start from the motion, and the gaps that are negative there."""
         system, plant, n = self.system, self.plant, self.system.n
         W, nc, x = directions(system), len(system.contacts), self.start
         turns = plant.rates * self.span[0]
@@ -120,12 +120,12 @@ class SteppedRun:
 
     @property
     def time(self) -> float:
-        """Where the run is."""
+        """The time that the run has reached."""
         return self.span[1] if self.done == self.count else self.span[0] + self.done * self.step
 
 
 def _length(system: MechanicalSystem, method: Moreau) -> float:
-    """The step as given, or a share of the one period of forcing and bases."""
+    """Return the given step, or a fraction of the single period of forcing and bases."""
     for label in ("step", "period", "steps_per_period"):
         value = getattr(method, label)
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -136,7 +136,7 @@ def _length(system: MechanicalSystem, method: Moreau) -> float:
     period = method.period or (2.0 * math.pi / rates[0] if len(set(rates)) == 1 else None)
     if period is None:
         raise UsageError(
-            f"moreau steps by a share of the forcing's period, and {system.name} has no single one",
+            f"moreau needs a step size, because {system.name} has no single forcing period",
             remedy="give step=... or period=...",
         )
     return period / method.steps_per_period

@@ -1,4 +1,4 @@
-"""What a run of a mechanical system by time stepping gives back."""
+"""This module defines the result of a time-stepping run of a mechanical system."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ _WORKS = ("forcing", "damping", "friction", "bases", "impacts")
 
 
 class SteppedSolution(ArraysResult):
-    """The result of simulating a `MechanicalSystem` by ``moreau``; ``sol(t)`` is linear in the velocities of a step.
+    """The result of simulating a `MechanicalSystem` by ``moreau``; ``sol(t)`` has linear velocities within a step.
 
     Attributes
     ----------
     t, y : array
         Times (k,) and states (2n, k): the positions in the order of declaration, then the velocities.
     events, modes : object
-        Changes of mode, at the beginning of the step that has the new one; bounces are none.
+        Changes of mode, at the beginning of the step with the new mode; bounces are not events.
     work : dict of str to float
-        Energy that the system gets from ``forcing``, from ``damping``, ``friction`` and ``impacts`` (not
-        positive, but for what a step rounds), and from the moving ``bases`` of its contacts, over the run.
-        With theta = 1/2 they add up to what kinetic and elastic energy gain.
+        Energy that the system gets from ``forcing``, ``damping``, ``friction``, ``impacts`` and the moving
+        ``bases`` of its contacts, over the run. Those of damping, friction and impacts are not positive, up
+        to rounding in a step. With theta = 1/2 they add up to the gain of kinetic and elastic energy.
     stats, status, success, message, warnings : object
-        As of a `Solution`.
+        As in a `Solution`.
 
     Other Parameters
     ----------------
     run, grid, save, wall_time, compile_time : object
-        What `simulate` passes on; not made by hand.
+        Passed on by `simulate`; do not construct it by hand.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class SteppedSolution(ArraysResult):
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times (k,): the requested grid as far as the run went, else where steps begin and end."""
+        """Times (k,): the requested grid up to the end of the run, else the ends of the steps."""
         if self._grid is not None:
             return self._grid[(self._grid >= self.t_start) & (self._grid <= self.t_end)]
         return self._steps
@@ -96,7 +96,7 @@ class SteppedSolution(ArraysResult):
         return self._states.T if self._grid is None else self(self.t)
 
     def __call__(self, t: Any) -> np.ndarray:
-        """States at time t: (2n,) for a number, (2n, k) for k times."""
+        """Return the states at time t: (2n,) for a number, (2n, k) for k times."""
         times = self._within(t)
         n, first = self.model.n, self._step_of(times)
         after = np.minimum(first + 1, self._run.done)
@@ -113,10 +113,10 @@ class SteppedSolution(ArraysResult):
         return np.clip(found, 0, max(self._run.done - 1, 0))
 
     def output(self, name: str, t: Any = None) -> np.ndarray:
-        """A quantity over time, by name.
+        """Return a quantity over time by its name.
 
-        A state; the force of a contact or an impact, in the mean of its step; ``v_rel(f)`` of a contact; ``gap(p)`` of
-        an impact.
+        It is a state; the force of a contact or an impact, as the mean over its step; ``v_rel(f)`` of a
+        contact; or ``gap(p)`` of an impact.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class SteppedSolution(ArraysResult):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of what `output` knows beside the states: forces, relative velocities, gaps."""
+        """Names of the quantities of `output` in addition to the states: forces, relative velocities, gaps."""
         speeds = (f"v_rel({contact.name})" for contact in self.model.contacts)
         return (*(p.name for p in self._parts), *speeds, *(f"gap({i.name})" for i in self.model.impacts))
 
@@ -183,14 +183,14 @@ class SteppedSolution(ArraysResult):
         return _CONTACT if k < len(self.model.contacts) else _IMPACT
 
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
-        """Times of the events of one contact or impact."""
+        """Return the times of the events of one contact or impact."""
         self._asked(component, kind, [part.name for part in self._parts])
         numbers = [k for k, part in enumerate(self._parts) if part.name == component]
         return self._when[np.isin(self._event[:, 1], numbers) & (kind in (None, "transition"))]
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """For each contact and impact its modes in order, with the stretch of time of each."""
+        """The modes of each contact and impact in order, with the time interval of each."""
         self._require_events()
         found = {}
         for k, part in enumerate(self._parts):
@@ -208,12 +208,12 @@ class SteppedSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) where the run ended, whatever was kept of it."""
+        """States (2n,) at the end of the run, whatever was kept of it."""
         return np.concatenate([self._run.state.q, self._run.state.v])
 
     @property
     def work(self) -> dict[str, float]:
-        """Energy that the system gets, by where from; see the class."""
+        """Energy that the system gets from each source; see the class."""
         return dict(zip(_WORKS, self._run.state.work.tolist(), strict=True))
 
     @property
@@ -223,7 +223,7 @@ class SteppedSolution(ArraysResult):
 
     @property
     def success(self) -> bool:
-        """Whether the run did what was asked."""
+        """Whether the run reached its end."""
         return self.status == "finished"
 
     @property
@@ -240,19 +240,19 @@ class SteppedSolution(ArraysResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know: steps whose impulses did not settle."""
+        """Warnings of the run: steps whose impulses did not converge."""
         failed = int(self._run.state.counts[UNSETTLED])
         _, _, tolerance, iterations = self._run.settings
         text = (
-            f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: take smaller ones"
+            f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: use a smaller step"
         )
         return (text,) if failed else ()
 
     @property
     def stats(self) -> dict[str, float]:
-        """Cost: steps, sweeps over the contacts, bounces, events, seconds; residual: largest that a step was left with.
+        """Cost: steps, sweeps over the contacts, bounces, events, seconds; residual: the largest of any step.
 
-        A residual is the last change of an impulse over the largest impulse of its step.
+        A residual is the last change of an impulse relative to the largest impulse of its step.
         """
         counts = self._run.state.counts.tolist()
         return {

@@ -1,4 +1,4 @@
-"""How far the series of a patch reach, and when its contacts first leave their modes; the tournament of these times."""
+"""This module computes the reach of a patch's series and the first exits of its contacts, in a tournament tree."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from hybridsim.mechanics.lanes import advance_lanes, lane_place
 from hybridsim.mechanics.runs import law_holds_in_run
 
 _UNIT = 2.0**-53
-_DEFECT = 100.0  # as in the taylor integrator: how far the law may be from its series, in tolerances
+_DEFECT = 100.0  # as in the taylor integrator: the permitted error of the law's series, in tolerances
 _SHRINKS = 200  # halvings of a reach
-_SHORT = 2.0**-12  # of the step: as far as a touch is looked at for what follows it
-_TINY = 2.0**-40  # of the step: what is still open on so short a stretch is a touch
+_SHORT = 2.0**-12  # of the step; the interval after a touch that is checked for an exit
+_TINY = 2.0**-40  # of the step; an exit that is undecided on such a short interval is a touch
 
 
 @kernel
 def set_time(tree: Any, leaf: int, t: float) -> None:
-    """Put a time into the tournament; tree[1] is the earliest of all."""
+    """Store a time in the tournament tree; tree[1] is the earliest of all."""
     i = tree.shape[0] // 2 + leaf
     tree[i] = t
     i >>= 1
@@ -51,7 +51,7 @@ def set_time(tree: Any, leaf: int, t: float) -> None:
 
 @kernel
 def first_leaf(tree: Any) -> int:
-    """The leaf with the earliest time."""
+    """Return the leaf with the earliest time."""
     i, half = 1, tree.shape[0] // 2
     while i < half:
         i = 2 * i if tree[2 * i] == tree[i] else 2 * i + 1
@@ -60,7 +60,7 @@ def first_leaf(tree: Any) -> int:
 
 @inlined
 def _largest(room: Any, first: Any, second: Any, total: Any) -> tuple[float, float, bool]:
-    """The largest number of each of two vectors, and whether those of a third are finite."""
+    """Return the largest number of each of two vectors, and whether those of a third are finite."""
     wide = room.sums.shape[1]
     store(room.sums, 2 * wide, first)
     store(room.sums, 2 * wide + WIDTH, second)
@@ -76,7 +76,7 @@ def _largest(room: Any, first: Any, second: Any, total: Any) -> tuple[float, flo
 def reach(
     plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
 ) -> float:
-    """The time over which the last two terms of each series stay below its tolerance; NaN where one is no number."""
+    """Return the time over which the last two terms of each series stay below its tolerance; NaN if a term is NaN."""
     h, Q, wide = longest, room.Q, room.Q.shape[1]
     for a in range(nd):
         x = room.dofs[a]
@@ -119,10 +119,10 @@ def reach(
 def _exit_of(
     state: Any, room: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
 ) -> tuple[int, float]:
-    """First time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
+    """Find the first time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
 
-    Where it is zero all along, or within the rounding `slack` of what it is the difference of, it does not. On a short
-    stretch a touch is passed if it is positive after it.
+    A polynomial that is zero throughout, or within the rounding `slack` of its terms, does not go negative.
+    On a short interval a touch is passed if the polynomial is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
     for k in range(terms):
@@ -143,9 +143,9 @@ def _exit_of(
 
 @kernel
 def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) -> None:
-    """Of each guard of slip (or force of stick) the sums of its terms over a time h that are above zero and below.
+    """Sum the positive and the negative terms of each guard of slip (or force of stick) over a time h.
 
-    All but the first; to room.sums, rows 1 and 2.
+    The first term is left out; results go to room.sums, rows 1 and 2.
     """
     R, F, sums = room.R, room.F, room.sums
     wide, step, zero = R.shape[1], splat(h), splat(0.0)
@@ -167,9 +167,9 @@ def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) 
 def _is_far(
     series: Any, i: int, last: int, lead: float, fall: float, power: float, h: float, most: float
 ) -> bool:
-    """Whether a guard that begins at `lead` stays above what `first_exit` would ask of it, whatever its terms do.
+    """Return whether a guard that begins at `lead` stays clear of zero for `first_exit`, whatever its terms do.
 
-    fall: the sum of those that are negative (each is there by a part only); power: h**last; most: size of all terms.
+    fall: sum of the negative terms, each of which acts in part only; power: h**last; most: size of all terms.
     """
     error = 2.0 * (abs(series[last, i]) * power + abs(series[last - 1, i]) * (power / h))
     return lead + fall > error + 24.0 * _UNIT * most
@@ -179,7 +179,7 @@ def _is_far(
 def isolate(
     plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
-    """First exit of each contact over (0, h], to room.exits and room.kinds; (OPEN, share) if one is open."""
+    """Find the first exit of each contact over (0, h]; return (OPEN, fraction) if one is undecided."""
     _bound_rest(plant, state, room, nc, top, h)
     power = h ** (top - 2)
     for i in range(nc):
@@ -221,7 +221,7 @@ def isolate(
 
 @kernel
 def _at_ends(room: Any, nc: int, h: float, top: int) -> None:
-    """Relative velocities and forces at the end, or at the exits, and the largest terms of these: to room.sums."""
+    """Compute relative velocities and forces at the end, or at the exits, and their largest terms, to room.sums."""
     R, F, sums = room.R, room.F, room.sums
     wide = R.shape[1]
     for i in range(whole_vectors(nc)):
@@ -245,7 +245,7 @@ def _at_ends(room: Any, nc: int, h: float, top: int) -> None:
 def _law_holds(
     plant: Any, laws: Any, state: Any, room: Any, nc: int, h: float, top: int, rtol: float
 ) -> bool:
-    """Whether the forces of what slips are what their laws say at the end of the patch's series, or at their exits."""
+    """Return whether slip forces agree with their laws at the end of the patch's series, or at their exits."""
     _at_ends(room, nc, h, top)
     if state.whole[FIRST] >= 0:
         share = _DEFECT * rtol + 64.0 * _UNIT
@@ -260,7 +260,7 @@ def _law_holds(
             i = room.lane[first + min(j, count - 1)]
             place = lane_place(at, block, laws.speed[t], orders, 0, j)
             room.V[place] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
-        # order 0 is done anew, and nothing needs the old one any more
+        # order 0 is overwritten, because its old value is no longer needed
         rows, end = (laws.row_ptr[t], laws.row_ptr[t + 1]), at + whole_vectors(count) // WIDTH * block
         advance_lanes(laws.rows, rows[0], rows[1], room.V, at, end, block, orders, 0)
         for j in range(count):
@@ -273,7 +273,7 @@ def _law_holds(
 
 
 def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """See `stretched`."""
+    """Run `stretched` with the arguments in the state."""
     nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
     h = reach(plant, state, room, nd, nc, top, rtol, longest)
@@ -285,7 +285,7 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
         if outcome == OPEN and h > _TINY * scale:
             h *= 0.5
             continue
-        if outcome == OPEN:  # a touch: what comes within rounding and is not certainly negative does not fire
+        if outcome == OPEN:  # a touch: an exit within rounding that is not certainly negative does not fire
             state.counts[5] += 1
         if _law_holds(plant, laws, state, room, nc, h, top, rtol):
             state.real[LENGTH] = h
@@ -297,9 +297,9 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
 
 @inlined
 def stretched(plant: Any, laws: Any, state: Any, room: Any, longest: float, rtol: float) -> float:
-    """How far the series of the patch just expanded are used, with the exits of its contacts up to there.
+    """Return the length over which the series of the expanded patch are used, and find its exits up to there.
 
-    NaN where there are none.
+    NaN if there is no such length.
     """
     state.real[LONGEST], state.real[RTOL] = longest, rtol
     call_kernel(state.kernels[STRETCH], (plant, laws, state, room))

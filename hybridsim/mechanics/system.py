@@ -1,4 +1,4 @@
-"""The declaration of a mechanical system: matrices, harmonic forcing, contacts with direction and friction law."""
+"""This module declares a mechanical system: matrices, harmonic forcing, contacts with direction and friction law."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A force, or speed of a base, sin*sin(omega t) + cos*cos(omega t); its phase loses no digits over any time.
+    """A force, or base speed, sin*sin(omega t) + cos*cos(omega t), whose phase stays accurate over any time.
 
     Parameters
     ----------
@@ -70,19 +70,19 @@ class MechanicalContact(Declared):
     Parameters
     ----------
     name : str
-        Of the friction force.
+        The name of the friction force.
     direction : array or mapping of int to float
         The weights w (n,), or a mapping from numbers of coordinates to weights.
     normal : float
         Normal load, >= 0.
     law : FrictionLaw or str
-        A set-valued `FrictionLaw` (``slip`` and ``stick``) without tables, or the name of one of the package.
+        A set-valued `FrictionLaw` (``slip`` and ``stick``) without tables, or the name of a packaged one.
     arguments : mapping of str to float, optional
-        The law's parameters, numbers.
+        Values of the law's parameters.
     base : float or Harmonic, optional
-        Speed of what the system slides on: a number, or a `Harmonic`.
+        Speed of the base on which the system slides: a number, or a `Harmonic`.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        The place of the declaration, for error messages.
 
     Examples
     --------
@@ -96,7 +96,7 @@ class MechanicalContact(Declared):
     law: FrictionLaw
     arguments: Mapping[str, Expression] = field(default_factory=FrozenMap)
     base: float | Harmonic = 0.0
-    weights: int = field(init=False, default=0, repr=False, compare=False)  # as many as were given in a row
+    weights: int = field(init=False, default=0, repr=False, compare=False)  # number of weights given in a row
 
     def __post_init__(self) -> None:
         self._texts("name")
@@ -107,10 +107,10 @@ class MechanicalContact(Declared):
         elif not isinstance(law, FrictionLaw):
             raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
-            what = "tables" if self.law.tables else "a force of its own instead of slip and stick"
+            what = "tables" if self.law.tables else "a direct force instead of slip and stick"
             raise self._fault(
                 f"the law '{self.law.name}' has {what}",
-                "a mechanical system takes laws of slip and stick; write others as hs.Contact of an hs.Model",
+                "use a law with slip and stick forces, or write the system as an hs.Model with hs.Contact",
             )
         object.__setattr__(self, "normal", finite(self, "normal", self.normal))
         if not self.normal >= 0.0:
@@ -122,7 +122,7 @@ class MechanicalContact(Declared):
         object.__setattr__(self, "direction", pairs)
 
     def values(self) -> dict[str, float]:
-        """The law's parameters in numbers, defaults included.
+        """Return the values of the law's parameters, including defaults.
 
         Raises
         ------
@@ -143,8 +143,8 @@ class MechanicalSystem:
 
         M q'' + C q' + K q = forcing(t) - sum_i w_i f_i + sum_j d_j p_j,      f_i = law_i(w_i . q' - base_i)
 
-    Which contacts stick after an event is decided for all contacts that act on each other at once, as one
-    complementarity problem of their accelerations (of the derivatives after them, where these do not tell).
+    After an event, stick and slip of all contacts that act on each other are decided jointly, as one
+    complementarity problem of their accelerations (or of higher derivatives if the accelerations are zero).
 
     Parameters
     ----------
@@ -152,28 +152,28 @@ class MechanicalSystem:
         Shape (n, n), dense or of scipy.sparse, or (n,) for a diagonal; M is positive definite. C or K may be
         None.
     forcing : sequence or mapping of int to float, Harmonic or tuple of these, optional
-        None, or for each coordinate a number, a `Harmonic`, or a tuple of these; also a mapping from
-        coordinates.
+        For each coordinate a number, a `Harmonic`, or a tuple of these; or a mapping from coordinates to
+        these; or None.
     contacts : iterable of MechanicalContact, optional
         `MechanicalContact` objects.
     impacts : iterable of MechanicalImpact, optional
-        Of directions d_j; with them a system is run by ``moreau``.
+        Unilateral contacts with directions d_j; a system with impacts is run by ``moreau``.
     q0, v0 : array, optional
         Initial positions and velocities (n,), zero if not given.
     names : sequence of str, optional
-        Of the coordinates, q1, q2, ... if not given; their velocities are v1, v2, ... or ``v_`` and the name.
+        Names of the coordinates, by default q1, q2, ...; their velocities are v1, v2, ... or ``v_`` and the name.
     name, title, source : str, optional
-        As of a `Model`.
+        As in a `Model`.
 
     Raises
     ------
     UsageError
-        For shapes that do not fit, a mass matrix that is not positive definite, names that are not unique.
+        For inconsistent shapes, a mass matrix that is not positive definite, or duplicate names.
 
     Notes
     -----
-    From a few contacts to thousands. The ordinary `Model` knows more laws, states and inputs, and is decided by trying
-    all combinations of modes; `to_model` makes one of a small system.
+    It is meant for a few to thousands of contacts. The ordinary `Model` supports more laws, states and
+    inputs, and decides by trying all combinations of modes; `to_model` converts a small system to one.
 
     Examples
     --------
@@ -200,7 +200,7 @@ class MechanicalSystem:
     ) -> None:
         for what, text in (("name", name), ("title", title), ("source", source)):
             if not isinstance(text, str):
-                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="give a text")
+                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="give a string")
         self.name, self.title, self.source = name, title, source
         self.M = _matrix(M, "M", None)
         require_positive_definite(self.M, name)
@@ -212,17 +212,17 @@ class MechanicalSystem:
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
         self.names = tuple(f"q{i + 1}" for i in range(self.n)) if names is None else as_tuple(names)
         if not all(isinstance(x, str) for x in self.names):
-            raise UsageError(f"{name}: names is {names!r}", remedy=f"give {self.n} texts")
+            raise UsageError(f"{name}: names is {names!r}", remedy=f"give {self.n} strings")
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
     def _parts(self, given: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
-        """A tuple of contacts or impacts."""
+        """Return a tuple of contacts or impacts."""
         parts = as_tuple(given)
         for part in parts:
             if not isinstance(part, kind):
                 raise UsageError(
-                    f"{self.name}: {what} hold {part!r}", remedy=f"give hs.{kind.__name__}(...) objects"
+                    f"{self.name}: {what} contain {part!r}", remedy=f"give hs.{kind.__name__}(...) objects"
                 )
         return parts
 
@@ -246,7 +246,8 @@ class MechanicalSystem:
         for i, given in pairs.items():
             if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
                 raise UsageError(
-                    f"{self.name}: forcing names the coordinate {i!r} of {self.n}", remedy="count from 0"
+                    f"{self.name}: forcing has the coordinate {i!r}, but there are {self.n}",
+                    remedy="count from 0",
                 )
             terms = given if isinstance(given, tuple | list) else (given,)
             for term in terms:
@@ -255,7 +256,7 @@ class MechanicalSystem:
                 ):
                     raise UsageError(
                         f"{self.name}: forcing of coordinate {i} holds {term!r}",
-                        remedy="give numbers and hs.Harmonic(omega, ...); write others in an hs.Model",
+                        remedy="give numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
                     )
             kept = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
             if kept:
@@ -272,15 +273,13 @@ class MechanicalSystem:
     def _check(self) -> None:
         if len(self.names) != self.n:
             raise UsageError(
-                f"{self.name}: names has {len(self.names)} of them for {self.n} coordinates",
+                f"{self.name}: there are {len(self.names)} names for {self.n} coordinates",
                 remedy="give a name for each coordinate",
             )
         every = [*self.names, *self.velocities, *(c.name for c in self.all_contacts)]
         twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
         if twice:
-            raise UsageError(
-                f"{self.name}: two things are called {twice[0]!r}", remedy="give each a name of its own"
-            )
+            raise UsageError(f"{self.name}: the name {twice[0]!r} is used twice", remedy="use each name once")
         for contact in self.all_contacts:
             what = "contact" if isinstance(contact, MechanicalContact) else "impact"
             if contact.weights not in (0, self.n):
@@ -291,7 +290,7 @@ class MechanicalSystem:
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
-                        f"{what} {contact.name}: its direction names the coordinate {i} of {self.n}",
+                        f"{what} {contact.name}: its direction has the coordinate {i}, but there are {self.n}",
                         remedy="count from 0",
                     )
 
@@ -301,7 +300,7 @@ class MechanicalSystem:
         return (*self.contacts, *self.impacts)
 
     def with_(self, **changes: Any) -> MechanicalSystem:
-        """A copy with some arguments of the constructor changed."""
+        """Return a copy with some arguments of the constructor changed."""
         own: dict[str, Any] = {
             key: getattr(self, key)
             for key in (
@@ -322,7 +321,7 @@ class MechanicalSystem:
         return MechanicalSystem(**{**own, **changes})
 
     def to_model(self) -> Model:
-        """The same as an ordinary `Model`, in text: for other integrators, and to check one against the other."""
+        """Return the same system as an ordinary `Model`, for other integrators or for comparison."""
         from hybridsim.mechanics.as_model import as_model
 
         return as_model(self)
@@ -334,7 +333,7 @@ class MechanicalSystem:
 
 
 def _matrix(given: Any, what: str, n: int | None) -> Any:
-    """A square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
+    """Return a square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
     from scipy import sparse
 
     if given is None and n is not None:

@@ -1,4 +1,4 @@
-"""What a run of a mechanical system leaves behind: pieces of series for each node, events, and values at any time."""
+"""This module stores a run of a mechanical system as pieces of series per node, and evaluates it at any time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.mechanics.polynomials import value_and_slope
 def evaluate(
     node_dof: Any, ptr: Any, begins: Any, start: Any, row: Any, series: Any, times: Any, right: bool, out: Any
 ) -> None:
-    """Positions and velocities (k, 2n) at times; pieces sorted by node (ptr) and time (begins)."""
+    """Evaluate positions and velocities (k, 2n) at times; pieces are sorted by node (ptr) and time (begins)."""
     n = out.shape[1] // 2
     for j in range(node_dof.shape[0] - 1):
         for i in range(times.shape[0]):
@@ -52,9 +52,9 @@ def quantities(
     forces: Any,
     velocities: Any,
 ) -> None:
-    """Make velocities meet the constraints of what sticks at each time; forces and relative velocities (k, m) there.
+    """Make velocities satisfy the stick constraints at each time; compute forces and relative velocities (k, m).
 
-    order sorts the times; first: modes at the start; out (k, 2n): states, velocities changed in place.
+    order sorts the times; first: modes at the start; out (k, 2n): states, whose velocities are changed in place.
     """
     n, at, nodes = out.shape[1] // 2, 0, plant.node_dof.shape[0] - 1
     for c in range(first.shape[0]):
@@ -99,7 +99,7 @@ class Pieces:
         self.begins = instants(self.start)
 
     def states(self, times: np.ndarray, right: bool) -> np.ndarray:
-        """Positions and velocities (k, 2n) in the plant's own order."""
+        """Return positions and velocities (k, 2n) in the order of the arrays."""
         out = np.empty((len(times), 2 * len(self.plant.dof_node)))
         arguments = (self.ptr, self.begins, self.start, self.row, self.series)
         evaluate(self.plant.node_dof, *arguments, np.ascontiguousarray(times), right, out)
@@ -107,5 +107,5 @@ class Pieces:
 
 
 def instants(parts: np.ndarray) -> np.ndarray:
-    """Doubles nearest to (high, low, local) times (k, 3)."""
+    """Return the doubles nearest to (high, low, local) times (k, 3)."""
     return parts[:, 0] + (parts[:, 1] + parts[:, 2]) if len(parts) else np.zeros(0)

@@ -1,4 +1,4 @@
-"""Pictures of solutions and comparisons: functions return the axes they drew in and change nothing global."""
+"""This package draws solutions and results; functions return their axes and change no global settings."""
 
 from hybridsim.plot.advice import advice
 from hybridsim.plot.branch import branch

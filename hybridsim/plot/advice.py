@@ -1,4 +1,4 @@
-"""Pictures of an advice: the error of each rung beside the tolerance, or a map of the simplest adequate rung."""
+"""This module draws an advice: the errors of the rungs, or a map of the simplest adequate rung."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Advice
     from hybridsim.analysis.advise.ladder import Step
 
-# The axis of errors: at least that many times the tolerance to both sides, and at most so many, with some room.
+# Range of the error axis: at least _NEAR and at most _FAR times the tolerance on both sides, with a margin
+# factor.
 _NEAR, _FAR, _ROOM = 30.0, 1e5, 2.0
 _TOP_LINE = -0.75  # above the first rung, in rungs
-_NOTHING = "#d8d8d8"  # grey is no rung's colour
+_NOTHING = "#d8d8d8"  # grey is not the colour of any rung
 _COLOURS = {
     "at-rest": "#4d4d4d", "no-friction": "#a6cee3", "viscous": "#1f78b4", "no-stop": "#33a02c",
     "constant-mu-at-rest": "#fdbf6f", "constant-mu-mean": "#ff7f00", "mu_s=mu_k": "#b15928",
@@ -35,9 +36,9 @@ _COLOURS = {
 def advice(found: Advice, axes: Axes | None = None) -> Axes:
     """Draw an advice: the ladder of one scene, or the map of a region of two parameters.
 
-    In the ladder a stem leads from the tolerance to the error of a rung against the full model: to the left, filled,
-    where it is adequate, with an arrow where it lies beyond the axis. Beside it stand error and cost. A rung without a
-    stem does not apply, gives no value or was stopped.
+    In the ladder a stem leads from the tolerance to the error of each rung. An adequate rung has a filled
+    marker on the left, and an arrow marks an error beyond the axis. The error and the cost are written next
+    to it. A rung without a stem does not apply, gives no value, or was stopped.
     """
     if axes is None:
         size = (6.4, 4.2) if found.region is not None else (7.2, 0.34 * len(found.ladder) + 1.4)
@@ -76,13 +77,13 @@ def _ladder(found: Advice, axes: Axes) -> None:
 
 
 def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
-    """Ends of the axis: the tolerance stands well inside, and so do all errors that are near enough to be compared."""
+    """Return the ends of the axis, which contain the tolerance and all errors near enough to compare."""
     near = [e for e in errors if tol / _FAR <= e <= tol * _FAR]
     return min([tol / _NEAR, *near]) / _ROOM, max([tol * _NEAR, *near]) * _ROOM
 
 
 def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
-    """A stem from the tolerance to the error, filled where it is adequate; an arrow where it lies beyond an end."""
+    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks an error beyond an end."""
     low, high = ends
     colour = style.PALETTE[0] if step.is_adequate else style.PALETTE[1]
     at = min(max(step.error, low), high)
@@ -93,7 +94,7 @@ def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float])
 
 
 def _beside(axes: Axes, y: float, text: str, colour: str) -> None:
-    """Text to the right of the axes, on the level of a rung."""
+    """Write text to the right of the axes, at the height of a rung."""
     axes.text(
         1.03, y, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=colour
     )  # fmt: skip
@@ -108,8 +109,8 @@ def _map(found: Advice, axes: Axes) -> None:
     assert region is not None
     if len(region.axes) != 2 or region.mode != "grid":
         raise UsageError(
-            f"a map needs two parameters, and the region has {len(region.axes)}",
-            remedy="look at advice.region instead",
+            f"a map needs two parameters, but the region has {len(region.axes)}",
+            remedy="read advice.region instead",
         )
     names = [step.name for step in found.ladder]
     numbers = np.full(region.status.shape, len(names), dtype=float)

@@ -1,4 +1,4 @@
-"""A branch of periodic orbits: a measure over the parameter, dashed where orbits repel, its special points marked."""
+"""This module draws a branch of periodic orbits: a measure over the parameter, with stability and special points."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _TITLES = {"sequence": "sequence of modes changes"}
 
 
 def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None) -> Axes:
-    """Draw the amplitude of a quantity (the first state if not given) over the parameter.
+    """Draw the amplitude of a quantity, by default the first state, over the parameter.
 
     Parameters
     ----------
-    axes : where to draw; a new figure if not given.
+    axes : the axes to draw in; by default a new figure.
     """
     model = result.points[0].motion.model
     name = name or model.states[0].name
@@ -56,7 +56,7 @@ def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None)
 
 
 def _beside(mask: np.ndarray) -> np.ndarray:
-    """The mask and the points next to it, so that the parts of a line meet."""
+    """Return the mask with the neighbours of its points, so that the parts of a line meet."""
     wider = mask.copy()
     wider[1:] |= mask[:-1]
     return wider

@@ -1,4 +1,4 @@
-"""A friction law: force against velocity, and against displacement where the law remembers."""
+"""This module draws a friction law: force against velocity, and against displacement for laws with memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridsim.plot import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_POINTS = 2000  # over a period; a loop of Iwan's model has a hundred corners at most
+_POINTS = 2000  # per period; a loop of Iwan's model has at most a hundred corners
 
 
 def friction_law(
@@ -29,22 +29,22 @@ def friction_law(
     mean: float = 0.0,
     integrator: str = "auto",
 ) -> list[Axes]:
-    """Draw what a law does: one axes, or two where it has states.
+    """Draw a friction law, in one axes, or in two if it has states.
 
-    A set-valued law is drawn as the curve that it is, with its range at rest. Any other is driven by the velocity
-    mean + speed*cos(speed/amplitude*t), and drawn over the second period; with states also against the
-    displacement, the mean motion left out.
+    A set-valued law is drawn as its curve, with the range of forces at rest. Any other law is driven by the
+    velocity mean + speed*cos(speed/amplitude*t) and drawn over the second period. A law with states is also
+    drawn against the displacement, without its mean motion.
 
     Parameters
     ----------
-    law : a law, or the name of one that comes with the package.
+    law : a law, or the name of a packaged one.
     arguments : values of its parameters.
-    speed : largest velocity (about the mean); has to be given, since no law knows how fast it is used.
+    speed : largest velocity about the mean; it has no default, because a law does not determine a range of speeds.
     """
     found = load_law(law) if isinstance(law, str) else law
     if speed is None:
         raise UsageError(
-            f"friction_law({found.name!r}) has no speed", remedy="give speed=, the largest velocity to draw"
+            f"friction_law({found.name!r}) needs a speed", remedy="give speed=, the largest velocity to draw"
         )
     if not speed > 0 or not amplitude > 0:
         raise UsageError(f"speed is {speed!r}, amplitude is {amplitude!r}", remedy="give numbers above zero")
@@ -75,7 +75,7 @@ def _curve(axes: Axes, contact: Contact, speed: float) -> None:
 
 
 def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> float:
-    """Magnitude of the slip force of a contact whose values are all numbers; tables included."""
+    """Return the magnitude of the slip force of a contact with numerical values, including its tables."""
     names = {table.name: table.value(speed) for table in contact.law.tables}
     slip = (contact.law.slip_backward if backward else None) or contact.law.slip
     values = {name: evaluate(e, {}) for name, e in contact.values().items() if name not in names}

@@ -1,4 +1,4 @@
-"""An output against a state: for a friction force against a displacement, the loop whose area is the loss."""
+"""This module draws an output against a state: the area of a friction loop is the energy loss."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def friction_loop(
 
     Parameters
     ----------
-    output : the force of the first contact if not given; without a contact the first output.
-    state : the first if not given.
-    t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
-    axes : where to draw; a new figure if not given.
+    output : by default the force of the first contact; without a contact the first output.
+    state : by default the first.
+    t_span : part of the run; by default all, or the last few of very many periods (the title says so).
+    axes : the axes to draw in; by default a new figure.
     """
     refuse_arrays(solution)
     model = solution.model

@@ -1,4 +1,4 @@
-"""How the lines of a comparison look: a hue for each family, a marker for each method, dashes for native events."""
+"""This module chooses the look of lines in comparisons: hue, marker and dashes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SIZE = 6.5
 PALE = 0.35
 
-# Of regularised forms and the law that they stand for; their integrators differ in their dashes.
+# colours of regularised forms and of the set-valued law; their integrators differ in dashes
 _SET_VALUED = "set-valued"
 _FORMS = {
     _SET_VALUED: style.INK,
@@ -27,8 +27,8 @@ _FORMS = {
     "arctan": style.PALETTE[1],
     "karnopp": style.PALETTE[2],
 }
-# The hue of each family, from Okabe and Ito's palette: of the published methods, of SciPy's explicit ones, its other
-# ones, SUNDIALS, and of all that is none of these. A name belongs to the first prefix that it has.
+# The hue of each family, from Okabe and Ito's palette: published methods, SciPy's explicit methods, other
+# SciPy methods, SUNDIALS, and all others. A name belongs to the first prefix that matches.
 _FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (style.INK, ("rk4-",)),
     (style.PALETTE[1], ("scipy-rk", "scipy-dop")),
@@ -37,7 +37,7 @@ _FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (style.PALETTE[0], ("",)),
 )
 _MARKERS = (*style.MARKERS, "h", "d", "8")
-_DARK, _LIGHT = 0.7, 0.4  # the range of shades of a hue: this much of it in black, and in white
+_DARK, _LIGHT = 0.7, 0.4  # the range of shades of a hue: fractions mixed with black and with white
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Look:
     dashes: str
 
     def handle(self, label: str, size: float = SIZE) -> Line2D:
-        """What stands for the line in a legend."""
+        """Return the legend entry of the line."""
         return Line2D(
             [], [], color=self.colour, marker=self.marker, linestyle=self.dashes, markersize=size, linewidth=1.1,
             label=label,
@@ -57,10 +57,10 @@ class Look:
 
 
 def looks(rows: Iterable[Row]) -> dict[str, Look]:
-    """Label -> look, in the order of the rows.
+    """Return the look of each label, in the order of the rows.
 
-    Methods of one family share a hue and differ in lightness and marker; two lines of one method (our events and
-    its own, as published and refined) or of one regularised form differ in their dashes.
+    Methods of one family share a hue and differ in lightness and marker. Several lines of one method (our
+    events and its own, published and refined) or of one regularised form differ in their dashes.
     """
     rows = list(rows)
     whole = _SET_VALUED if any(row.form for row in rows) else ""
@@ -90,7 +90,7 @@ def _hue(name: str) -> str:
 
 
 def _shade(hue: str, place: int, count: int) -> str:
-    """One of `count` shades of a hue, dark first."""
+    """Return one of `count` shades of a hue, dark first."""
     if count == 1:
         return hue
     part = place / (count - 1)
@@ -104,8 +104,9 @@ def draw_line(
 ) -> None:  # fmt: skip
     """Draw the settings of a line at their (time, error), with the spread of the times.
 
-    A point is filled where the modes are right, hollow where they are wrong, half filled where there are none to
-    judge. What is cold was timed only in its first run, which warms up: it is drawn pale and the line passes it by.
+    A point is filled if the modes are right, hollow if they are wrong, and half filled if there are no modes
+    to compare. A cold point was timed only in its first run, which warms up; it is drawn pale, without the
+    line.
     """
     if not points:
         return

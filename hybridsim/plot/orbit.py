@@ -1,4 +1,4 @@
-"""One quantity against another: what the phase portrait and the friction loop have in common."""
+"""This module draws one quantity against another, for phase portraits and friction loops."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 Points = NDArray[np.float64]
 
-_HELD, _FREE = 3.0, 1.2  # line widths where a surface holds (stick), and elsewhere
-_DOT = 5.0  # size of a stretch that stays at a point
-_VISIBLE = 1e-3  # of the range: what is smaller is a point, or no jump
+_HELD, _FREE = 3.0, 1.2  # line widths if a surface holds (stick), and otherwise
+_DOT = 5.0  # size of an interval that stays at a point
+_VISIBLE = 1e-3  # of the range: a smaller piece is a point, a smaller jump is not drawn
 
 
 def draw_orbit(
     solution: Solution, across: str, up: str, t_span: tuple[float, float] | None, axes: Axes | None
 ) -> Axes:
-    """Draw `up` against `across` in the colours of the modes; held pieces thick, jumps dashed.
+    """Draw `up` against `across` in the colours of the modes, with thick held pieces and dashed jumps.
 
-    With several components they are the modes of those that the quantities are of: a contact whose force or velocity is
-    drawn. Where there are none, or more than one, a colour stands for the mode of the first one, and a piece is held
-    where any is.
+    The colours show the modes of the components that belong to the quantities, such as a contact whose force
+    or velocity is drawn. If there is no such component, or several, the colour shows the mode of the first
+    one, and a piece is held if any component holds.
     """
     units = unit_of(solution, across), unit_of(solution, up)
     window = window_of(solution, t_span)
@@ -96,7 +96,7 @@ def draw_orbit(
 
 
 def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
-    """The components that the drawn quantities are of; all of them where none is."""
+    """Return the components that belong to the drawn quantities, or all if there are none."""
     forces = [contact.name for contact in solution.model.contacts if contact.name in drawn]
     moved = [contact.name for contact in solution.model.contacts if drawn & contact.velocity.names]
     return forces or moved or [component.name for component in solution.components]
@@ -105,7 +105,7 @@ def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
 def _stretches(
     pieces: Sequence[Piece], across: str, up: str, surfaces: Mapping[str, str], least: Points
 ) -> tuple[list[tuple[str, Points]], list[tuple[Points, Points]]]:
-    """Continuous stretches of one mode, whatever ticked meanwhile, and the jumps between them."""
+    """Return the continuous intervals of one mode, merged over other events, and the jumps between them."""
     stretches: list[tuple[str, list[Points]]] = []
     jumps = []
     for piece in pieces:

@@ -1,4 +1,4 @@
-"""One state against another, stick drawn apart and jumps dashed."""
+"""This module draws one state against another, with stick highlighted and jumps dashed."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def phase_portrait(
     t_span: tuple[float, float] | None = None,
     axes: Axes | None = None,
 ) -> Axes:
-    """Draw state `y` against state `x` (the first two if not given).
+    """Draw state `y` against state `x`, by default the first two.
 
-    The colours are those of the modes. What a surface holds is thick, or a dot where it does not move at all.
+    The colours show the modes. Pieces held by a surface are thick, or a dot if the point does not move.
 
     Parameters
     ----------
-    t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
-    axes : where to draw; a new figure if not given.
+    t_span : part of the run; by default all, or the last few of very many periods (the title says so).
+    axes : the axes to draw in; by default a new figure.
     """
     refuse_arrays(solution)
     names = [state.name for state in solution.model.states]

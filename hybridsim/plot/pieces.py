@@ -1,4 +1,4 @@
-"""Cuts a solution at its events into smooth pieces, sampled densely enough to draw, in bounded number."""
+"""This module cuts a solution at its events into smooth pieces, with a bounded number of sample points."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from hybridsim.model.units import units_of
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-# Points of a whole picture, about four for each pixel across; and the fewest of a piece, so that a short
-# slip among long ones is still a curve.
+# Points of a whole picture, about four per horizontal pixel, and the fewest per piece, so that a short slip
+# among long ones remains a curve.
 _POINTS, _LEAST = 6_000, 9
-# More periods than can be told apart in a picture are not drawn; the last few are, without the transient.
+# If there are more periods than a picture can resolve, only the last few are drawn, without the transient.
 _MANY, _FEW = 24, 4
-_MANY_EVENTS, _FEW_EVENTS = 300, 24  # and so with events, where nothing has a period
-# A number of periods that differs from a whole one by this share is whole: an end given as 100T is rounded.
+_MANY_EVENTS, _FEW_EVENTS = 300, 24  # the same for events of a motion without a period
+# A number of periods that differs from a whole one by this fraction is whole, because an end such as 100T is
+# rounded.
 _WHOLE = 1e-9
 
 
@@ -39,7 +40,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Window:
-    """The part of a run to draw, and what the title has to say about it."""
+    """The part of a run to draw, and a note for the title."""
 
     t0: float
     t1: float
@@ -47,27 +48,28 @@ class Window:
 
 
 def refuse_arrays(solution: Any) -> None:
-    """Refuse what is no solution, and that of a `MechanicalSystem`: it has no units, no period, no look of its own."""
+    """Refuse objects other than solutions, and solutions of a `MechanicalSystem`, which have no units."""
     if not hasattr(solution, "model"):
         raise UsageError(
-            f"there is nothing to draw in {type(solution).__name__} {getattr(solution, 'name', '')}".rstrip(),
-            remedy="give what simulate returns: hs.simulate(model, (t0, t1))",
+            f"{type(solution).__name__} {getattr(solution, 'name', '')}".rstrip() + " cannot be drawn",
+            remedy="give the result of a run: hs.simulate(model, (t0, t1))",
         )
     if isinstance(solution.model, MechanicalSystem):
         raise UsageError(
-            f"{type(solution).__name__} of {solution.model.name} is not drawn by this",
-            remedy="run to_model() of the system and draw that; or draw columns of sol.to_pandas() by its plot()",
+            f"{type(solution).__name__} of {solution.model.name} cannot be drawn by this function",
+            remedy="simulate system.to_model() and draw that, or draw columns of sol.to_pandas() with its plot()",
         )
 
 
 def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
-    """What to draw: `t_span` if given, else all of it, or the last few of very many periods or regular events."""
+    """Return the part to draw: `t_span` if given, else all, or the end of a run with many periods or events."""
     start, end = sorted((solution.t_start, solution.t_end))
     if t_span is not None:
         t0, t1 = sorted(map(float, t_span))
         if not (t1 > start and t0 < end):
             raise UsageError(
-                f"t_span = ({t0:g}, {t1:g}) is outside of the run", remedy=f"it is from {start:g} to {end:g}"
+                f"t_span = ({t0:g}, {t1:g}) is outside of the run",
+                remedy=f"the run covers t = {start:g} to {end:g}",
             )
         return Window(max(t0, start), min(t1, end))
     period = forcing_period(solution.model)
@@ -79,7 +81,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
 
 
 def _last_events(solution: Solution, start: float, end: float) -> Window:
-    """All, or the last of very many events that are spread over the run: a limit cycle's, not a bouncing ball's."""
+    """Return all, or the last of very many events that are spread over the run, as in a limit cycle."""
     times = np.array([event.t for event in solution.events if event.kind == "transition"])
     if len(times) <= _MANY_EVENTS:
         return Window(start, end)
@@ -91,13 +93,13 @@ def _last_events(solution: Solution, start: float, end: float) -> Window:
 
 
 def _short(periods: float) -> str:
-    """A number of periods: whole where it is, but for rounding, else with one decimal."""
+    """Return a number of periods as text: whole if it is whole to rounding, else with one decimal."""
     whole = round(periods)
     return f"{whole}" if abs(periods - whole) < _WHOLE * periods else f"{periods:.1f}"
 
 
 def unit_of(solution: Solution, name: str) -> str:
-    """Unit of what `Solution.output` knows, empty where none is declared; `UsageError` for a name that it does not."""
+    """Return the unit of a quantity, empty if none is declared; raise `UsageError` for an unknown name."""
     units = units_of(solution.model)
     if name not in units:
         try:
@@ -111,13 +113,13 @@ def unit_of(solution: Solution, name: str) -> str:
 
 
 def extent(pieces: Sequence[Piece], name: str) -> tuple[float, float]:
-    """Least and largest value of a quantity."""
+    """Return the least and largest value of a quantity."""
     values = [piece.values[name] for piece in pieces]
     return float(min(map(np.min, values))), float(max(map(np.max, values)))
 
 
 def pieces_of(solution: Solution, names: Sequence[str], window: Window) -> list[Piece]:
-    """The pieces of a window in order of time; at an event one ends at x- and the next begins at x+."""
+    """Return the pieces of a window in order of time; at an event one ends at x- and the next begins at x+."""
     inner = {e.t for e in solution.events if e.kind != "near-grazing" and window.t0 < e.t < window.t1}
     cuts = np.array([window.t0, *sorted(inner), window.t1])
     lengths = np.diff(cuts)
@@ -147,7 +149,7 @@ def _evaluate(solution: Solution, name: str, t: NDArray[np.float64], side: str) 
 
 
 def _mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:
-    """Function of a time that gives the mode of each component."""
+    """Return a function from a time to the mode of each component."""
     starts, modes = {}, {}
     for component, intervals in solution.modes.items():
         ordered = sorted((min(interval.t0, interval.t1), interval.mode) for interval in intervals)

@@ -1,4 +1,4 @@
-"""What a regularised friction law costs and what it is worth: error and wall time against its width v0."""
+"""This module draws the error and the cost of regularised friction laws against their width v0."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     """Draw two panels over v0: the largest error of the states over the run, and the wall time.
 
-    The legend gives the exponents of error and work (evaluations) as v0 falls. Level lines are the set-valued law.
+    The legend gives the exponents of error and work (evaluations) as v0 falls. Horizontal lines are the set-valued law.
     """
     figure = style.figure(12.5, 5.0)
     figure.suptitle(headline(comparison), fontsize=10, x=0.01, ha="left")

@@ -1,4 +1,4 @@
-"""Labels and ticks of an axis that carries a physical quantity: prefixes instead of powers of ten."""
+"""This module labels axes of physical quantities, with prefixes instead of powers of ten."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-# Units that take a prefix when they stand first: "m" and "m/s" do, "kg" (has one) and "1/s" do not.
+# Units that take a prefix at their start: "m" and "m/s" do; "kg" (which has one) and "1/s" do not.
 _TAKES_PREFIX = re.compile(r"(m|s|N|V|A|W|J|Pa|Hz|rad|g|C|F|H|K|Nm|N m)(?![A-Za-z])")
 
 
 class Scaled(Formatter):
-    """Ticks in units of `factor`, with as many decimals as their spacing needs; the data stay as they are."""
+    """Formats ticks in units of `factor`, with as many decimals as their spacing needs; the data are unchanged."""
 
     def __init__(self, factor: float) -> None:
         self.factor = factor
@@ -30,7 +30,7 @@ class Scaled(Formatter):
         scaled = [value / self.factor for value in values]
         steps = [abs(b - a) for a, b in itertools.pairwise(scaled) if b != a]
         decimals = 0
-        # Rounding must not show: the fewest decimals at which every tick is where its label says.
+        # Use the fewest decimals for which every label is exact.
         while (
             decimals < 9
             and steps

@@ -1,4 +1,4 @@
-"""Colours and dress of the pictures, set on each axes; matplotlib's global settings are left alone."""
+"""This module sets colours and styles on each axes, without changing matplotlib's global settings."""
 
 from __future__ import annotations
 
@@ -23,13 +23,11 @@ MARK = "#c4c4c4"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 150
-_LETTERS = (
-    13.0  # of a title, to the inch: those of the default font at 10 points are some 14, wide ones fewer
-)
+_LETTERS = 13.0  # of a title per inch: the default font at 10 points has about 14, fewer if they are wide
 
 
 def dress(axes: Axes) -> None:
-    """Quiet frame and grid, behind the data."""
+    """Style the frame and the grid so that they stay behind the data."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(FAINT)
     axes.tick_params(color=FAINT, labelsize=9)
@@ -38,12 +36,12 @@ def dress(axes: Axes) -> None:
 
 
 def literal(text: str) -> str:
-    """Text from a model as it stands: matplotlib would read what is between dollars as mathematics."""
+    """Return text for matplotlib, with dollar signs escaped so that it is not read as mathematics."""
     return text.replace("$", r"\$")
 
 
 def head(axes: Axes, *parts: str) -> None:
-    """Title of axes: each part that is not empty on its own lines, broken where the figure ends or other axes begin."""
+    """Set the title of axes: each non-empty part on its own lines, wrapped at the width of the axes' column."""
     whole, left = _figure_of(axes), axes.get_position().x0
     beside = [other.get_position().x0 for other in whole.axes]
     right = min((x0 for x0 in beside if x0 > axes.get_position().x1), default=1.0)
@@ -53,7 +51,7 @@ def head(axes: Axes, *parts: str) -> None:
 
 
 def figure(width: float, height: float) -> Figure:
-    """A figure (inches) that belongs to no window and to no global state."""
+    """Return a figure (size in inches) without a window or global state."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -64,12 +62,12 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
     ----------
     picture : a figure, axes, or several axes of one figure, as the functions of `hybridsim.plot` return them.
     path : ends in .png, .pdf or .svg.
-    dpi : dots to the inch of a .png.
+    dpi : dots per inch of a .png.
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(
-            f"{path} is no picture that can be written", remedy=f"end it in {', '.join(SUFFIXES)}"
+            f"{path}: unsupported file type {path.suffix!r}", remedy=f"use {', '.join(SUFFIXES)}"
         )
     with whole_file(path) as partly:
         _figure_of(picture).savefig(partly, dpi=dpi)
@@ -85,4 +83,4 @@ def _figure_of(picture: Any) -> Figure:
         for part in picture:
             if part is not None:
                 return _figure_of(part)
-    raise UsageError(f"{type(picture).__name__} is no picture", remedy="give a figure or axes")
+    raise UsageError(f"{type(picture).__name__} is not a picture", remedy="give a figure or axes")

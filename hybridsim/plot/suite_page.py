@@ -1,4 +1,4 @@
-"""The comparison suite on one page: a small chart for each scene, one legend for all."""
+"""This module draws the comparison suite on one page: a small chart per scene, and one legend."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _MARKER = 4.5
 def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
     """Draw the largest error of the states over the run against the wall time, scene by scene.
 
-    A run with a wrong sequence of modes is hollow. Dashes mark SciPy's own event finding, or the refined form of
-    the published method, beside the solid line of the same colour.
+    Runs with a wrong sequence of modes are hollow. Dashed lines show SciPy's own event finding, or the
+    refined form of the published method, in the colour of the solid line.
     """
     comparisons = [result.comparison for result in suite.results]
     rows = [row for comparison in comparisons for row in comparison.rows]

@@ -1,4 +1,4 @@
-"""Readings of a sweep as lines over one parameter, one line for each value of the other."""
+"""This module draws readings of a sweep as lines over one parameter, one line for each value of the other."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Sweep
 
-_FEW = 30  # points of a line that are marked each
-_DOT = 5.0  # size of the items of an array, the first line's
-_CROWD = 12  # lines that a legend names each; of more, some
-_WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of what stands above and below
+_FEW = 30  # points of a line up to which each is marked
+_DOT = 5.0  # size of the items of an array, for the first line
+_CROWD = 12  # lines up to which the legend names each; of more lines it names some
+_WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of the space above and below
 
 
 def sweep_lines(
     result: Sweep, *names: str, over: str | None = None, axes: tuple[Axes, ...] | None = None
 ) -> tuple[Axes, ...]:
-    """Draw readings over one parameter, a panel each; of an array at each point, every item as a dot.
+    """Draw readings over one parameter, a panel each; arrays are drawn as dots.
 
     Parameters
     ----------
-    names : readings; six of those that are numbers if none is given, amplitudes, stick and stops before others.
-    over : the parameter that runs across; if not given the longest axis of numbers.
-    axes : as many axes as readings, to draw in; a new figure if not given.
+    names : readings; by default up to six numerical ones, with amplitudes, stick and stops first.
+    over : the parameter on the horizontal axis; by default the longest numerical one.
+    axes : as many axes as readings, to draw in; by default a new figure.
     """
     dimensions = list(result.axes) if result.mode == "grid" else [next(iter(result.axes))]
     if len(dimensions) > 2:
         raise UsageError(
             f"the sweep has {len(dimensions)} parameters",
-            remedy="two can be drawn; take a part of it with to_xarray().sel(...)",
+            remedy="at most two can be drawn; select a part of it with to_xarray().sel(...)",
         )
     lengths = dict(zip(dimensions, result.status.shape, strict=True))
     across = over
-    if over is None:  # texts are no distances
+    if over is None:  # texts have no distances
         across = max(dimensions, key=lambda name: (result.axes[name].dtype.kind == "f", lengths[name]))
     if not isinstance(across, str) or across not in dimensions:
         raise UsageError(f"over is {over!r}", remedy=nearest(str(over), dimensions, kind="parameters"))
@@ -87,7 +87,7 @@ def _draw(
         y = values if other is None else values[:, k]
         if has_items:
             dots = np.broadcast_to(x[:, None], y.shape)
-            size = _DOT * 0.6**k  # what lies under other dots still shows around them
+            size = _DOT * 0.6**k  # dots under other dots remain visible around them
             panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=max(size, 1.5), label=label)
         else:
             marker = "o" if len(x) <= _FEW else ""
@@ -108,7 +108,7 @@ def _draw(
 
 
 def _colours(count: int) -> list[str]:
-    """Apart for few lines; from dark to light in their order for many."""
+    """Return distinct colours for few lines, and colours from dark to light for many."""
     if count <= len(style.PALETTE):
         return list(style.PALETTE[:count])
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, count))

@@ -1,4 +1,4 @@
-"""Readings of a sweep over two parameters as maps."""
+"""This module draws readings of a sweep over two parameters as maps."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
 
 _COLUMNS = 3
-_WIDTH, _HEIGHT, _MORE = 4.6, 3.4, 0.5  # inches of a map with its scale, and of the title
-_BETWEEN = 0.12  # inches on each side, so that the label of a scale is not taken for that of the next map
-_NOTHING = "#d8d8d8"  # no colour of the scale
+_WIDTH, _HEIGHT, _MORE = 4.6, 3.4, 0.5  # inches of a map with its colour bar, and of the title
+_BETWEEN = 0.12  # inches on each side, so that the label of a colour bar is not read as that of the next map
+_NOTHING = "#d8d8d8"  # not a colour of the scale
 
 
 def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) -> tuple[Axes, ...]:
-    """Draw readings over two parameters, a map each: the first parameter up, the second across.
+    """Draw readings over two parameters, a map each: the first parameter is vertical, the second horizontal.
 
     Points without a result are grey.
 
     Parameters
     ----------
-    names : readings; six of those that are numbers if none is given, amplitudes, stick and stops before others.
-    axes : as many axes as readings, to draw in; a new figure if not given.
+    names : readings; by default up to six numerical ones, with amplitudes, stick and stops first.
+    axes : as many axes as readings, to draw in; by default a new figure.
     """
     if len(result.axes) != 2 or result.mode != "grid":
         raise UsageError(
-            f"a map needs a grid of two parameters, and this is a {result.mode} of {len(result.axes)}",
-            remedy="draw lines, or take a part of it with to_xarray().sel(...)",
+            f"a map needs a grid of two parameters, but this sweep is a {result.mode} of {len(result.axes)}",
+            remedy="draw lines, or select a part of it with to_xarray().sel(...)",
         )
     found = chosen_names(result, names, arrays=False)
     if axes is None:

@@ -1,4 +1,4 @@
-"""A sweep as a picture: lines over one parameter, maps over two."""
+"""This module draws a sweep: lines over one parameter, or maps over two."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 
 def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ...]:
-    """Draw readings of a sweep; all that are numbers, if none is named, up to six.
+    """Draw readings of a sweep, by default up to six numerical ones.
 
-    A parameter of texts, such as the direction of `hs.bifurcation`, does not run across: its readings are lines, and
-    arrays at each point dots, the diagram of a bifurcation.
+    A parameter of texts, such as the direction of `hs.bifurcation`, is not an axis: its readings are separate
+    lines. Arrays at each point are drawn as dots, as in a bifurcation diagram.
 
     Parameters
     ----------
-    over : the parameter that runs across. With it, or with one parameter only, there are lines, one for each value
-        of the other parameter; without it two parameters make a map.
+    over : the parameter on the horizontal axis. With it, or with one parameter only, the picture shows lines,
+    one for each value of the other parameter; without it two parameters make a map.
     """
     if is_map(result, over):
         return sweep_map(result, *names)
@@ -30,6 +30,6 @@ def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ..
 
 
 def is_map(result: Sweep, over: str | None) -> bool:
-    """Whether the picture has both parameters as axes."""
+    """Return whether the picture has both parameters as axes."""
     has_texts = any(values.dtype.kind != "f" for values in result.axes.values())
     return over is None and len(result.axes) == 2 and result.mode == "grid" and not has_texts

@@ -1,4 +1,4 @@
-"""Which readings of a sweep can be drawn, with their units and where there is none."""
+"""This module selects the readings of a sweep that can be drawn, with their units and missing values."""
 
 from __future__ import annotations
 
@@ -16,37 +16,39 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Sweep
 
-_MOST = 6  # panels that fit a page
+_MOST = 6  # panels that fit on a page
 _RATHER = (
     "amplitude",
     "stick_fraction",
     "stops_per_period",
     "dissipated",
-)  # than others, where not all are drawn
+)  # preferred if not all can be drawn
 NO_RESULT = "no result"
 
 
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
-    """Readings that are asked for, else those that people ask for first; arrays only where they can be drawn.
+    """Return the requested readings, else the most common ones; arrays only if they can be drawn.
 
     Raises
     ------
     UsageError
-        For names that do not exist, and readings that cannot be drawn.
+        For unknown names, or readings that cannot be drawn.
     """
     kept = [name for name in result.values if _drawable(result, name, arrays)]
     for name in names:
         if result[name] is not None and name not in kept:
-            what = "texts" if result[name].dtype.hasobject else "an array at each point"
+            what = "text" if result[name].dtype.hasobject else "an array at each point"
             raise UsageError(f"{name} is {what}, which cannot be drawn", remedy=f"draw one of {kept}")
     found = tuple(names) or _first_asked_for(kept)
     if not found:
-        raise UsageError("the sweep holds nothing that can be drawn", remedy="see its status for what failed")
+        raise UsageError(
+            "the sweep has no reading that can be drawn", remedy="see its status for the reasons"
+        )
     return found
 
 
 def _first_asked_for(kept: Sequence[str]) -> tuple[str, ...]:
-    """As many as fit a page, one of each of the kinds above before a second; in the order of the sweep."""
+    """Return as many readings as fit on a page, one of each kind above before a second, in the order of the sweep."""
 
     def rank(name: str) -> tuple[int, int]:
         kind = name.partition(".")[0]
@@ -58,7 +60,7 @@ def _first_asked_for(kept: Sequence[str]) -> tuple[str, ...]:
 
 
 def not_drawn(result: Sweep, arrays: bool) -> tuple[str, ...]:
-    """Readings that could be drawn and are not, unless they are asked for by name."""
+    """Return the readings that can be drawn but are drawn only on request."""
     kept = [name for name in result.values if _drawable(result, name, arrays)]
     return tuple(name for name in kept if name not in _first_asked_for(kept))
 
@@ -69,24 +71,24 @@ def _drawable(result: Sweep, name: str, arrays: bool) -> bool:
 
 
 def numbers_of(result: Sweep, name: str) -> np.ndarray:
-    """A reading as real numbers: the modulus of what is complex."""
+    """Return a reading as real numbers, with the modulus of complex ones."""
     values = result[name]
     return np.abs(values) if np.iscomplexobj(values) else values
 
 
 def range_of(values: np.ndarray) -> tuple[float, float]:
-    """Least and largest number, (0, 0) where there is none."""
+    """Return the least and largest number, or (0, 0) without any."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
 def label_of(result: Sweep, name: str) -> str:
-    """Name of a reading as it is written at an axis."""
+    """Return the name of a reading as an axis label."""
     return f"|{name}|" if np.iscomplexobj(result[name]) else name
 
 
 def positions(values: np.ndarray) -> np.ndarray:
-    """Where the values of a parameter stand along an axis; texts one after the other."""
+    """Return the positions of a parameter's values along an axis; texts are placed one after the other."""
     return values if values.dtype.kind == "f" else np.arange(float(len(values)))
 
 
@@ -101,11 +103,11 @@ def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
 
 
 def setting(result: Sweep, name: str, value: object) -> str:
-    """One value of a parameter in words: "N = 40 N"."""
+    """Return one value of a parameter as text: "N = 40 N"."""
     number = f"{value:.6g}" if isinstance(value, float) else str(value)
     return literal(f"{name} = {number} {result.units.get(name, '')}".rstrip())
 
 
 def title_of(result: Sweep) -> str:
-    """What a picture of a sweep is headed by."""
+    """Return the title of a picture of a sweep."""
     return result.model.title or result.model.name

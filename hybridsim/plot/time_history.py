@@ -1,4 +1,4 @@
-"""States and outputs over time, with a strip of modes under them and marks at the events."""
+"""This module draws states and outputs over time, with a strip of modes and marks at the events."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.solution import Event, Solution
 
-_MOST_QUANTITIES = 4  # drawn unasked, and as many outputs
-_MOST_MARKS = 150  # event lines; closer together they would be a grey area
-_VISIBLE = 1e-3  # of the range: a smaller jump is not seen
+_MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
+_MOST_MARKS = 150  # event lines; more would merge into a grey area
+_VISIBLE = 1e-3  # of the range: a smaller jump is invisible
 _ROW, _STRIP = 1.75, 0.34  # inches
 
 
 @dataclass(frozen=True)
 class TimeHistoryAxes:
-    """The axes of a time history: one for each quantity, and the strip of modes (None without components)."""
+    """The axes of a time history: one per quantity, and the strip of modes (None without components)."""
 
     quantities: tuple[Axes, ...]
     modes: Axes | None
@@ -55,9 +55,9 @@ def time_history(
 
     Parameters
     ----------
-    quantities : names of states and outputs; the first four of them, and the first four outputs, if not given.
-    t_span : part of the run; if not given all, or the last few of very many periods (the title says so).
-    axes : where to draw: one for each quantity, one more if the model has components; new if not given.
+    quantities : names of states and outputs; by default the first four of both, and the first four outputs.
+    t_span : part of the run; by default all, or the last few of very many periods (the title says so).
+    axes : one per quantity, and one more if the model has components; by default a new figure.
     """
     refuse_arrays(solution)
     model = solution.model
@@ -84,7 +84,7 @@ def time_history(
 
 
 def _unasked(model: Model) -> list[str]:
-    """What is drawn without being asked for: what was declared first, and what was declared to be looked at."""
+    """Return the default quantities: the first declared ones, and the outputs."""
     names = list(units_of(model))[:_MOST_QUANTITIES]
     outputs = [output.name for output in model.outputs][:_MOST_QUANTITIES]
     return list(dict.fromkeys([*names, *outputs]))
@@ -106,7 +106,7 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
 
 
 def _draw(axis: Axes, pieces: Sequence[Piece], name: str) -> None:
-    """The curve in one line, interrupted at jumps, which are dashed in another."""
+    """Draw the curve as one line, interrupted at jumps, which are a second, dashed line."""
     low, high = extent(pieces, name)
     t, y, jump_t, jump_y = [pieces[0].t], [pieces[0].values[name]], [], []
     for before, after in itertools.pairwise(pieces):
@@ -124,7 +124,7 @@ def _draw(axis: Axes, pieces: Sequence[Piece], name: str) -> None:
 
 
 def _mark(axis: Axes, events: Sequence[Event]) -> None:
-    """A thin line at each event of a kind that can be told apart; a triangle at the top for a monitor's."""
+    """Draw a thin line at each event of a kind with few enough events, and a triangle at the top for monitors."""
     kinds = Counter(event.kind for event in events)
     for event in events:
         if kinds[event.kind] <= _MOST_MARKS:
@@ -144,7 +144,7 @@ def _mark(axis: Axes, events: Sequence[Event]) -> None:
 
 
 def _strip(axis: Axes, solution: Solution, window: Window) -> None:
-    """One row a component, each mode in its colour; the legend names the modes that occur."""
+    """Draw one row per component with coloured modes; the legend names the modes that occur."""
     colours = style.mode_colours(solution.components)
     components = list(solution.modes)
     seen: dict[str, None] = {}

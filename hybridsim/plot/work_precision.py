@@ -1,4 +1,4 @@
-"""Error against cost, one panel for each kind of error: what accuracy costs with each integrator."""
+"""This module draws error against cost, with one panel per kind of error."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _TITLES = {
     "event_time": "Largest event-time error",
     "graph": "Distance of the graphs",
 }
-_ZERO = 1e-17  # where an error of exactly zero is drawn: below any rounding
+_ZERO = 1e-17  # position of an error of exactly zero, below rounding
 _UNCERTAIN = "#eeeeee"
 
 
 def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -> tuple[Axes, ...]:
-    """Draw a panel for each kind of error that there is: of the states over the whole run and over the last period,
-    of the times of events, and of the graphs where states jump (`Comparison.quantities`).
+    """Draw error against cost, one panel for each kind of error (`Comparison.quantities`).
 
-    The wall time runs across, the error up; a line joins the settings of one integrator. A run with a wrong
-    sequence of modes is hollow: its errors compare what is not the same motion. Stick erases memory, so an
-    error at the end alone may be small after a run that was wrong; that is why there are several panels.
+    The wall time is horizontal and the error vertical; a line joins the settings of one integrator. A run
+    with a wrong sequence of modes is hollow, because its errors compare different motions. Stick erases the
+    memory of errors, so that a wrong run may have a small error at its end; several panels are needed to see
+    this.
 
     Parameters
     ----------
-    axes : as many axes as there are kinds of error, to draw in; a new figure if not given.
+    axes : as many axes as kinds of error, to draw in; by default a new figure.
     """
     quantities = comparison.quantities
     if axes is None:
@@ -72,7 +72,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
 
 
 def headline(comparison: Comparison) -> str:
-    """Model, length of the run and reference, in two lines."""
+    """Return model, length of the run and reference as two lines."""
     t0, t1 = comparison.t_span
     long = f"{(t1 - t0) / comparison.period:.4g} periods" if comparison.period else f"t = {t0:g} to {t1:g}"
     return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
@@ -81,7 +81,7 @@ def headline(comparison: Comparison) -> str:
 def draw_panel(
     panel: Axes, comparison: Comparison, quantity: str, chosen: dict[str, Look], size: float = SIZE
 ) -> None:
-    """One kind of error against the wall time, for all lines."""
+    """Draw one kind of error against the wall time, for all lines."""
     for label in comparison.labels:
         rows = [row for row in comparison.rows if row.label == label]
         found = [(row, point) for row in rows if (point := _point(comparison, row, quantity))]
@@ -112,7 +112,7 @@ def draw_panel(
 
 
 def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, float] | None:
-    """(Wall time, error); None for what cannot be drawn."""
+    """Return (wall time, error), or None if it cannot be drawn."""
     reading = comparison.reading(row, quantity)
     if reading is None or row.cost is None or not math.isfinite(reading.value):
         return None
@@ -120,17 +120,17 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, floa
 
 
 def is_cold(row: Row) -> bool:
-    """Whether a run was timed only where it warmed up itself."""
+    """Return whether a run was timed only while it warmed up."""
     return row.cost is not None and row.cost.repetitions == 0
 
 
 def verdict_of(row: Row) -> bool | None:
-    """Whether the modes of a run are right; None where it has none to judge."""
+    """Return whether the modes of a run are right; None if it has no modes."""
     return row.errors.sequence.right if row.errors and row.errors.sequence is not None else None
 
 
 def label_ticks(panel: Axes) -> None:
-    """Wall times as "20 ms", as many as can be read; decades of the error."""
+    """Set as many tick labels of wall times ("20 ms") as are readable, and decades of the error."""
     low, high = panel.get_xlim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for steps in ((1, 2, 3, 4, 6, 8), (1, 2, 5), (1, 3), (1,)):
@@ -148,7 +148,7 @@ def label_ticks(panel: Axes) -> None:
 def handles(
     rows: Iterable[Row], comparisons: Sequence[Comparison], chosen: dict[str, Look], size: float = SIZE
 ) -> list[Artist]:
-    """The legend: a line each, and what hollow, half filled and grey mean where they occur."""
+    """Return the legend: an entry per line, and entries for hollow, half filled and grey marks if they occur."""
     rows = list(rows)
     found: list[Artist] = []
     for label, look in chosen.items():

@@ -1,4 +1,4 @@
-"""What a run gives back, how it goes on, and how it is kept in a file."""
+"""This package holds the results of runs, resumes runs, and saves results to files."""
 
 from hybridsim.solution.archive import load_solution
 from hybridsim.solution.event import Event, ModeInterval

@@ -1,7 +1,7 @@
-"""Solutions in files: one file holds the model, how it was run, the trajectory, and where the run goes on.
+"""This module saves solutions to files: model, settings, trajectory, and a checkpoint to resume from.
 
-The file is a zip of NumPy arrays (`numpy.savez`), one of which is a text, the header, in JSON. Nothing in it is
-pickled, so that reading a file runs no code of its writer.
+The file is a zip of NumPy arrays (`numpy.savez`). One of them, the header, is JSON text. Nothing is pickled, so that
+reading a file runs no code from it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMAT, VERSION = "hybridsim solution", 4
 _HEADER, _SEAL = "header", "digest"
-_REMEDY = "give a file that sol.save(...) has written"
+_REMEDY = "give a file written by sol.save(...)"
 _FAULTS = (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError)
 
 
@@ -40,19 +40,19 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
 
 
 def to_bytes(solution: Solution) -> bytes:
-    """What a file of a solution holds: so it goes from process to process."""
+    """Return the content of a solution's file, to send the solution to another process."""
     file = io.BytesIO()
     np.savez(file, **_stored(solution))  # type: ignore[arg-type]  # as above
     return file.getvalue()
 
 
 def of_bytes(stored: bytes) -> Solution:
-    """The solution of which `to_bytes` has given these."""
+    """Return the solution that `to_bytes` has packed."""
     return _read(io.BytesIO(stored), "the solution that another process sent")
 
 
 def _stored(solution: Solution) -> dict[str, np.ndarray]:
-    """The arrays of its file."""
+    """Return the arrays of a solution's file, by name."""
     from hybridsim import __version__
     from hybridsim.engine.block_arrays import taken_apart
 
@@ -116,8 +116,9 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
 def load_solution(path: str | PathLike[str]) -> Solution:
     """Read a solution that `Solution.save` wrote.
 
-    Events, modes and the states at the run's own steps are to the last bit those that were saved, and so are
-    ``resume()`` and the dense output of the compiled integrators; the dense output of the others to rounding.
+    The events, the modes and the states at the run's own steps are bit for bit those that were saved. So are
+    ``resume()`` and the dense output of the compiled integrators; the dense output of other integrators
+    agrees to rounding.
 
     Parameters
     ----------
@@ -127,12 +128,12 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     Returns
     -------
     Solution
-        As it was saved.
+        The solution as it was saved.
 
     Raises
     ------
     UsageError
-        Where it is no such file, damaged, or written by a later version.
+        If the file is not a saved solution, is damaged, or was written by a later version.
 
     Examples
     --------
@@ -153,22 +154,22 @@ def _read(file: IO[bytes], name: str) -> Solution:
     try:
         arrays = read_arrays(file)
         if _HEADER not in arrays:
-            raise ValueError("its arrays are others, and it has no header")
+            raise ValueError("the header is missing")
         text = arrays.pop(_HEADER).tobytes().decode()
         seal = arrays.pop(_SEAL, np.zeros(0)).tobytes().decode()
         header = json.loads(text)
         if not isinstance(header, dict) or header.get("format") != FORMAT:
-            raise ValueError("its header is another")
+            raise ValueError("the header has another format")
     except (ValueError, RecursionError) as error:
-        raise UsageError(f"{name} holds no solution: {error}", remedy=_REMEDY) from error
+        raise UsageError(f"{name} is not a saved solution: {error}", remedy=_REMEDY) from error
     if header.get("version") != VERSION:
         raise UsageError(
-            f"{name} is of version {header.get('version')!r}, written by hybridsim {header.get('hybridsim')}; "
-            f"this one reads version {VERSION}",
-            remedy="read it with that version",
+            f"{name} has file version {header.get('version')!r}, written by hybridsim {header.get('hybridsim')}; "
+            f"this hybridsim reads version {VERSION}",
+            remedy="read it with the version of hybridsim that wrote it",
         )
     if seal != _digest(text, arrays):
-        raise UsageError(f"{name} is damaged: it was changed after it was written", remedy=_REMEDY)
+        raise UsageError(f"{name} is damaged: its content does not match its checksum", remedy=_REMEDY)
     try:
         return _put_together(header, arrays)
     except HybridsimError as error:
@@ -259,7 +260,7 @@ def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkp
 
 
 def _digest(text: str, arrays: dict[str, np.ndarray]) -> str:
-    """Hash of the header and the arrays: what does not fit together does not come as far as compiled code."""
+    """Return a hash of the header and the arrays; it keeps inconsistent files away from compiled code."""
     digest = hashlib.sha256(text.encode())
     for name in sorted(arrays):
         array = np.ascontiguousarray(arrays[name])

@@ -1,4 +1,4 @@
-"""What the header and the arrays of a saved solution may be, given its model: anything else is refused by name."""
+"""This module checks the header and the arrays of a saved solution against its model, and names what is wrong."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ _TASK: dict[str, Form] = {
     "discrete": (float, ("D",)),
     "atol": (float, ("n",)),
 }
-# of the places that the two loops note; see `hybridsim.engine.outcome` and `hybridsim.integrators.fixed_step_run`
+# Arrays of the checkpoints that the two loops write; see `hybridsim.engine.outcome` and
+# `hybridsim.integrators.fixed_step_run`.
 _AFTER_EVENT: dict[str, Form] = {
     "x": (float, ("n",)),
     "p": (float, ("P",)),
@@ -56,18 +57,18 @@ _AFTER_STEPS: dict[str, Form] = {
     "fresh": (bool, ("M",)),
     "turned": (bool, ()),
 }
-_MOST_INTERVALS = 64  # more than are ever remembered of the pace of a component
-_NOBODY = -1  # as the component of a pace: resets of monitors
+_MOST_INTERVALS = 64  # more than the intervals that a component's pace ever holds
+_NOBODY = -1  # the component number of a pace that belongs to resets of monitors
 _TEXTS = ("status", "message", "reason")
 
 
 def mode_counts(system: System) -> list[int]:
-    """How many modes each component has."""
+    """Return the number of modes of each component."""
     return [len(a.modes) for a in system.automata]
 
 
 def sizes_of(system: System) -> dict[str, int]:
-    """The lengths of arrays that a system decides."""
+    """Return the array lengths that depend on the system, by their symbols."""
     return {
         "n": system.n,
         "C": len(system.automata),
@@ -79,7 +80,7 @@ def sizes_of(system: System) -> dict[str, int]:
 
 
 def check_header(header: Header) -> None:
-    """Refuse a header whose entries are not of the kinds that they have."""
+    """Refuse a header with an entry of the wrong type."""
     for name in _TEXTS:
         if not isinstance(header[name], str):
             raise ValueError(f"its {name} is {header[name]!r}")
@@ -91,11 +92,11 @@ def check_header(header: Header) -> None:
             check_count(f"a count of its {name}", count)
     for name in ("counters", "method", "tolerances"):
         if not isinstance(header[name], dict):
-            raise ValueError(f"its {name} are no table")
+            raise ValueError(f"its {name} are not a mapping")
     for name, value in header["counters"].items():
         check_number(f"its count '{name}'", value, 0.0)
     if not (isinstance(header["cost"], list) and len(header["cost"]) == 2):
-        raise ValueError("its cost is no pair of numbers")
+        raise ValueError("its cost is not a pair of numbers")
     for value in header["cost"]:
         check_number("a part of its cost", value, 0.0)
     taken_over = header.get("taken_over")
@@ -105,19 +106,19 @@ def check_header(header: Header) -> None:
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
-        raise ValueError("its kinds of blocks are no texts")
+        raise ValueError("its block kinds are not strings")
     if header["save"] not in ("all", "events", "last-period", "nothing"):
-        check_number("what it keeps", header["save"], 0.0)
+        check_number("its save setting", header["save"], 0.0)
     keep = header["keep"]
     if not (isinstance(keep, list) and len(keep) == 2):
-        raise ValueError("how much it keeps is no pair")
+        raise ValueError("its retention is not a pair")
     for value in keep:
         if value is not None:
-            check_number("how much it keeps", value, 0.0, is_finite=False)
+            check_number("a part of its retention", value, 0.0, is_finite=False)
 
 
 def check_task(header: Header, arrays: Arrays, system: System) -> None:
-    """Refuse a span, tolerances or a start that `simulate` would refuse."""
+    """Refuse a time span, tolerances or a start that `simulate` would refuse."""
     arguments.time_span(header["span"])
     tolerances = header["tolerances"]
     arguments.relative_tolerance(check_number("rtol", tolerances["rtol"]))
@@ -134,7 +135,7 @@ def check_task(header: Header, arrays: Arrays, system: System) -> None:
 
 
 def check_events(events: Arrays, hidden: object, system: System) -> None:
-    """Refuse events of components and modes that the model does not have."""
+    """Refuse events whose components or modes are not in the model."""
     lengths: dict[str, Form] = {
         "instants": (float, ("E", 2)),
         "directions": (np.int64, ("E",)),
@@ -144,7 +145,7 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
     known = check_forms("the events", events, lengths, sizes_of(system))
     words = events.get("words")
     if words is None or words.dtype.kind != "U" or words.shape != (known["E"], 5):
-        raise ValueError("the words of the events are not those of its events")
+        raise ValueError("the texts of the events do not match the events")
     check_count("the number of events that are not shown", hidden, known["E"])
     check_finite("the time of an event", events["instants"])
     check_range("the direction of an event", events["directions"], -1, 1)
@@ -162,49 +163,49 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
 
 
 def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple[float, float]) -> None:
-    """Refuse a place to go on from that no run of the system can have noted."""
-    high, low = check_instant("the place where it goes on", header["instant"])
+    """Refuse a checkpoint that no run of the system could have written."""
+    high, low = check_instant("the checkpoint", header["instant"])
     if not min(span) <= high + low <= max(span):
-        raise ValueError("the place where it goes on is not within its span")
+        raise ValueError("the checkpoint is outside of t_span")
     if header["settled"] is not None:
-        check_instant("what is settled", header["settled"])
+        check_instant("the settled instant", header["settled"])
     for name in ("segments", "occurrences"):
-        check_count(f"the number of {name} since", header[name])
+        check_count(f"the checkpoint's number of {name}", header[name])
     if not isinstance(header["paces"], list):
-        raise ValueError("its paces are no rows")
+        raise ValueError("its paces are not rows")
     for row in header["paces"]:
         _check_pace(row, len(system.automata))
     if not isinstance(header["names"], list) or sorted(map(str, header["names"])) != sorted(arrays):
-        raise ValueError("the names of the place where it goes on are not those of its arrays")
+        raise ValueError("the names of the checkpoint do not match its arrays")
     sizes = sizes_of(system)
     if set(arrays) >= set(_AFTER_STEPS):
-        check_forms("the place where it goes on", arrays, _AFTER_STEPS, sizes)
-        check_finite("the place where it goes on", arrays["x"], arrays["discrete"], arrays["scale"])
+        check_forms("the checkpoint", arrays, _AFTER_STEPS, sizes)
+        check_finite("the checkpoint", arrays["x"], arrays["discrete"], arrays["scale"])
     else:
-        check_forms("the place where it goes on", arrays, _AFTER_EVENT, sizes)
-        check_finite("the place where it goes on", arrays["x"])
+        check_forms("the checkpoint", arrays, _AFTER_EVENT, sizes)
+        check_finite("the checkpoint", arrays["x"])
         for name in ("x_error", "guard_floors", "monitor_floors"):
-            check_range(f"{name} of the place where it goes on", arrays[name], 0.0, math.inf)
+            check_range(f"{name} of the checkpoint", arrays[name], 0.0, math.inf)
         for name in ("sides", "monitor_sides"):
-            check_range(f"{name} of the place where it goes on", arrays[name], -1, 1)
+            check_range(f"{name} of the checkpoint", arrays[name], -1, 1)
         for name in ("orders", "monitor_orders"):
-            check_range(f"{name} of the place where it goes on", arrays[name], 0, ORDER + 1)
+            check_range(f"{name} of the checkpoint", arrays[name], 0, ORDER + 1)
         step = float(arrays["step_size"])
         if not (math.isnan(step) or 0.0 < step < math.inf):
-            raise ValueError(f"the step to go on with is {step!r}")
+            raise ValueError(f"the next step of the checkpoint is {step!r}")
         if "headway" in arrays:
-            check_forms("the place where it goes on", arrays, {"headway": (float, (HEADWAY_SIZE,))}, {})
+            check_forms("the checkpoint", arrays, {"headway": (float, (HEADWAY_SIZE,))}, {})
             if (
                 np.isnan(arrays["headway"]).any()
                 or np.isinf(np.delete(arrays["headway"], HEADWAY_PACE)).any()
             ):
-                raise ValueError("the headway of the place where it goes on is not finite")
+                raise ValueError("the headway of the checkpoint is not finite")
         if "taken_over" in arrays:
-            check_forms("the place where it goes on", arrays, {"taken_over": (float, ())}, {})
+            check_forms("the checkpoint", arrays, {"taken_over": (float, ())}, {})
             check_finite("the time of a change of method", arrays["taken_over"])
         if "place" in arrays:
-            check_forms("the place where it goes on", arrays, {"place": (float, ("numbers",))}, {})
-    check_modes("the place where it goes on", arrays["z"], mode_counts(system))
+            check_forms("the checkpoint", arrays, {"place": (float, ("numbers",))}, {})
+    check_modes("the checkpoint", arrays["z"], mode_counts(system))
 
 
 def _check_pace(row: object, components: int) -> None:

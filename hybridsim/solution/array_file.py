@@ -1,7 +1,7 @@
-"""Reads files of arrays that anybody may have made: with no more memory and time than the size of the file allows.
+"""This module reads untrusted files of arrays with memory and time bounded by the size of the file.
 
-The file is a zip of NumPy arrays that are not compressed (`numpy.savez`). A compressed member could grow without end as
-it is read, and an array may say that it has a shape of terabytes. Both are refused before memory is taken.
+The file is a zip of uncompressed NumPy arrays (`numpy.savez`). A compressed member could expand without bound, and an
+array header could claim terabytes. Both are refused before any memory is allocated.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from numpy.lib import format as npy
 
 from hybridsim.errors import UsageError
 
-_KINDS = "fiucbU"  # of numbers and texts; Python objects and records are none of ours
-_NAMES_IN_UTF8 = 0x800  # the one flag that a member may have
+_KINDS = "fiucbU"  # numbers and text; Python objects and records are refused
+_NAMES_IN_UTF8 = 0x800  # the only flag that a member may have
 _FAULTS = (
     ValueError, TypeError, KeyError, SyntaxError, EOFError, OverflowError, RecursionError, NotImplementedError,
     zipfile.BadZipFile, tokenize.TokenError,
@@ -27,16 +27,16 @@ _FAULTS = (
 
 
 def open_regular(name: str, remedy: str) -> IO[bytes]:
-    """Open a file to read; a device or a pipe, which may have no end, is refused.
+    """Open a regular file for reading; devices and pipes are refused, because they may be endless.
 
     Raises
     ------
     UsageError
-        Where it cannot be read, with the reason.
+        If the file cannot be read; the message gives the reason.
     """
     try:
         if not stat.S_ISREG(os.stat(name).st_mode):
-            raise UsageError(f"{name} cannot be read: it is no regular file", remedy=remedy)
+            raise UsageError(f"{name} cannot be read: it is not a regular file", remedy=remedy)
         return open(name, "rb")
     except (OSError, ValueError) as fault:
         if isinstance(fault, UsageError):
@@ -46,16 +46,16 @@ def open_regular(name: str, remedy: str) -> IO[bytes]:
 
 
 def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:
-    """The arrays of a file by name.
+    """Return the arrays of a file by name.
 
     Raises
     ------
     ValueError
-        For what is no such file.
+        If the file is not an archive of plain arrays.
     """
     try:
         if not zipfile.is_zipfile(file):
-            raise ValueError("it is no archive of arrays")
+            raise ValueError("it is not an archive of arrays")
         size = file.seek(0, os.SEEK_END)
         with zipfile.ZipFile(file) as archive:
             members = archive.infolist()
@@ -67,10 +67,10 @@ def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:
 
 
 def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
-    """Refuse members that are not what `numpy.savez` writes into a file of this size."""
+    """Refuse members that `numpy.savez` would not write into a file of this size."""
     names = {member.filename for member in members}
     if len(names) != len(members) or len({name.removesuffix(".npy") for name in names}) != len(names):
-        raise ValueError("two of its arrays have one name")
+        raise ValueError("two of its arrays have the same name")
     for member in members:
         is_plain = member.compress_type == zipfile.ZIP_STORED and member.file_size == member.compress_size
         if not is_plain or member.flag_bits & ~_NAMES_IN_UTF8:
@@ -80,7 +80,7 @@ def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
 
 
 def _array(content: bytes, name: str) -> np.ndarray:
-    """One array; its shape is that of the bytes that are there."""
+    """Return one array, after checking that its shape matches the number of bytes."""
     from io import BytesIO
 
     head = BytesIO(content)
@@ -96,6 +96,6 @@ def _array(content: bytes, name: str) -> np.ndarray:
     start = head.tell()
     is_shape = len(shape) <= 5 and all(type(n) is int and 0 <= n <= len(content) for n in shape)
     if not is_shape or math.prod(shape) * dtype.itemsize != len(content) - start:
-        raise ValueError(f"its array '{name}' has a shape that is not that of its content")
+        raise ValueError(f"its array '{name}' has a shape that does not match its content")
     found = np.ndarray(shape, dtype, bytearray(content[start:]), order="F" if is_fortran else "C")
     return np.ascontiguousarray(found).reshape(shape)

@@ -1,4 +1,4 @@
-"""An impact in words: restitution, speeds, and what friction did during the blow."""
+"""This module describes an impact in words: its restitution, its speeds, and the action of friction."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from hybridsim.solution.candidate import GuardView
     from hybridsim.solution.stages import Stage
 
-_AT_LIMIT = 1e-9  # of an impulse: closer to its limit it is at it
+_AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impulse counts as at the limit
 
 
 def restitution(model: Model, stage: Stage, c: int, blow: GuardView) -> str:
-    """How fast a gap closed and how fast it opens, and by which restitution."""
+    """Describe the speeds at which a gap closed and opens, and the coefficient of restitution."""
     settling, outcome = stage.settling, stage.outcome
     system, automaton = settling.system, settling.system.automata[c]
     declared = next(i for i in model.impacts if i.name == automaton.name).restitution
     z = outcome.z.copy()
-    z[c] = 1 - automaton.hold  # open: it alone has the gap for a guard
+    z[c] = 1 - automaton.hold  # open mode; the only one with the gap as its guard
     guard = automaton.guards[z[c]][0]
     at = replace(settling.at, x=outcome.x)
     (after,) = views(system, at, z, [guard], np.zeros(system.guard_count, int))
@@ -41,13 +41,13 @@ def restitution(model: Model, stage: Stage, c: int, blow: GuardView) -> str:
 
 
 def is_struck(system: System, change: Change) -> bool:
-    """Whether a change is that of a contact that an impact strikes."""
+    """Return whether a change belongs to a contact that an impact closes."""
     automaton = system.automata[change.component]
     return change.guard == "gap" and automaton.is_unilateral and change.source != automaton.hold
 
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
-    """Bounds of the rounding of the states, infinite for those that no impulse around a contact can change."""
+    """Return rounding bounds of the states, infinite for states outside the contact's impulses."""
     system, at = stage.settling.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))
@@ -56,13 +56,14 @@ def errors_beside(stage: Stage, c: int) -> np.ndarray:
 
 
 def friction(stage: Stage, c: int) -> str:
-    """What friction that an impact of a gap loads did: at its limit, or within it and stopped; empty without any.
+    """Describe the friction during an impact: at its limit, or within it and stopped; empty without friction.
 
-    The impulses are those that change the states as they were changed; nothing is said where several do so.
+    The impulses are computed from the changes of the states. The text is empty if several sets of impulses
+    fit.
     """
     system, at, z = stage.settling.system, stage.before, np.maximum(stage.before.z, 0)
     if stage.due or any((one.x_minus != one.x_plus).any() for one in stage.settling.changes):
-        return ""  # resets changed them as well
+        return ""  # resets changed the states as well
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     place = {k: i for i, k in enumerate(system.surface_of)}
     slopes, changes, loads = system.impulses(at.s, at.x, at.p, z)
@@ -84,7 +85,7 @@ def friction(stage: Stage, c: int) -> str:
         return ""
     inverse = np.linalg.pinv(changes[rows].T)
     impulses = inverse @ moved
-    # rounding of the states is no more than this of an impulse
+    # This bounds the effect of the states' rounding on an impulse.
     errors = np.abs(inverse) @ (4.0 * at.x_error + 8.0 * UNIT * np.abs(at.x))
     pushes = impulses[: len(normal)]
     said = []
@@ -106,7 +107,7 @@ def friction(stage: Stage, c: int) -> str:
         ):
             said.append(f"the impulse of {name} is at its limit, {bound} = {limit:.6g}")
         elif abs(after) > rest:
-            said.append(f"the impulse of {name} is {size}, of {bound} = {limit:.6g} at most")
+            said.append(f"the impulse of {name} is {size}, at most {bound} = {limit:.6g}")
         else:
             does = "stops it" if abs(before) > rest else "keeps it at rest"
             is_all = abs(abs(impulse) - limit) <= _AT_LIMIT * limit

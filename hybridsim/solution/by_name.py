@@ -1,4 +1,4 @@
-"""A dictionary of what a solution holds for each component, which says what there is where a name is unknown."""
+"""This module defines a dictionary by component whose error for an unknown name lists the known names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class ByName(dict[str, T]):
-    """A dict whose unknown keys are refused with the known ones."""
+    """A dict whose error for an unknown key suggests the known keys."""
 
     def __missing__(self, name: object) -> Never:
         raise UsageError(

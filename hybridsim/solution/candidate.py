@@ -1,4 +1,4 @@
-"""What is shown of a decision: guards along the flow of a mode, and the combinations of modes that were looked at."""
+"""This module shows the details of a decision: guards along a flow, and the combinations judged."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class GuardView:
 
     Parameters
     ----------
-    mode, guard, text : whose guard it is, and its expression.
-    derivatives, bounds : its value and derivatives with respect to time (4,), and bounds of their rounding errors.
-    decreed : how many of them, from the first on, the event itself makes zero: they are not looked at.
-    side : its sign just after, 0 where that is a question of rounding; order : of the derivative that decides.
-    units : of the guard and its derivatives (4,), empty where they are not known.
+    mode, guard, text : the mode, the name of the guard, and its expression.
+    derivatives, bounds : its value and time derivatives (4,), and bounds of their rounding errors.
+    decreed : the number of leading derivatives that the event makes exactly zero; they are skipped.
+    side : its sign just after the event, 0 if rounding decides; order : of the derivative that decides.
+    units : of the guard and its derivatives (4,), empty if unknown.
     """
 
     mode: str
@@ -54,12 +54,12 @@ class GuardView:
 
     @property
     def is_open(self) -> bool:
-        """Whether its sign just after is a question of rounding: nothing decides, and it is not zero identically."""
+        """Whether rounding decides the sign just after: no derivative is clearly non-zero."""
         left = (*self.derivatives[self.decreed :], *self.bounds[self.decreed :])
         return self.side == 0 and any(left)
 
     def in_numbers(self) -> str:
-        """Its value, first and second rate as they are, and what rounding of the states makes of the value."""
+        """Return its value, its first two derivatives, and the rounding error of the value as text."""
         numbers = zip(("g", "g'", "g''"), self.derivatives, self.units, strict=False)
         terms = [f"{name} = {value + 0.0:.3g} {unit}".rstrip() for name, value, unit in numbers]
         rounding = f"{self.bounds[0]:.1g} {self.units[0]}".rstrip()
@@ -69,7 +69,7 @@ class GuardView:
     def __str__(self) -> str:
         if not self.is_open and self.side == 0:
             still = "g = 0 exactly" if self.decreed else "g = 0"
-            return f"{self.guard} (g = {self.text}) stays >= 0: {still} and does not move"
+            return f"{self.guard} (g = {self.text}) stays >= 0: {still} and does not change"
         terms = []
         for k, (value, bound) in enumerate(zip(self.derivatives, self.bounds, strict=True)):
             name, unit = "g" + "'" * k, f" {self.units[k]}" if self.units[k] else ""
@@ -89,7 +89,7 @@ class GuardView:
 
 @dataclass(frozen=True)
 class Candidate:
-    """Modes that could hold just after, what their guards say of it, and whether they were taken."""
+    """A combination of modes that could hold just after an event, with its guards and the verdict."""
 
     modes: dict[str, str]
     verdict: str
@@ -100,7 +100,7 @@ class Candidate:
 def views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
-    """Guards along the flow of the modes z, those that the event decrees to be zero taken as such."""
+    """Yield the guards along the flow of the modes z; values that the event makes zero count as exactly zero."""
     series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error, at.is_put)
     time = time_unit(system.model)
     for g in guards:
@@ -126,7 +126,7 @@ def views(
 
 
 def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
-    """An expression with what stands for its corners on the sides of the modes z."""
+    """Return an expression with its corners replaced by their values on the sides of the modes z."""
     modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
     values = {n: e.tree for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
     tree = expression.tree
@@ -136,14 +136,14 @@ def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
 
 
 def _in_words(text: str, component: str) -> str:
-    """The expression of a guard; a surface's attraction and the name of a sign are the program's own."""
+    """Return the expression of a guard in words, without the program's internal names."""
     if text.startswith(ATTRACTION):
-        return f"pull of {component}, half the sum of how fast its two sides drive towards it"
+        return f"attraction of {component}, half the sum of the rates at which its two sides approach it"
     return re.sub(rf"{SIGN}\d+", component, text)
 
 
 def candidate(system: System, decision: Decision, look: Look) -> Candidate:
-    """One combination that a decision looked at, with the values that it had then."""
+    """Return one combination that a decision judged, with its values at that moment."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = tuple(views(system, look.at, look.z, guards, look.decreed))
     modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}
@@ -151,7 +151,7 @@ def candidate(system: System, decision: Decision, look: Look) -> Candidate:
 
 
 def way(system: System, look: Look) -> str:
-    """The modes of a combination in words."""
+    """Return the modes of a combination as text."""
     return ", ".join(
         f"{system.automata[c].name} {system.automata[c].modes[look.z[c]]}" for c in look.components
     )

@@ -1,4 +1,4 @@
-"""What happened in a run: events, and the stretches of time between them."""
+"""This module defines the events of a run and the time intervals between them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """Something that happened at one instant.
+    """An event: something that happened at one instant of a run.
 
     Parameters
     ----------
@@ -22,9 +22,9 @@ class Event:
     guard : str
         Name of the guard that fired, if one did.
     source, target : str
-        Modes before and after; empty where no mode changed.
+        Modes before and after; empty if no mode changed.
     direction : int
-        -1 falling, +1 rising, 0 where it has no meaning.
+        -1 falling, +1 rising, 0 if it has no meaning.
     x_minus, x_plus : array
         States (n,) just before and just after.
 
@@ -46,7 +46,7 @@ class Event:
     x_plus: np.ndarray
 
     def __eq__(self, other: object) -> bool:
-        """Equal when everything is; of states, two that are no numbers are equal as well."""
+        """Return whether all fields are equal; NaN states count as equal."""
         if not isinstance(other, Event):
             return NotImplemented
         states = ((self.x_minus, other.x_minus), (self.x_plus, other.x_plus))
@@ -57,7 +57,7 @@ class Event:
 
     @property
     def _what(self) -> tuple[float | str, ...]:
-        """All but the states."""
+        """All fields except the states, for comparisons and hashes."""
         return self.t, self.kind, self.component, self.guard, self.source, self.target, self.direction
 
     def __repr__(self) -> str:
@@ -67,7 +67,7 @@ class Event:
 
 @dataclass(frozen=True)
 class ModeInterval:
-    """A stretch of time that a component spent in one mode."""
+    """A time interval that a component spent in one mode."""
 
     mode: str
     t0: float

@@ -1,4 +1,4 @@
-"""Why an event went as it did: the decision made once more, with everything that it looked at."""
+"""This module explains an event: it repeats the decision and shows every quantity that the decision used."""
 
 from __future__ import annotations
 
@@ -42,29 +42,29 @@ if TYPE_CHECKING:
     from hybridsim.solution.watched import Decision
 
 _LEGEND = """\
-  (a mode lasts while its guards g are >= 0; g', g'' are their rates along the motion in that mode, and the first that
-  is not zero decides; exactly: the event itself makes it zero, so that there is no rounding in it)"""
-_SERIES = 24  # events that are looked at to say how they accumulated
+  (a mode holds while its guards g are >= 0; g' and g'' are the time derivatives of g in that mode, and the first one
+   that is not zero decides; exactly: the event itself makes the value zero, without rounding error)"""
+_SERIES = 24  # events that are used to describe an accumulation
 
 
 @dataclass(frozen=True)
 class Explanation(Readable):
-    """Why an event went as it did; ``print`` it.
+    """The reason why an event happened as it did; ``print`` it.
 
     Parameters
     ----------
     event : Event
-        What is explained.
+        The explained event.
     fired : tuple of GuardView
-        Guards that were located at zero, as they went in the mode before; of a near-grazing the one that came near.
+        Guards that were located at zero, in the mode before; for a near-grazing, the guard that came near zero.
     candidates : tuple of Candidate
-        The combinations of modes that the decision looked at which made this change, in the order of looking.
+        The combinations of modes that the deciding choice judged, in their order.
     reason : str
-        Why the one that was taken, in a sentence.
+        Why the chosen combination was taken, in one sentence.
     state : str, optional
-        States just before, and what a condition or a contact reads, as text with units.
+        States just before the event, and the values that a condition or a contact reads, as text with units.
     choices : tuple of str, optional
-        Of a guard with an ordered choice, in words: each condition with its values, and what came of it.
+        For a guard with an ordered choice: each condition with its values and its outcome, as text.
     remarks : tuple of str, optional
         Sentences about corners whose sides the guards depend on, loads that reach or leave zero, and other events at
         the same instant.
@@ -91,7 +91,7 @@ class Explanation(Readable):
         lines = [repr(self.event)[1:-1]]
         is_near, is_limit = self.event.kind == "near-grazing", self.event.guard == LIMIT
         if self.state:
-            when = "there" if is_near else "as the last event before left it" if is_limit else "just before"
+            when = "there" if is_near else "just after the previous event" if is_limit else "just before"
             lines.append(f"  {when}: {self.state}")
         if self.fired:
             lines.append("  came near zero:" if is_near else "  came to zero:")
@@ -104,7 +104,7 @@ class Explanation(Readable):
             lines += [f"      {view.mode}: {view}" for view in one.guards]
         if self.choices:
             lines.append(f"  choices of guard {self.event.guard}, the first that holds is taken:")
-            lines += [f"    {choice}" for choice in self.choices]
+            lines.append(f"  choices of guard {self.event.guard}; the first whose condition holds is taken:")
         lines += [f"  note: {remark}" for remark in self.remarks]
         lines.append(f"  so: {self.reason}")
         if (self.fired or self.candidates) and not is_near:
@@ -113,7 +113,7 @@ class Explanation(Readable):
 
 
 def explain(solution: Solution, number: int | Event) -> Explanation:
-    """The explanation of one of a solution's events; see `Solution.explain`."""
+    """Return the explanation of one event of a solution; see `Solution.explain`."""
     events, occurrences = solution.events, solution._trajectory.occurrences
     if isinstance(number, Event) and number in solution.corners:
         corner = [o for o in occurrences if o.kind == CORNER][solution.corners.index(number)]
@@ -123,8 +123,8 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
         number = events.index(number)
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
         raise UsageError(
-            f"the run has {len(events)} events, and event {number!r} is asked for",
-            remedy=f"give the place of one, 0 to {len(events) - 1}, or -1 for the last" if events else None,
+            f"there is no event {number!r}: the run has {len(events)} events",
+            remedy=f"give a number from 0 to {len(events) - 1}, or -1 for the last" if events else None,
         )
     happened = [o for o in occurrences if o.kind != CORNER]
     found = _explained(solution, events[number], happened, number)
@@ -132,7 +132,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
 
 
 def _explained(solution: Solution, event: Event, happened: list[Occurrence], number: int) -> Explanation:
-    """The explanation without the remarks; `happened`: what the events stand for, in their order."""
+    """Return the explanation without remarks; `happened` holds the records behind the events, in their order."""
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
         return Explanation(
@@ -165,9 +165,12 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
     resets = then[taken].reset if then else {}
     x_minus, x_plus = at.x, stage.outcome.x
     if change is not None and not system.automata[change.component].has_surface:
-        x_minus, x_plus = change.x_minus, change.x_plus  # its own round: others may go before it, or follow
+        x_minus, x_plus = (
+            change.x_minus,
+            change.x_plus,
+        )  # its own round: other changes of the instant may precede or follow it
     texts = {name: f" ({assignment('', reset).strip()})" for name, reset in resets.items() if reset.names}
-    # less than the error is what rounding left of a zero, set exactly
+    # A smaller change is rounding left over by a zero that was set exactly.
     error = (
         errors_beside(stage, change.component)
         if change is not None and is_struck(system, change)
@@ -180,7 +183,7 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
 
 
 def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
-    """The decision that made a change, or that an impact left to be made; None where it was made by a guard."""
+    """Return the decision that made a change or followed an impact; None if a guard made the change."""
     settling, change = place.stage.settling, place.change
     system = settling.system
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
@@ -198,22 +201,24 @@ def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
 
 
 def _is_declared(solution: Solution, event: Event) -> bool:
-    """Whether the mode that an event left declares the guard that it names."""
+    """Return whether the mode that an event left declares the guard named by the event."""
     component = next(c for c in solution.components if c.name == event.component)
     return any(guard.name == event.guard for guard in component.mode(event.source).guards)
 
 
 def _of_accumulation(solution: Solution, event: Event) -> str:
-    """What led to an instant at which no segment ends: the limit of a series of events."""
+    """Explain an accumulation: an instant that is the limit of a series of events and ends no segment."""
     times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
-    told = takewhile(lambda gap: gap * SAME_FACTOR > math.ulp(event.t), gaps)  # from rounding of the instants
+    told = takewhile(
+        lambda gap: gap * SAME_FACTOR > math.ulp(event.t), gaps
+    )  # smaller gaps are affected by rounding of the instants
     turn, factor = turn_of(list(told), 3, 2.0 * SAME_FACTOR)
     shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
     every = "each" if turn == 1 else f"every {turn} of them"
     series = f", {every} shorter by the factor {factor:.6g}" if turn else ""
     component = next(c for c in solution.components if c.name == event.component)
-    end = ", as its limit is declared" if component.limit else ""
+    end = ", as declared by its limit" if component.limit else ""
     return (
         f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
         f"and {event.target} is entered there{end}"
@@ -221,32 +226,32 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
 
 
 def _without_a_segment(solution: Solution, event: Event) -> str:
-    """Why a mode changed at an instant to which no motion leads: the start of a run, or where it ended."""
+    """Explain a change of mode at the start of a run, or at its end, where no motion leads to it."""
     if event.t == solution.t[0]:
         return (
-            "the run starts here: the sides of corners and the modes that the initial values leave admissible are "
-            "found before anything moves"
+            "the run starts here: the sides of corners and the admissible modes are found from the initial values, "
+            "before anything moves"
         )
     if not solution.success and event.t == solution.t[-1]:
         return f"the run ended here: {solution.message}"
-    return "it followed at once on the events before it at this instant: nothing moved in between"
+    return "it followed the earlier events of this instant immediately: nothing moved in between"
 
 
 def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:
-    """Why a mode changed where no guard was located at zero."""
+    """Explain a change of mode for which no guard was located at zero."""
     due = sorted({o.component for o in together if o.kind == "scheduled"})
     if due:
-        return f"{', '.join(due)} was due at this instant; the modes that hold were found anew just after it"
+        return f"{', '.join(due)} was due at this instant; the modes that hold were found again just after it"
     if event.guard and any(o.kind == "monitor" for o in together):
         return "a reset at this instant led there: no guard was located at zero"
     if solution.model.inputs and solution._run.method.leaps:
         names = ", ".join(declared.name for declared in solution.model.inputs)
-        return f"no guard came to zero by itself: an input has a knot here (of {names}), and the modes were found anew"
-    return "it was decided by a rule of the integrator's own: no guard was located at zero"
+        return f"no guard reached zero: an input has a knot here (of {names}), and the modes were found again"
+    return "the integrator decided this by its own rule: no guard was located at zero"
 
 
 def _state(solution: Solution, event: Event) -> str:
-    """The states just before, with their units."""
+    """Return the states just before an event as text, with units."""
     units = units_of(solution.model)
     return ", ".join(
         f"{name} = {_with_unit(value, units.get(name, ''))}"
@@ -259,7 +264,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
-    """The ordered choice of the guard that fired, and the place in it of what was taken; empty where it has none."""
+    """Return the ordered choice of the guard that fired, and the index of the entry taken; empty without a choice."""
     component = next((c for c in solution.components if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
@@ -272,7 +277,7 @@ def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choic
 
 
 def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
-    """The ordered choice of the guard that fired, if it has more than one: conditions, values, and what was taken."""
+    """Describe the choice of the guard that fired, if it has several entries: conditions, values, and the outcome."""
     then, taken = _taken(solution, event, at)
     if len(then) < 2:
         return ()
@@ -298,7 +303,7 @@ def _of_another_kind(solution: Solution, event: Event, occurrence: Occurrence) -
         return f"the monitor {event.component} {way}; it changes no mode" + sets
     if event.kind == "scheduled":
         sets = _sets(event, solution.model.schedules)
-        return f"the schedule {event.component} was due; it was stepped to, not searched for" + sets
+        return f"the schedule {event.component} was due; a step ended exactly there, without a search" + sets
     return (
         f"guard {event.guard} of {event.component} came within rounding of zero and turned back: no event, "
         "but a slightly different run may have one here"
@@ -306,7 +311,7 @@ def _of_another_kind(solution: Solution, event: Event, occurrence: Occurrence) -
 
 
 def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
-    """What the reset of a monitor or a schedule sets, as it is declared; a clock has none that is declared."""
+    """Describe the declared reset of a monitor or a schedule; it is empty for a clock without one."""
     part = next((part for part in parts if part.name == event.component), None)
     resets = part.reset.items() if part else ()
     values = ", ".join(assignment(name, value) for name, value in resets)
@@ -314,7 +319,7 @@ def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
 
 
 def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | None:
-    """The segment that the event ended; None where it ended none."""
+    """Return the segment that an event ended, or None."""
     if solution._save != "all":
         raise UsageError(
             f"the run was made with save={solution._save!r}",
@@ -322,7 +327,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
         )
     segments = solution._segments
     last = int(np.searchsorted(solution._starts, float(occurrence.instant), side="right"))
-    for k in range(last - 1, max(last - 4, -1), -1):  # behind it there may be segments of no length
+    for k in range(last - 1, max(last - 4, -1), -1):  # segments of zero length may follow it
         segment = segments[k]
         if abs(segment.end.minus(occurrence.instant)) == 0.0 and len(segment.s) > 1:
             return segment
@@ -330,7 +335,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
 
 
 def _met(system: System, at: Situation, fired: list[int]) -> list[int]:
-    """Further guards that came to zero with those that fired and would go negative, whether or not a mode changed."""
+    """Return the other guards that reached zero with those that fired and would go negative."""
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     found = []
     for g in np.flatnonzero(system.active(at.z)):

@@ -1,4 +1,4 @@
-"""How near a guard came that touched zero within rounding and turned back."""
+"""This module describes how near to zero a guard came that touched it within rounding and turned back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def grazed(solution: Solution, occurrence: Occurrence) -> tuple[GuardView, ...]:
-    """The guard with its derivatives and their rounding where it came nearest; none where no states were kept."""
+    """Return the grazing guard with its derivatives at its nearest point; empty if no states were kept."""
     if solution._save != "all":
         return ()
     system, x = solution._system, occurrence.x_minus

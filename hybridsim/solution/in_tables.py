@@ -1,4 +1,4 @@
-"""The forms in which the table of a run is given: CSV, NPZ, pandas, xarray."""
+"""This module converts the table of a run to CSV, NPZ, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class InTables(ABC):
-    """What a result with names, events and a table can be written as."""
+    """The base class of results with names, events and a table, which can be written in several formats."""
 
     @property
     @abstractmethod
@@ -31,12 +31,12 @@ class InTables(ABC):
 
     @abstractmethod
     def table(self, points: int | None = None) -> Table:
-        """Times, states, outputs and modes in columns: what all the forms below are made of.
+        """Return times, states, outputs and modes as columns; all conversions below use this table.
 
         Parameters
         ----------
-        points : how many equal steps of time to take, both ends included; without it ``sol.t``: the integrator's own
-            steps with each event time twice, on both its sides, or the grid of `simulate`.
+        points : the number of equally spaced times, both ends included. Without it the times are ``sol.t``: the
+            integrator's own steps with both sides of each event, or the grid of `simulate`.
         """
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
@@ -48,13 +48,13 @@ class InTables(ABC):
         self.table(points).to_npz(path, event_columns(self.events, self.names))
 
     def to_pandas(self, points: int | None = None) -> pd.DataFrame:
-        """The `table` as a data frame over t; modes are categorical, units stand in its ``attrs``."""
+        """Return the `table` as a data frame over t; modes are categorical, and ``attrs`` holds the units."""
         return self.table(points).to_pandas()
 
     def to_xarray(self, points: int | None = None) -> xr.Dataset:
-        """The `table` as a data set over t; modes are coordinates, each variable has its unit in its ``attrs``."""
+        """Return the `table` as a data set over t; modes are coordinates, and ``attrs`` holds the units."""
         return self.table(points).to_xarray()
 
     def events_to_pandas(self) -> pd.DataFrame:
-        """The events as a data frame, one row each: t, kind, component, ..., the states before and after."""
+        """Return the events as a data frame with one row per event: t, kind, component, ..., states."""
         return event_frame(self.events, self.names)

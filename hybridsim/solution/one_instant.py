@@ -1,4 +1,4 @@
-"""What happens at one instant: guards that were located at zero, and what resets then led to."""
+"""This module lists the events of one instant: guards located at zero, and the effects of resets."""
 
 from __future__ import annotations
 
@@ -19,18 +19,21 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
 LOCATED = (
-    1e6  # times its rounding: a guard that was searched for is closer to zero, what a reset moves is not
+    1e6  # multiple of its rounding error; a located guard is closer to zero, a guard moved by a reset is not
 )
-_STEPS = 2.0  # of a method that drives its own runs: it dates events to its steps
-BY_RESET = "reset"  # the guard of a change to the side of a surface on which a reset has put the state
+_STEPS = 2.0  # in steps of a method that drives its own runs, because it assigns events to its steps
+BY_RESET = (
+    "reset"  # the guard name of a change that a reset made by moving the state to one side of a surface
+)
 
 
 def fired_guards(
     system: System, segment: Segment, together: list[Occurrence], method: Integrator
 ) -> list[int]:
-    """Numbers of the guards that came to zero at one instant, in the modes of the segment before.
+    """Return the numbers of the guards that reached zero at one instant, in the modes of the segment before.
 
-    Not those that something else at this instant moved: where the segment ends they are not at zero.
+    Guards that another event of this instant moved are left out: they are not at zero at the end of the
+    segment.
     """
     named = set()
     for o in together:
@@ -53,7 +56,7 @@ def fired_guards(
 
 
 def resets_before(settling: Settling, change: Change) -> str:
-    """The resets before a change at its instant, in words, with what they set; empty where there were none."""
+    """Describe the resets before a change at its instant, with the values that they set; empty without any."""
     system = settling.system
     said: dict[str, None] = {}
     for one in settling.changes:
@@ -75,7 +78,7 @@ def changes_in_words(
     error: np.ndarray | float = 0.0,
     texts: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """States that changed by more than their error: name, from, to, and a text about it where there is one."""
+    """Describe the states that changed by more than their error: name, old value, new value, and an optional note."""
     moved = np.abs(after - before) > 2.0 * error
     return ", ".join(
         f"{name} from {a:.6g} to {b:.6g}{texts.get(name, '')}"

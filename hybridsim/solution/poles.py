@@ -1,6 +1,7 @@
-"""A run across a pole of its rates ends there: what would follow has no meaning.
+"""This module ends a run at a pole of its rates, because the results after it would have no meaning.
 
-The zero of a denominator is no pole where the rates are continuous, as those of sin(x)/x are: a run goes on through it.
+A zero of a denominator is not a pole if the rates are continuous there, as in sin(x)/x; the run then
+continues.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.engine.trajectory import Trajectory
 
-_LOOKS = 64  # at states of a run: a denominator that passes zero seldom comes back between two of them
+_LOOKS = 64  # states of a run that are checked; a denominator rarely crosses zero twice between two of them
 _HALVINGS = 60
-# So near to the zero the rates are looked at, in steps and at the least in ulps of time, and once more at a part r of
-# it. Continuous rates change by r times as much there, a root's by its root, what jumps or has a pole by as much or
-# more; the slope of a root is 1/sqrt(r) times as steep, that of a pole 1/r times or more. The borders are
-# half way between.
+# The rates are evaluated at this distance from the zero, in steps and at least in ulps of time, and again at
+# r times that distance (r = _PART). Over it continuous rates change by a factor r, a root by sqrt(r), and a
+# jump or a pole by 1 or more. The slope of a root grows by 1/sqrt(r), that of a pole by 1/r or more. The
+# thresholds lie half way between.
 _NEAR, _PART, _ULPS = 1e-2, 1e-2, 4.0
-_ROUNDING = 1e-9  # of the rates: a change of less is none
-_REMEDY = "end the run before by a monitor, or write the rate so that its denominator stays away from zero"
+_ROUNDING = 1e-9  # of the rates: a smaller relative change is rounding
+_REMEDY = "end the run earlier by a monitor, or write the rate so that its denominator stays away from zero"
 
 
 class _Way:
-    """The states that a run went through."""
+    """The states that a run passed through, with the signs of its denominators."""
 
     def __init__(self, system: System, segments: list[Segment]) -> None:
         model = system.model
@@ -39,13 +40,13 @@ class _Way:
         self._names, self._parameters = [s.name for s in model.states], model.parameter_values()
 
     def sign(self, divisor: Denominator, number: int, s: float, x: np.ndarray) -> int:
-        """The sign of a denominator at a local time of a segment."""
+        """Return the sign of a denominator at a local time of a segment."""
         t = float(self.segments[number].origin.plus(s))
         states = dict(zip(self._names, x.tolist(), strict=True))
         return divisor.sign({**self._parameters, "t": t, **states})
 
     def passage(self, divisor: Denominator) -> tuple[int, float, float] | None:
-        """The first zero that is passed in a pole: number of the segment, local time, and length of the step there."""
+        """Return the first crossing of zero at a pole: number of the segment, local time, and step length."""
         stride = max(sum(len(segment.s) for segment in self.segments) // _LOOKS, 1)
         for number, segment in enumerate(self.segments):
             last = len(segment.s) - 1
@@ -59,7 +60,7 @@ class _Way:
         return None
 
     def _zero(self, divisor: Denominator, number: int, first: int, last: int) -> tuple[float, float]:
-        """The last time before the sign changes between two knots, and the length of the step there."""
+        """Return the last time before the sign changes between two knots, and the step length there."""
         segment = self.segments[number]
         sign = self.sign(divisor, number, float(segment.s[first]), segment.x[first])
         while last - first > 1:
@@ -75,7 +76,7 @@ class _Way:
         return before, step
 
     def _is_pole(self, segment: Segment, s: float, step: float) -> bool:
-        """Whether the rates jump or grow beyond all bounds at a local time, or their derivatives do."""
+        """Return whether the rates or their derivatives jump or grow without bound at a local time."""
         flow, low, high = Flow(self.system, segment.p, segment.z, Counters()), *sorted(segment.s[[0, -1]])
         nearest = max(_NEAR * _PART * abs(step), _ULPS * math.ulp(s))
         near = max(_NEAR * abs(step), 10.0 * nearest)
@@ -89,13 +90,13 @@ class _Way:
             slopes.append(np.abs(flow.jacobian(float(times[1]), states[1])))
         part = nearest / near
         jumps = ~(changes[1] <= np.maximum(part**0.25 * changes[0], _ROUNDING * size))
-        # 0/0 that has a limit along one motion and not beside it: from there on any may follow
+        # 0/0 with a limit along this motion only: after it any motion may follow
         steep = ~(slopes[1] <= part**-0.75 * np.maximum(slopes[0], _ROUNDING * slopes[0].max(initial=0.0)))
         return bool(jumps.any() or steep.any())
 
 
 def end_at_pole(system: System, trajectory: Trajectory) -> None:
-    """End a run where the denominator of a rate passes zero and the rates are not continuous."""
+    """End a run at the zero of a denominator if the rates are not continuous there."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return
@@ -124,13 +125,13 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
     trajectory.forget_checkpoint()
     trajectory.status = "step-failure"
     trajectory.message = (
-        f"after t = {float(ended.end)!r}: the denominator {divisor.text} in the rate of {divisor.state} passes zero, "
-        f"where the rates have a pole or jump, so that no motion goes on from there: {_REMEDY}"
+        f"after t = {float(ended.end)!r}: the denominator {divisor.text} in the rate of {divisor.state} passes zero. "
+        f"The rates have a pole or a jump there, so the motion cannot be continued: {_REMEDY}"
     )
 
 
 def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: float) -> list[str]:
-    """A sentence for each denominator that has changed its sign in a run of which the way is not kept."""
+    """Return a warning for each denominator whose sign changed in a run whose states were not kept."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return []
@@ -141,8 +142,8 @@ def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: fl
     start = Segment(first.origin, first.z, first.p, first.s[:1], x0[None], first.dense)
     begun = _Way(system, [start])
     return [
-        f"the denominator {d.text} in the rate of {d.state} has another sign at the end than at the start: where it "
-        f"passes zero the rate may have a pole, beyond which nothing means anything; save all, or {_REMEDY}"
+        f"the denominator {d.text} in the rate of {d.state} has different signs at the start and at the end: it may "
+        f"have passed a pole, after which the results are meaningless. Use save='all' to check, or {_REMEDY}"
         for d in every
         if begun.sign(d, 0, float(first.s[0]), x0)
         * way.sign(d, len(way.segments) - 1, float(last.s[-1]), last.x[-1])

@@ -1,4 +1,4 @@
-"""Why an event went as it did, in a sentence: what led to the decision, and the rule by which it was made."""
+"""This module explains an event in one sentence: the cause of the decision, and the rule that made it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridsim.solution.stages import Place
     from hybridsim.solution.watched import Decision, Look
 
-_RULE = "the fewest modes change, and where as many do, what holds comes before what slips"
+_RULE = "fewer changes of mode are preferred, then holding before slipping"
 
 
 def reason(
@@ -31,7 +31,7 @@ def reason(
     has_choices: bool,
     blow: GuardView | None,
 ) -> str:
-    """The sentence; `changed`: the states that changed, in words, and `blow`: the gap as it came to zero."""
+    """Return the sentence; `changed` names the changed states, and `blow` is the gap as it reached zero."""
     stage, change = place.stage, place.change
     settling, outcome = stage.settling, stage.outcome
     system = settling.system
@@ -50,9 +50,9 @@ def reason(
     if how == "impact":
         return f"{led.subject or 'an impact at this instant'} made its gap open: nothing is left to decide"
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
-        # the run had it closer to the rounding of its own steps
+        # the run knew the rate to within the rounding of its own steps
         if after != occurrence.target and change is None:
-            return f"an impact after which the gap opens by less than its rounding: {occurrence.target} from here on"
+            return f"an impact after which the gap opens by no more than rounding: {occurrence.target} from here on"
         said = restitution(model, stage, c, blow) if blow else ""
         said = f"an impact{said}: its impulses change {changed}{friction(stage, c)}; {occurrence.target} just after"
         if decision is not None and len(decision.fine) > 1:
@@ -64,7 +64,7 @@ def reason(
         leads = f"{first.format(occurrence.guard)} to {occurrence.target}{reset}"
         if blow is not None:
             return leads
-        subject = led.subject or "what else happened at this instant"
+        subject = led.subject or "another event of this instant"
         return f"{subject} made the guard leave: it was not at zero before; {leads}"
     if decision is None:
         return f"{led.start or 'at this instant: '}{occurrence.target} from here on"
@@ -72,27 +72,27 @@ def reason(
 
 
 class _Led(NamedTuple):
-    """What led to a change, in words: what happened, as clauses, and what it came after, as nouns."""
+    """The causes of a change in words: earlier events as clauses, and earlier impacts or resets as nouns."""
 
     clauses: list[str]
     nouns: list[str]
 
     @property
     def subject(self) -> str:
-        """As the subject of a sentence; empty where there is nothing."""
+        """The causes as the subject of a sentence; empty without any."""
         said = " and ".join([*self.clauses, *self.nouns])
         return f"{said}, which" if self.clauses else said
 
     @property
     def start(self) -> str:
-        """As the start of a sentence; empty where there is nothing."""
+        """The causes as the start of a sentence; empty without any."""
         after = [f"after {' and '.join(self.nouns)}"] if self.nouns else []
         said = " and ".join([*self.clauses, *after])
         return f"{said}: " if said else ""
 
 
 def _led(place: Place) -> tuple[list[str], list[str]]:
-    """What came before a change at its instant: what was due and transitions; resets and impacts."""
+    """List the causes of a change: due events and transitions as clauses, resets and impacts as nouns."""
     stage, change = place.stage, place.change
     settling = stage.settling
     assert change is not None
@@ -111,7 +111,7 @@ def _led(place: Place) -> tuple[list[str], list[str]]:
 
 
 def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
-    """The transitions of other components that set no state."""
+    """List the transitions of other components that set no state."""
     found = []
     for one in changes:
         automaton = system.automata[one.component]
@@ -122,27 +122,27 @@ def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
 
 
 def _impacts(system: System, changes: Sequence[Change], of: Change) -> list[str]:
-    """The contacts that were struck, other than the one whose change it is."""
+    """Return the names of the struck contacts, without the one whose change is explained."""
     struck = [one.component for one in changes if is_struck(system, one) and one.component != of.component]
     return [system.automata[c].name for c in struck]
 
 
 def _decided(system: System, decision: Decision, c: int) -> str:
-    """By which rule a decision took what it took, as far as it is of one component."""
+    """Describe the rule by which a decision chose the mode of one component."""
     fine, undecided, taken = decision.fine, decision.undecided, decision.taken
     whose = _whose(system, c, int(decision.z[c]))
     if taken is not None and taken.verdict != FINE:
         shown = _open_modes(system, taken) or whose
-        better = "" if fine else "nothing else is better: "
-        return f"{shown}: a question of rounding, and {better}a mode is kept where it can be"
+        better = "" if fine else "no other is better: "
+        return f"{shown}: a question of rounding, and {better}a mode is kept if possible"
     if len(fine) > 1:
         return _of_several(system, decision)
     if not fine:
-        return f"{whose}: a question of rounding, and nothing else is better: a mode is kept where it can be"
+        return f"{whose}: a question of rounding, and no other is better: a mode is kept if possible"
     is_joint = len(fine[0].components) > 1
     if not undecided:
         if is_joint:
-            alone = "of all combinations of what acts on each other the only admissible one"
+            alone = "the only admissible one of all combinations of the coupled components"
             return f"{way(system, fine[0])} together: {alone}"
         return f"{whose} is the only mode that is admissible just after"
     what = f"{way(system, fine[0])} together" if is_joint else whose
@@ -150,7 +150,7 @@ def _decided(system: System, decision: Decision, c: int) -> str:
 
 
 def _of_several(system: System, decision: Decision) -> str:
-    """Which of several admissible combinations was taken, and by which rule."""
+    """Describe which of several admissible combinations was taken, and by which rule."""
     fine, taken = decision.fine, decision.taken
     ways = " and ".join(f"({way(system, look)})" for look in fine)
     first = taken or fine[0]
@@ -161,7 +161,7 @@ def _of_several(system: System, decision: Decision) -> str:
 
 
 def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
-    """The combinations that rounding leaves open, and whether they are the same motion as what was taken."""
+    """Describe the combinations that rounding leaves open, and whether they are the same motion as the one taken."""
     ways = " and ".join(f"({way(system, look)})" for look in undecided)
     are = "is a question" if len(undecided) == 1 else "are questions"
     same = ": the same motion to rounding" if all(look.is_as(taken) for look in undecided) else ""
@@ -169,7 +169,7 @@ def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
 
 
 def _open_modes(system: System, look: Look) -> str:
-    """The modes of a combination whose guards are a question of rounding."""
+    """Return the modes of a combination whose guards are undecided at rounding."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = views(system, look.at, look.z, guards, look.decreed)
     return " and ".join(dict.fromkeys(view.mode for view in shown if view.is_open))

@@ -1,4 +1,4 @@
-"""What decided an event beside its guards: the sides of corners, loads that are zero, other events at its instant."""
+"""This module adds remarks to an explanation: sides of corners, vanishing loads, simultaneous events."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from hybridsim.model import Component, Contact, Model
     from hybridsim.solution.solution import Solution
 
-_FIRST_PIECE = "1"  # the first mode of a table's component, whose modes are numbers
+_FIRST_PIECE = "1"  # the name of the first mode of a table's component; its modes are numbered
 
 
 def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occurrence]) -> tuple[str, ...]:
-    """The sentences about an event that the values of its guards alone do not say; `everything`: all of the run."""
+    """Return remarks that the values of the guards do not show; `everything` holds all records of the run."""
     if solution._save != "all":
-        return ()  # the modes and the motion beside the event were not kept
+        return ()  # the modes and the motion around the event were not kept
     system = solution._system
     together = [one for one in everything if one.instant == occurrence.instant]
     changed = [one for one in together if one.kind == CORNER]
@@ -42,16 +42,16 @@ def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occ
 
 
 def change_of_side(solution: Solution, occurrence: Occurrence) -> str:
-    """Why a corner changed its side, and what that means for the model."""
+    """Describe why a corner changed its side, and the consequence for the model."""
     system = solution._system
     sentence = _changed(system, occurrence, _modes_after(solution, float(occurrence.instant)))
     if next(a for a in system.automata if a.name == occurrence.component).is_step:
-        return f"{sentence}; time alone decides this, so that rates may jump, and no mode changes"
+        return f"{sentence}; it depends on time alone, so that rates may jump, but no mode changes"
     return f"{sentence}; both sides agree at this instant, so that nothing jumps and no mode changes"
 
 
 def _companions(occurrence: Occurrence, together: Sequence[Occurrence]) -> Iterator[str]:
-    """That several events happen at one instant, in their order."""
+    """List several events of one instant in their order."""
     events = [one for one in together if one.kind != CORNER]
     if len(events) < 2:
         return
@@ -64,7 +64,7 @@ def _name(one: Occurrence) -> str:
 
 
 def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
-    """That a corner changed its side, or a table its piece."""
+    """Describe a change of a corner's side or of a table's piece."""
     name, component = _quoted(occurrence.component), _component(system, occurrence.component)
     if component.modes[0].name == _FIRST_PIECE:
         return f"table {name} goes from piece {occurrence.source} to piece {occurrence.target} here"
@@ -79,7 +79,7 @@ def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
 
 
 def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str]:
-    """What the component is that the program made of a jump in the rates."""
+    """Describe the component that stands for a jump in the rates."""
     for component in system.model.all_components():
         surface = component.surface if component.name == occurrence.component else None
         if surface and surface.unknown.startswith(SIGN):
@@ -90,7 +90,7 @@ def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str
 def _standing_sides(
     system: System, occurrence: Occurrence, z: np.ndarray, changed: set[str]
 ) -> Iterator[str]:
-    """The sides of the corners that an event depends on and that did not change."""
+    """Describe the sides of corners that an event depends on and that did not change."""
     read = _read_by(system, occurrence)
     for component, automaton, mode in zip(system.model.all_components(), system.automata, z, strict=True):
         own = component.modes[int(mode)]
@@ -110,7 +110,7 @@ def _standing_sides(
 
 
 def _read_by(system: System, occurrence: Occurrence) -> set[str]:
-    """The names that the guards or the monitor of an event read, also those behind definitions and variables."""
+    """Return the names that the guards or the monitor of an event read, also through definitions and variables."""
     model = system.model
     behind: dict[str, set[str]] = {name: set(names_of(expr.tree)) for name, expr in model.definitions}
     for component in model.all_components():
@@ -127,7 +127,7 @@ def _read_by(system: System, occurrence: Occurrence) -> set[str]:
 
 
 def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
-    """The expressions that decide an event: its guard, at a surface all of both modes, or its monitor."""
+    """Yield the expressions that decide an event: its guard, all guards of a surface's modes, or its monitor."""
     yield from (monitor.expr.tree for monitor in model.monitors if monitor.name == occurrence.component)
     for component in model.all_components():
         if component.name != occurrence.component or occurrence.kind == CORNER:
@@ -140,7 +140,7 @@ def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
 
 
 def _loads(solution: Solution, t: float) -> Iterator[str]:
-    """The contacts whose normal load reaches zero at an instant, leaves it, or touches it."""
+    """Describe the contacts whose normal load reaches, leaves or touches zero at an instant."""
     times = sorted(
         {solution.t_start, solution.t_end, *(float(o.instant) for o in solution._trajectory.occurrences)}
     )
@@ -163,7 +163,7 @@ def _loads(solution: Solution, t: float) -> Iterator[str]:
 
 
 def _load(solution: Solution, contact: Contact, t: float) -> float | None:
-    """The normal load of a contact at a time; None where it has no value by its form."""
+    """Return the normal load of a contact at a time, or None if its expression has no value there."""
     model = solution.model
     trees = {name: expr.tree for name, expr in model.definitions}
     values, open_ = dict(model.parameter_values()), set(names_of(contact.normal.tree))
@@ -178,13 +178,13 @@ def _load(solution: Solution, contact: Contact, t: float) -> float | None:
 
 
 def _modes_after(solution: Solution, t: float) -> np.ndarray:
-    """The modes of all components just after an instant."""
+    """Return the modes of all components just after an instant."""
     index, _ = solution._places(np.array([t]), "+")
     return np.maximum(solution._segments[int(index[0])].z, 0)
 
 
 def _quoted(name: str) -> str:
-    """The name of a corner as a part of a sentence: that of a conditional has words in it."""
+    """Return the name of a corner for a sentence, quoted if it contains words."""
     return f"'{name}'" if " if " in name else name
 
 

@@ -1,4 +1,4 @@
-"""Going on with a run from the last place that it noted."""
+"""This module resumes a run from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def resumed(
     limits: Mapping[str, float] | None,
     progress: Callable[[float], None] | None,
 ) -> Solution:
-    """The solution of the whole run; see `Solution.resume`."""
+    """Return the solution of the whole run after continuing it; see `Solution.resume`."""
     run, trajectory = solution._run, solution._trajectory
     task, checkpoint = run.task, trajectory.checkpoint
     if solution.status not in ("finished", *_EARLY) or checkpoint is None:
         raise UsageError(
-            f"the run of {run.model.name} cannot go on: {solution.status}, {solution.message}",
-            remedy="start a new one, from sol.y[:, -1] and with what is to be different",
+            f"the run of {run.model.name} cannot be resumed: {solution.status}, {solution.message}",
+            remedy="start a new run from sol.y[:, -1] with other settings",
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):
@@ -36,8 +36,8 @@ def resumed(
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(
-            f"the run of {run.model.name} is finished, at t = {task.t1!r}",
-            remedy="say how far to go on: t_end=...",
+            f"the run of {run.model.name} already reached its end, t = {task.t1!r}",
+            remedy="pass a later end, t_end=...",
         )
     if not sign * (end - solution.t_end) >= 0.0:
         raise UsageError(

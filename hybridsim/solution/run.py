@@ -1,4 +1,4 @@
-"""One run, ready to be carried out: the model, the method, the task, and what its solution is to show."""
+"""This module holds one prepared run: the model, the method, the task, and the form of its solution."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """What `hybridsim.simulate` makes of its arguments.
+    """The prepared run that `hybridsim.simulate` makes from its arguments.
 
     Parameters
     ----------
     grid : the times at which the solution is given; None for the integrator's own steps.
-    save : what is kept, as it was asked for.
-    reason : why "auto" took this method.
+    save : the requested retention, as in `simulate`.
+    reason : why "auto" chose this method.
     """
 
     model: Model
@@ -45,7 +45,7 @@ class Run:
     reason: str = ""
 
     def on_grid(self, grid: np.ndarray | None) -> Run:
-        """The same with its solution given at other times."""
+        """Return the same run with its solution at other times."""
         if grid is self.grid:
             return self
         return Run(self.model, self.system, self.method, self.task, grid, self.save, self.reason)
@@ -53,10 +53,10 @@ class Run:
     def carried_out(
         self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
     ) -> Solution:
-        """The solution; before: seconds that an earlier part of it took."""
+        """Carry out the run and return its solution; `before` is the time in seconds of an earlier part."""
         began, compiled = time.perf_counter(), seconds_compiling()
         trajectory = self.method.run(self.system, self.task, progress)
-        within = seconds_compiling() - compiled  # kernels that no earlier run of this process has needed
+        within = seconds_compiling() - compiled  # compile time of kernels that were first needed in this run
         wall_time = time.perf_counter() - began - within
         if isinstance(trajectory, AtOnce):
             trajectory.then(self._close)
@@ -65,17 +65,17 @@ class Run:
         else:
             self._close(trajectory)
         run = self
-        # a solution holds on to what the run left, not to what it began with
+        # The solution keeps only what the run left, not its start.
         if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
         solution = Solution(run, trajectory, before + wall_time, compile_time + within)
-        # a run that its loop took from start to end was not interrupted, and is not looked at
+        # A compiled loop that took the run from start to end was not interrupted.
         if not isinstance(trajectory, AtOnce) and trajectory.status == "interrupted":
             raise RunInterrupted(solution)
         return solution
 
     def _close(self, trajectory: Trajectory) -> None:
-        """Add what is to be said of the run, and let go of what is not to be kept."""
+        """Add the warnings of the run, and drop the data that is not to be kept."""
         if isinstance(self.system.code, PythonCode):
             self.system.code.report(trajectory)
         for caution in jumps_of(self.model):

@@ -1,4 +1,4 @@
-"""What a run gives back: times, states, dense output, events, modes, outputs, cost."""
+"""This module defines the result of a run: times, states, dense output, events, modes, outputs and cost."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _GOOD = ("finished", "terminated")
 
 
 def _speed(contact: str) -> str:
-    """What `Solution.output` calls the relative velocity of a contact."""
+    """Return the name under which `Solution.output` gives the relative velocity of a contact."""
     return f"v_rel({contact})"
 
 
@@ -41,16 +41,16 @@ class Solution(InTables):
     Attributes
     ----------
     t, y : array
-        Times (m,) and states (n, m), as in SciPy: a row for each state, in the order in which the model
-        declares them (``names``; states that a friction law brings come after those), a column for each time;
-        an event time stands twice, with x- and x+.
+        Times (m,) and states (n, m), as in SciPy: one row per state and one column per time. The rows follow
+        the order of declaration (``names``), then the states of friction laws. An event time appears twice,
+        with x- and x+.
     events, modes, stats, status, success, message, warnings : object
         See the properties.
 
     Other Parameters
     ----------------
     run, trajectory, wall_time, compile_time : object
-        What `simulate` passes on; not made by hand.
+        Passed on by `simulate`; do not construct a solution by hand.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class Solution(InTables):
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times (m,): the requested grid as far as the run went, else the steps with every event time twice."""
+        """Times (m,): the requested grid up to the end of the run, else the steps with every event time twice."""
         if self._grid is not None:
             if not self._segments:
                 return self._grid[:0]
@@ -113,7 +113,7 @@ class Solution(InTables):
 
     @property
     def t_start(self) -> float:
-        """First time of the run, or of what was kept of it."""
+        """First time of the run, or of the part of it that was kept."""
         whole = self._save in ("all", "events", "nothing") or not self._segments
         return self._span[0] if whole else float(self._starts[0])
 
@@ -125,9 +125,9 @@ class Solution(InTables):
         return float(self._segments[-1].end) if self._segments else self._span[0]
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
-        """States at time t: (n,) for a number, (n, k) for k times.
+        """Return the states at time t: (n,) for a number, (n, k) for k times.
 
-        side "+" is right-continuous, as x+ at an event; "-" gives x-.
+        With side "+" the result is right-continuous, x+ at an event; "-" gives x-.
         """
         times = as_times(t)
         x = self._segments.states(*self._places(times, side))
@@ -135,14 +135,14 @@ class Solution(InTables):
 
     @refusing
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
-        """A named quantity over time: a state, an output, an input, a definition, a variable of a mode such as a force.
+        """Return a quantity over time: a state, output, input, definition, or variable of a mode.
 
         ``v_rel(f)`` is the relative velocity of a contact f that can stick.
 
         Parameters
         ----------
-        name : what to evaluate.
-        t : a number or an array of times; without it ``sol.t``, each event time on both its sides.
+        name : the name of the quantity.
+        t : a number or an array of times; without it ``sol.t``, with both sides of each event time.
         """
         known = (*self._system.names, *(q for q in self._system.quantities if " in " not in q))
         known = (*known, *(d.name for d in self.model.discrete))
@@ -165,7 +165,7 @@ class Solution(InTables):
 
     @cached_property
     def _speeds(self) -> dict[str, int]:
-        """The relative velocities of contacts by name, each with its place among the surfaces."""
+        """The relative velocities of contacts by name, each with its index among the surfaces."""
         contacts = {contact.name for contact in self.model.contacts}
         components = [self._system.automata[c].name for c in self._system.surface_of]
         return {_speed(name): k for k, name in enumerate(components) if name in contacts}
@@ -182,7 +182,7 @@ class Solution(InTables):
     def _quantities(
         self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
     ) -> list[np.ndarray]:
-        """Discrete states and other quantities that are no states, at points of a segment."""
+        """Return discrete states and other quantities that are not states, at points of a segment."""
         system = self._system
         discrete = [d.name for d in self.model.discrete]
         known = system.quantities
@@ -213,7 +213,7 @@ class Solution(InTables):
         return self._frame.ends
 
     def _outside(self, times: np.ndarray) -> np.ndarray | None:
-        """Which of some times lie outside of what is kept of the run, or are no numbers; None if none does."""
+        """Return a mask of the times that are NaN or outside the kept part of the run; None if there are none."""
         low, high = self.t_start, self.t_end
         if high < low:
             low, high = high, low
@@ -222,10 +222,10 @@ class Solution(InTables):
         return ~((times >= low) & (times <= high))
 
     def _places(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the segment that holds each time, and its local time there."""
+        """Return the number of the segment that holds each time, and the local time in it."""
         side = side_of_event(side)
         if not self._segments:
-            raise UsageError(f"the run holds no trajectory ({self.status}: {self.message})")
+            raise UsageError(f"the run has no trajectory ({self.status}: {self.message})")
         if self._save in ("events", "nothing"):
             raise UsageError(
                 f"the run was made with save={self._save!r}, which keeps no states between the ends",
@@ -235,11 +235,11 @@ class Solution(InTables):
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
             raise UsageError(
-                f"t = {float(bad)!r} is outside of {whole}, which goes from {low!r} to {high!r}",
+                f"t = {float(bad)!r} is outside of {whole}, which covers t = {low!r} to {high!r}",
                 remedy="give times within it",
             )
         sign = 1.0 if self.t_end >= self.t_start else -1.0
-        # right-continuous in time: forward the later segment has an event time, backward the earlier one
+        # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
         later = (side == "+") == (sign > 0)
         index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
         find_places(np.ascontiguousarray(times), *self._frame, sign, later, index, s)
@@ -248,7 +248,7 @@ class Solution(InTables):
     def _pieces(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
-        """States (k, n) at some times, and (segment, indices of the times in it, their local times) for each."""
+        """Return states (k, n) at some times, and (segment, indices, local times) for each segment."""
         index, s = self._places(times, side)
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
         pieces = [(self._segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
@@ -266,8 +266,8 @@ class Solution(InTables):
     def corners(self) -> tuple[Event, ...]:
         """The instants at which a corner (`abs`, `min`, `max`) inside a mode changed its side: kind "corner".
 
-        Nothing happens there to the model; the run goes on with the other side's equations. `events` and `modes`
-        leave them out.
+        The model does not change there: the run continues with the equations of the other side. `events` and
+        `modes` do not contain these instants.
         """
         self._require_events()
         return tuple(event for event in self._happened if event.kind == "corner")
@@ -277,16 +277,16 @@ class Solution(InTables):
         return tuple(Event(float(o.instant), *o[1:]) for o in self._trajectory.occurrences)
 
     def explain(self, number: int | Event) -> Explanation:
-        """Why an event went as it did: what came to zero, which modes could hold just after, and why that one.
+        """Explain an event: guards that reached zero, modes that could hold just after, and the reason.
 
         Parameters
         ----------
-        number : its place in `events`, or an event of `events` or `corners`.
+        number : the index of the event in `events`, or an event of `events` or `corners`.
 
         Raises
         ------
         UsageError
-            Where there is no such event, or what is needed was not kept (``save``).
+            If there is no such event, or ``save`` did not keep the data that is needed.
 
         Examples
         --------
@@ -301,16 +301,17 @@ class Solution(InTables):
 
     @refusing
     def event_times(self, component: str, kind: str | None = None) -> np.ndarray:
-        """Times of the events of one component, monitor or schedule."""
+        """Return the times of the events of one component, monitor or schedule."""
         found = [block.times_of(component, kind) for block in self._blocks_with(component, kind)]
         return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
 
     @refusing
     def event_states(self, component: str, kind: str | None = None, side: str = "+") -> np.ndarray:
-        """States (m, n) at the m events of one component, in the order of `event_times`.
+        """Return the states (m, n) at the m events of one component, in the order of `event_times`.
 
-        side "+" is x+, just after each, "-" is x-; columns are in the order of ``sol.names``. The same as in
-        ``sol.events``, without an object for each event.
+        With side "+" these are the states x+ just after each event, with "-" the states x-; columns are in
+        the order of ``sol.names``. The values equal those in ``sol.events``, without an object for each
+        event.
         """
         side = side_of_event(side)
         found = [
@@ -321,7 +322,7 @@ class Solution(InTables):
         return np.concatenate([np.empty((0, self._system.n)), *(states for states in found if len(states))])
 
     def _blocks_with(self, component: str, kind: str | None) -> list[Any]:
-        """All blocks of what happened, once it is known that the component is one that may be heard of."""
+        """Return all blocks of records with events of a component, after checking its name."""
         self._require_events()
         if kind is not None:
             text(kind, "kind")
@@ -335,12 +336,12 @@ class Solution(InTables):
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """Those of which `modes` tells: the model's, and those that jumps in its rates are."""
+        """Components listed in `modes`: those of the model, and those created for jumps in its rates."""
         return tuple(self._system.model.all_components()[: len(self._system.declared)])
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """For each component its modes in order, with the stretch of time of each."""
+        """The modes of each component in order, with the time interval of each."""
         self._require_events()
         if self._save == "events":
             return self._modes_of_events()
@@ -383,12 +384,12 @@ class Solution(InTables):
 
     @property
     def success(self) -> bool:
-        """Whether the run did what was asked."""
+        """Whether the run reached its end or was terminated by a monitor or schedule."""
         return self.status in _GOOD
 
     @property
     def chosen_because(self) -> str:
-        """Why `auto` took the integrator, in words; empty where it was asked for by name."""
+        """Why `auto` chose the integrator, as text; empty if the integrator was named."""
         return self._reason
 
     @property
@@ -398,22 +399,22 @@ class Solution(InTables):
         how = " backward in time" if self.t_end < self.t_start else ""
         if taken_over := self._trajectory.taken_over:
             why += (
-                f"; from t = {taken_over[1]:.9g} on with {taken_over[0]}, since stability and not accuracy kept its "
-                "steps short"
+                f"; from t = {taken_over[1]:.9g} on with {taken_over[0]}, because stability, not accuracy, limited its "
+                "steps"
             )
         return self._trajectory.message or f"reached t = {self.t_end!r}{how} with {self.integrator}{why}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know of the run: near-grazings, decisions at rounding, accumulation, chattering, jumps, stiffness."""
+        """Warnings of the run: near-grazings, undecided events, accumulation, chattering, jumps, stiffness."""
         return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._trajectory.warnings.items())
 
     @property
     def stats(self) -> dict[str, float]:
-        """Cost summed over all restarts: steps, rejected, evaluations, events, restarts; seconds of wall, of compiling.
+        """Cost summed over all restarts: counts of steps, evaluations, events and restarts; times in seconds.
 
-        wall_time is all of the run; kernel_time what of it was spent in the compiled mode loop, for methods that have
-        one.
+        wall_time covers the whole run. kernel_time is the part of it in the compiled mode loop, for methods
+        that have one.
         """
         counters = self._trajectory.counters
         return {**vars(counters), "wall_time": self._cost[0], "compile_time": self._cost[1]}
@@ -421,24 +422,25 @@ class Solution(InTables):
     # -- on disk, and on ------------------------------------------------------------------------------------
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled as it is saved, to go from process to process; a model of Python functions cannot."""
+        """Pickle a solution as it is saved to a file; a model with Python functions cannot be pickled."""
         from hybridsim.solution.archive import of_bytes, to_bytes
 
         return of_bytes, (to_bytes(self),)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the run to one file: the model, how it was run, the trajectory, where it goes on.
+        """Write the run to one file: the model, its settings, the trajectory, and the checkpoint to resume from.
 
-        `hybridsim.load_solution` reads it. The file is a zip of NumPy arrays and one text; no code is in it.
+        `hybridsim.load_solution` reads it. The file is a zip of NumPy arrays and one text; it contains no
+        code.
 
         Parameters
         ----------
-        path : the file; .hsol is a good ending.
+        path : the file; the usual suffix is .hsol.
 
         Raises
         ------
         UsageError
-            For a model of Python functions, and where the file cannot be written.
+            For a model of Python functions, or if the file cannot be written.
         """
         from hybridsim.solution.archive import save
 
@@ -452,21 +454,21 @@ class Solution(InTables):
         limits: Mapping[str, float] | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Solution:
-        """Go on with the run from just after its last event, and return the solution of the whole.
+        """Resume the run from just after its last event, and return the solution of the whole run.
 
-        It computes what an undisturbed run would have computed, to the last bit: after Ctrl-C, after a limit, and where
-        it is to go further than it was asked for (there up to the tolerances for the methods of SciPy and SUNDIALS and
-        ``rodas5p``, whose first step depends on how far away the end is).
+        The result is bit for bit that of an uninterrupted run: after Ctrl-C, after a limit, or beyond the
+        original end. Beyond the original end it agrees only to the tolerances for the methods of SciPy and
+        SUNDIALS and for ``rodas5p``, because their first step depends on the distance to the end.
 
         Parameters
         ----------
-        t_end : where to end; without it, where the run should have ended.
+        t_end : the new end; without it the original end.
         limits, progress : as in `simulate`; limits count from here.
 
         Raises
         ------
         UsageError
-            Where there is nothing left to do, or no way on (a terminating monitor, an error).
+            If the run has already reached its end, or cannot continue (a terminating monitor, an error).
 
         Examples
         --------
@@ -508,7 +510,7 @@ class Solution(InTables):
     # -- tables ---------------------------------------------------------------------------------------------
 
     def table(self, points: int | None = None) -> Table:
-        """Times, states, outputs and modes in columns, at ``sol.t`` or at so many equal steps of time."""
+        """Return times, states, outputs and modes as columns, at ``sol.t`` or at equally spaced times."""
         from hybridsim.solution.tabulated import tabulated
 
         return tabulated(self, points)
@@ -517,5 +519,5 @@ class Solution(InTables):
         return in_words(self)
 
     def _repr_html_(self) -> str:
-        """What notebooks show: how the run went, a strip of modes for each component, the events."""
+        """Return the HTML for notebooks: a summary, a strip of modes for each component, and the events."""
         return in_html(self)

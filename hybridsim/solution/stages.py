@@ -1,4 +1,4 @@
-"""What was settled at one instant, once more and in its order: what was located, resets of monitors, what was due."""
+"""This module repeats what was resolved at one instant, in order: located guards, monitor resets, due events."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """One settling at an instant.
+    """One resolution of the modes at an instant.
 
     Parameters
     ----------
-    before : the situation that it began with.
+    before : the situation at its start.
     fired : numbers of the guards that were located at zero.
-    due : in words, what set it off other than guards at zero; empty where nothing did.
+    due : its other causes in words; empty without any.
     """
 
     before: Situation
@@ -47,13 +47,13 @@ class Stage:
 
     @property
     def changes(self) -> list[Change]:
-        """The changes that the run records as transitions."""
+        """Return the changes that the run records as transitions."""
         return [c for c in self.settling.changes if not self.settling.system.is_corner[c.component]]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where in the stages of its instant a recorded transition was made; no change where it was not found again."""
+    """The stage of its instant in which a recorded transition was made; `change` is None if it was not found."""
 
     stage: Stage
     change: Change | None
@@ -62,7 +62,7 @@ class Place:
 def place_of(
     run: Run, segment: Segment, together: Sequence[Occurrence], fired: list[int], occurrence: Occurrence
 ) -> Place | None:
-    """The stage in which a transition was made, of all the occurrences of its instant; None where there is none."""
+    """Return the stage in which a transition was made, given all records of its instant; None if there is none."""
     instant = _Instant(run, segment, together)
     stages = list(instant.located(fired))
     found, left = _matched(run.system, instant.transitions, stages)
@@ -81,7 +81,7 @@ def place_of(
 def _matched(
     system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
 ) -> tuple[dict[int, Place], list[Occurrence]]:
-    """Where each recorded transition, by number, was made; and those that were not found."""
+    """Return the place of each recorded transition by number, and the transitions that were not found."""
     made = [Place(stage, change) for stage in stages for change in stage.changes]
     found, left, start = {}, [], 0
     for number, occurrence in enumerate(transitions):
@@ -102,7 +102,7 @@ def _is_of(system: System, change: Change | None, occurrence: Occurrence) -> boo
 
 
 class _Instant:
-    """An instant of a run: the segment that ended there, and what was recorded."""
+    """An instant of a run: the segment that ended there, and the records of the instant."""
 
     def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
         self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
@@ -129,7 +129,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Of guards that were located at zero, and monitors; on the pieces of inputs that begin there."""
+        """Return the stages of guards located at zero and of monitors, with inputs already on their next piece."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
@@ -139,13 +139,13 @@ class _Instant:
         return [self._settled(found, self.stopping, (), begins=found.inputs is not None)]
 
     def _nothing(self, at: Situation, fired: dict[int, int] | None = None) -> Located:
-        """What was located where no monitor decides."""
+        """Return the located guards without any deciding monitor."""
         monitors = self.system.model.monitors
         none = MonitorSides.of(monitors, np.zeros(len(monitors), dtype=np.int64))
         return Located(at, fired or {}, none, True)
 
     def crossed(self, stage: Stage) -> Stage | None:
-        """Of the resets of monitors that a stage carried off their sides; None where it did so to none."""
+        """Return the stage of monitor resets that another stage triggered, or None."""
         sides = stage.outcome.monitor_sides
         crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] != -way]
         if not crossed:
@@ -155,7 +155,7 @@ class _Instant:
         return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
-        """Of what was due at the instant, and what its resets led to; `first`: the first transition of it."""
+        """Return the stages of events due at the instant and of their resets; `first` is their first transition."""
         system, segment = self.system, self.segment
         if first is None or not (self.schedules or self.knots):
             return []
@@ -173,7 +173,7 @@ class _Instant:
     def _settled(
         self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """One settling; begins: pieces of inputs begin with it, so that it jumps where one carries a surface away."""
+        """Resolve one stage; `begins`: pieces of inputs begin with it, so the state may jump off a surface."""
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
@@ -193,7 +193,7 @@ class _Instant:
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
-    """The state before, with bounds of its rounding as the run itself has them."""
+    """Return the state before an event, with the bounds of its rounding that the run itself uses."""
     s, x = float(segment.s[-1]), segment.x[-1].copy()
     s_error = 2.0 * math.ulp(s)
     series = system.series(s, x, segment.p, segment.z, np.zeros(system.n), 0.0)
@@ -208,7 +208,7 @@ def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
 
 
 def _set_by(system: System, key: tuple[Any, ...], at: Situation) -> str:
-    """What one reset sets, in words: from, to."""
+    """Describe the values that one reset sets, old and new."""
     if key not in system.resets:
         return ""
     x, p = at.x.copy(), at.p.copy()
@@ -220,7 +220,7 @@ def _set_by(system: System, key: tuple[Any, ...], at: Situation) -> str:
 
 
 def _knots(system: System, segment: Segment, instant: Instant, forward: bool) -> list[str]:
-    """The inputs that have a knot at an instant."""
+    """Return the names of the inputs that have a knot at an instant."""
     found = []
     for declared, signal in zip(system.model.inputs, system.signals, strict=True):
         knot = signal.next_knot(segment.start, forward)
@@ -230,7 +230,7 @@ def _knots(system: System, segment: Segment, instant: Instant, forward: bool) ->
 
 
 def _said_of(system: System, names: list[str], instant: Instant, at: Situation, forward: bool) -> list[str]:
-    """That inputs have a knot, and the values of those that jump there."""
+    """Describe the inputs that have a knot, and the values of those that jump there."""
     if not names:
         return []
     vectors = (system.vector(instant, system.discrete(at.p), not forward), at.p)

@@ -1,4 +1,4 @@
-"""A solution at a glance: as text in a terminal, as HTML in a notebook."""
+"""This module summarises a solution as text for a terminal and as HTML for a notebook."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def kinds(solution: Solution) -> Counter[str]:
-    """How many events of each kind there were, corners among them; none of them is made an object for that."""
+    """Count the events of each kind, including corners, without creating event objects."""
     found: Counter[str] = Counter()
     for block in solution._trajectory.occurrences.blocks:
         found += block.kinds()
@@ -21,7 +21,7 @@ def kinds(solution: Solution) -> Counter[str]:
 
 
 def in_words(solution: Solution) -> str:
-    """How the run went, where it ended, its events by kind, its cost and its warnings."""
+    """Return a summary as text: status, end state, events by kind, cost and warnings."""
     counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds(solution).items())) or "none"
     counted = "not kept" if solution._save == "nothing" else counted
     lines = [
@@ -42,7 +42,7 @@ def in_words(solution: Solution) -> str:
 
 
 def in_html(solution: Solution) -> str:
-    """How the run went, a strip of modes for each component, the events and the warnings."""
+    """Return a summary as HTML: status, a strip of modes for each component, events and warnings."""
     stats, model = solution.stats, solution.model
     head = {
         solution.status: f"{model.title or model.name}, by {solution.integrator}",

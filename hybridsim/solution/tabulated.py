@@ -1,4 +1,4 @@
-"""A solution in columns: times, states, outputs and modes."""
+"""This module puts a solution into columns: times, states, outputs and modes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from hybridsim.tables import Table
 if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution
 
-MOST_POINTS = 1 << 27  # of a column: a gigabyte
+MOST_POINTS = 1 << 27  # rows per column: one gigabyte
 
 
 def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
-    """Times (points,) at equal steps, both ends included."""
+    """Return equally spaced times (points,), both ends included."""
     return np.linspace(t0, t1, whole_number(points, "points", 2, MOST_POINTS))
 
 
 def tabulated(solution: Solution, points: int | None) -> Table:
-    """The table of a solution; see `Solution.table`."""
+    """Return the table of a solution; see `Solution.table`."""
     model, own_steps = solution.model, points is None and solution._grid is None
     if own_steps:
         t, ends = solution.t, np.cumsum([len(g.s) for g in solution._segments], dtype=int)

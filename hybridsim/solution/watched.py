@@ -1,4 +1,4 @@
-"""A settling that remembers its decisions, and what each looked at, with the values of then."""
+"""This module repeats a resolution of modes and records its decisions and the values that each of them used."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Look:
 
     Parameters
     ----------
-    at : what it was judged with.
+    at : the situation in which it was judged.
     z : modes of all components; components : those whose guards were judged.
-    verdict : as `hybridsim.engine.decide` has it.
-    decreed : leading zeros of each guard, by the event.
-    motion : coefficients of the states and of the surfaces along its flow, with bounds of their rounding,
-        (2, n + surfaces, orders); of a surface that it holds they are zero.
-    free : the rows of it that say how it moves: a held state is evaluated from its surface.
+    verdict : one of the codes of `hybridsim.engine.decide`.
+    decreed : the number of leading derivatives of each guard that the event makes zero.
+    motion : coefficients of the states and surfaces along its flow, with bounds of their rounding,
+        (2, n + surfaces, orders); zero for a surface that it holds.
+    free : a mask of the rows that describe its motion; a held state follows from its surface.
     """
 
     at: Situation
@@ -40,7 +40,7 @@ class Look:
     free: np.ndarray
 
     def is_as(self, other: Look) -> bool:
-        """Whether both are the same motion to rounding."""
+        """Return whether both are the same motion to rounding."""
         free = self.free & other.free
         (mine, error), (its, its_error) = self.motion[:, free], other.motion[:, free]
         return bool((np.abs(mine - its) <= error + its_error).all())
@@ -48,12 +48,12 @@ class Look:
 
 @dataclass
 class Decision:
-    """One joint decision: what it looked at, the modes that it ended with, and the changes it is the cause of.
+    """One joint decision: the combinations it judged, the modes it chose, and the changes it caused.
 
     Parameters
     ----------
-    first, last : of the changes of the settling, by number, its own are those from first up to last.
-    z : modes of all components after it; empty where it found none.
+    first, last : the changes first to last - 1 of the resolution belong to it.
+    z : modes of all components after it; empty if it found none.
     """
 
     first: int
@@ -63,17 +63,17 @@ class Decision:
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Those whose guards were judged."""
+        """Return the components whose guards were judged."""
         return self.looks[0].components if self.looks else ()
 
     def has_taken(self, look: Look) -> bool:
-        """Whether it ended with the modes of a look."""
+        """Return whether it ended with the modes of a look."""
         members = list(look.components)
         return bool(len(self.z) and (look.z[members] == self.z[members]).all())
 
     @property
     def taken(self) -> Look | None:
-        """The look that it ended with."""
+        """The look whose modes were taken."""
         return next((look for look in self.looks if self.has_taken(look)), None)
 
     def with_verdict(self, verdict: int) -> list[Look]:
@@ -82,17 +82,17 @@ class Decision:
 
     @property
     def fine(self) -> list[Look]:
-        """Those that are admissible."""
+        """Return the admissible looks."""
         return self.with_verdict(FINE)
 
     @property
     def undecided(self) -> list[Look]:
-        """Those that rounding leaves open."""
+        """Return the looks that rounding leaves open."""
         return self.with_verdict(UNDECIDED)
 
 
 class Watched(Settling):
-    """It judges all candidates, also those that no choice needs."""
+    """A resolution that judges all candidates, including those that the choice does not need."""
 
     is_thorough = True
 
@@ -128,12 +128,12 @@ class Watched(Settling):
         return found
 
     def decision_of(self, component: int, number: int) -> Decision | None:
-        """The decision that made a change of a component, by its number; None where no decision did."""
+        """Return the decision that made a change of a component, by its number; None if no decision did."""
         for decision in self.decisions:
             if component in decision.components and number < decision.last:
                 return decision if decision.first <= number else None
         return None
 
     def decision_after(self, component: int, number: int) -> Decision | None:
-        """The first decision on a component after a change, by its number."""
+        """Return the first decision on a component after a change, by its number."""
         return next((d for d in self.decisions if component in d.components and d.first > number), None)

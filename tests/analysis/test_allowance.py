@@ -29,7 +29,7 @@ def test_an_allowance_is_looked_at_until_it_is_over() -> None:
     looks: list[None] = []
     Allowance(1e9, lambda: looks.append(None))(0.5)
     assert len(looks) == 1
-    with pytest.raises(OutOfTime, match="not done after"):
+    with pytest.raises(OutOfTime, match="not finished after"):
         Allowance(-1.0)()
 
 

@@ -86,7 +86,7 @@ def test_after_how_many_samples_they_repeat() -> None:
 def test_a_section_that_is_never_passed_is_a_status() -> None:
     found = hs.bifurcation(WELLS, "b", [0.0], section="x - 50", settle=1, samples=1)
     (said,) = set(found.status.ravel())
-    assert said.startswith("SimulationError: the section was not passed upward once in a run of")
+    assert said.startswith("SimulationError: the section was not crossed upward in a run of")
 
 
 @pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_a_section_that_is_never_passed_is_a_status() -> None:
         ({"samples": 0}, "samples is 0"),
         ({"tol": 0}, "tol is 0"),
         ({"section": 3}, "section is 3"),
-        ({"rtoll": 1e-8}, "'rtoll' is no option of simulate"),
-        ({"integrator": "dop853", "step": 1.0}, "'step' is no option of simulate and of dop853"),
+        ({"rtoll": 1e-8}, "'rtoll' is not an option of simulate"),
+        ({"integrator": "dop853", "step": 1.0}, "'step' is not an option of simulate or of dop853"),
     ],
 )
 def test_what_cannot_be_asked_for(given: dict[str, object], message: str) -> None:

@@ -83,7 +83,7 @@ def test_bad_questions_are_refused() -> None:
         hs.continuation("dfcs", "F1", (1, 2))
     with pytest.raises(UsageError, match="bounds"):
         hs.continuation("dfcs", "F0", (1, 2))
-    with pytest.raises(UsageError, match="no periodic orbit"):
+    with pytest.raises(UsageError, match="does not settle on a periodic orbit"):
         hs.continuation("free-decay", "mu", (0.05, 0.2))
 
 

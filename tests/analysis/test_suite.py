@@ -149,7 +149,7 @@ def test_graphs_are_compared_where_states_jump() -> None:
 
 def test_table_and_files(tmp_path) -> None:
     table = suite().table()
-    for part in ("Who is right", "Cheapest", "References", "held against", "wrong modes", "1e-11"):
+    for part in ("Correct runs", "Cheapest", "References", "compared with", "wrong modes", "1e-11"):
         assert part in table
     suite().to_csv(tmp_path / "table.csv")
     with open(tmp_path / "table.csv", encoding="utf-8") as file:

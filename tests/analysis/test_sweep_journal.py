@@ -107,10 +107,10 @@ def test_a_journal_of_another_sweep_is_refused(tmp_path: Path) -> None:
         ("dfcs", {"F0": [20.0, 30.0]}, mixed),
         (hs.load("dfcs").with_(mu=0.4), {"F0": [20.0, 30.0]}, end),
     ):
-        with pytest.raises(hs.UsageError, match="of another sweep"):
+        with pytest.raises(hs.UsageError, match="belongs to another sweep"):
             hs.sweep(model, values, measure, journal=path)
     path.write_text("something else\n")
-    with pytest.raises(hs.UsageError, match="no journal"):
+    with pytest.raises(hs.UsageError, match="not a journal"):
         hs.sweep("dfcs", {"F0": [20.0]}, end, journal=path)
     assert path.read_text() == "something else\n"
     with pytest.raises(hs.UsageError, match="cannot be written"):
@@ -169,7 +169,7 @@ def test_a_journal_serves_no_other_measure_of_the_same_name(
 ) -> None:
     path = tmp_path / "sweep.journal"
     hs.sweep("dfcs", {"F0": [20.0, 30.0]}, one, journal=path)
-    with pytest.raises(hs.UsageError, match="of another sweep"):
+    with pytest.raises(hs.UsageError, match="belongs to another sweep"):
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, other, journal=path)
     hs.sweep("dfcs", {"F0": [20.0, 30.0]}, one, journal=path)
 
@@ -180,7 +180,7 @@ def test_a_journal_serves_no_measure_that_reads_another_constant(
     path = tmp_path / "sweep.journal"
     hs.sweep("dfcs", {"F0": [20.0, 30.0]}, _over_level, journal=path)
     monkeypatch.setattr(sys.modules[__name__], "LEVEL", 2.0)
-    with pytest.raises(hs.UsageError, match="of another sweep"):
+    with pytest.raises(hs.UsageError, match="belongs to another sweep"):
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, _over_level, journal=path)
 
 
@@ -227,7 +227,7 @@ def test_a_journal_serves_no_measure_of_a_class_that_has_changed(
     path = tmp_path / "sweep.journal"
     whole = hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
     monkeypatch.setattr(_Scaled, name, part)
-    with pytest.raises(hs.UsageError, match="of another sweep"):
+    with pytest.raises(hs.UsageError, match="belongs to another sweep"):
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
     monkeypatch.undo()
     assert same(whole, hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path))
@@ -266,7 +266,7 @@ def test_an_object_is_told_by_its_state(
     assert identity(partial(_asks_a_class, kind(1.0))) != identity(partial(_asks_a_class, kind(2.0)))
     hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(1.0), journal=path)
     hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(1.0), journal=path)
-    with pytest.raises(hs.UsageError, match="of another sweep"):
+    with pytest.raises(hs.UsageError, match="belongs to another sweep"):
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, kind(2.0), journal=path)
 
 

@@ -83,7 +83,7 @@ def test_what_does_not_exist(measure: object, options: dict[str, object], messag
 @pytest.mark.parametrize("measure", ["steady", "final", lambda model: 1.0])
 def test_an_option_that_nothing_knows_is_refused_before_the_first_point(measure: Any) -> None:
     span = {"t_span": (0, 1)} if measure == "final" else {}
-    with pytest.raises(UsageError, match="'rtoll' is no option of"):
+    with pytest.raises(UsageError, match="'rtoll' is not an option of"):
         hs.sweep("dfcs", {"F0": [20, 30]}, measure, rtoll=1e-8, **span)
     if not callable(measure):
         with pytest.raises(UsageError, match="no integrator 'dop835'"):

@@ -16,7 +16,7 @@ def test_the_suite_prints_a_table_and_fills_its_folder(hybridsim: Callable, tmp_
     argv = ("--integrators", "dop853,rk4-sign", "--rtol", "1e-6,1e-9", "--steps", "600", "--repeat", 1)
     code, out, err = hybridsim("compare", "--suite", "--scenes", "P1,bouncing-ball", *argv, "--budget", 100)
     assert code == 0, err
-    assert "Who is right" in out and "bouncing-" in out and "of 100 s" in out
+    assert "Correct runs" in out and "bouncing-" in out and "of 100 s" in out
     folder = tmp_path / "compare-suite"
     assert (folder / "suite.png").read_bytes().startswith(PNG)
     with (folder / "table.csv").open(encoding="utf-8") as file:

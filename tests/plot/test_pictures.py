@@ -156,7 +156,7 @@ def test_nothing_global_is_touched() -> None:
         (lambda: friction_loop(ball()), "no outputs"),
         (lambda: phase_portrait(oscillator(2), "x", "w"), "has no quantity 'w'"),
         (lambda: save(phase_portrait(ball()), "picture.jpg"), "picture.jpg"),
-        (lambda: time_history(oscillator(2).model), "nothing to draw in Model"),
+        (lambda: time_history(oscillator(2).model), "Model oscillator.* cannot be drawn"),
     ],
 )
 def test_what_cannot_be_drawn_says_why(draw, message: str) -> None:

@@ -127,7 +127,7 @@ def test_a_corner_without_an_event_can_be_explained() -> None:
     sol = hs.simulate(timed, (0, 2), integrator="taylor")
     assert sol.explain(sol.corners[0]).reason == (
         "sign(t - 1) changes its side here: t - 1 becomes positive; "
-        "time alone decides this, so that rates may jump, and no mode changes"
+        "it depends on time alone, so that rates may jump, but no mode changes"
     )
 
 

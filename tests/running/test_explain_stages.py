@@ -255,8 +255,8 @@ def test_friction_in_a_blow_is_at_its_limit_or_stops_the_body(integrator: str) -
     said = f"the impulse of f, 0.5, stops it within its limit 0.3*{FALL:.6g} = {0.3 * FALL:.6g}; closed"
     assert said in why(slow, "p", "closed").reason
     assert why(slow, "f", "stick").reason == (
-        f"after the impact of p (u from 0.5 to 0, w from {-FALL:.6g} to 0): f stick, p closed together: of all "
-        "combinations of what acts on each other the only admissible one"
+        f"after the impact of p (u from 0.5 to 0, w from {-FALL:.6g} to 0): f stick, p closed together: the "
+        "only admissible one of all combinations of the coupled components"
     )
 
 
@@ -270,7 +270,7 @@ def test_of_several_admissible_modes_the_rule_is_given() -> None:
     }
     assert blow.reason.endswith(
         "(f slip+, p open) and (f slip-, p open) and (f stick, p open) are admissible, and (f slip+, p open) is "
-        "taken: the fewest modes change, and where as many do, what holds comes before what slips; they are the same "
+        "taken: fewer changes of mode are preferred, then holding before slipping; they are the same "
         "motion to rounding"
     )
 

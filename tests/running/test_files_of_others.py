@@ -179,7 +179,7 @@ def test_what_is_no_file(kind: str, tmp_path: Path) -> None:
         path.mkdir()
     else:
         path.symlink_to("/dev/zero")
-    with pytest.raises(hs.UsageError, match=r"r\.hsol cannot be read: it is no regular file"):
+    with pytest.raises(hs.UsageError, match=r"r\.hsol cannot be read: it is not a regular file"):
         hs.load_solution(path)
 
 

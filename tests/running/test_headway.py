@@ -65,7 +65,7 @@ def test_stiffness_that_begins_on_the_way() -> None:
     states = [hs.State("x", 1, der="-(1 + 1e3*z)*(x - cos(t)) - sin(t)"), hs.State("z", 0, der="1")]
     model = hs.Model("later", states=states, parameters={})
     sol = hs.simulate(model, (0, 1000), rtol=1e-8)
-    assert sol.status == "finished" and "with rodas5p, since stability" in sol.message
+    assert sol.status == "finished" and "with rodas5p, because stability" in sol.message
     assert sol.integrator == "dop853" and not any(text.startswith("stiff") for text in sol.warnings)
     times = np.linspace(0.0, 1000.0, 501)
     assert sol(times)[0] == pytest.approx(np.cos(times), abs=1e-5)

@@ -265,9 +265,9 @@ def test_two_sweeps_with_one_journal(tmp_path: Path) -> None:
 HEAD = '{"format": "hybridsim sweep", "sweep": "MARK"}\n'
 ROW = '[[0], [["ok", {"x": 1.0}]]]\n'
 MALFORMED = {
-    "no text": (b"\xff\xfe\x00", "no journal"),
-    "a head of another kind": (b"[1, 2]\n", "no journal"),
-    "deep head": (b"[" * 100_000 + b"\n", "no journal"),
+    "no text": (b"\xff\xfe\x00", "not a journal"),
+    "a head of another kind": (b"[1, 2]\n", "not a journal"),
+    "deep head": (b"[" * 100_000 + b"\n", "not a journal"),
     "a head without a mark": (b'{"format": "hybridsim sweep"}\n', "another sweep"),
     "a number": (b"HEAD3\n", "line 2"),
     "an object": (b'HEAD{"a": 1}\n', "line 2"),

@@ -1,4 +1,4 @@
-"""How little model, and which integrator, is enough for a question and a tolerance."""
+"""This package finds the simplest model and the cheapest integrator that answer a question within a tolerance."""
 
 from hybridsim.analysis.advise.advice import Advice
 from hybridsim.analysis.advise.advise import advise

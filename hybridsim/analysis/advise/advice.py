@@ -1,4 +1,4 @@
-"""What `advise` gives back: the ladder, the simplest adequate rung, the integrator to take, and what supports it."""
+"""This module defines the result of `advise`: the ladder, the simplest adequate rung, the best setting."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Advice(Readable):
-    """How little model answers a question within a tolerance.
+    """The simplest model that answers a question within a tolerance, with the evidence for it.
 
     Parameters
     ----------
     model, quantity, tol : object
-        What was asked.
+        The question.
     value : float
-        Of the full model; nan for a region.
+        The value of the full model; nan for a region.
     ladder : tuple of Step
         A `Step` for each rung from the simplest up, the full model last. Over a region ``value`` and
         ``seconds`` of a step are not numbers, ``error`` is the largest of the region and ``why`` counts
         points.
     certificates : tuple of str, optional
-        What theory says without a run.
+        Statements that theory makes without a run.
     settings : tuple of Setting, optional
-        Integrator settings for the full model, tried: the quickest adequate one first.
+        Integrator settings that were tried for the full model; the quickest adequate one first.
     spread : Spread, optional
-        What given ranges of parameters do to the quantity.
+        The effect of the given parameter ranges on the quantity.
     region : Sweep, optional
-        A `Sweep` with, at each point, ``simplest`` (a name), ``error`` of it, ``value`` of the full model and
-        ``errors`` of all rungs (inf where a rung does not apply, or was not tried because a simpler one
-        serves).
+        A `Sweep` with, at each point, ``simplest`` (a name), its ``error``, the ``value`` of the full model
+        and the ``errors`` of all rungs (inf if a rung does not apply, or was not tried because a simpler one
+        is adequate).
     left_out : str, optional
-        What the budget left no time for, in a sentence.
+        A sentence about the work that did not fit into the budget.
     seconds : float, optional
-        Of all of it.
+        The total time.
 
     Examples
     --------
@@ -76,16 +76,16 @@ class Advice(Readable):
 
     @property
     def simplest(self) -> Step:
-        """The first rung that is adequate (over a region: everywhere); the full model where no simpler one is."""
+        """The simplest adequate rung (over a region: adequate everywhere), or the full model."""
         return next(step for step in self.ladder if step.is_adequate)
 
     @property
     def integrator(self) -> Setting | None:
-        """The quickest setting that answers within the tolerance; None where none was tried, or none does."""
+        """The quickest setting within the tolerance; None if none was tried or none is."""
         return next((s for s in self.settings if s.is_adequate), None)
 
     def __getitem__(self, name: str) -> Step:
-        """The step of a rung."""
+        """Return the step of a rung by its name."""
         for step in self.ladder:
             if step.name == name:
                 return step
@@ -94,27 +94,27 @@ class Advice(Readable):
 
     @property
     def map(self) -> np.ndarray:
-        """Over a region: the name of the simplest adequate rung at each point."""
+        """Over a region, the name of the simplest adequate rung at each point."""
         if self.region is None:
-            raise UsageError("the advice is about one scene", remedy="give over={...} for a map")
+            raise UsageError("the advice is for a single point", remedy="pass over={...} for a map")
         return self.region["simplest"]
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know besides, a sentence each."""
+        """Further findings, one sentence each."""
         return tuple(_remarks(self))
 
     def __repr__(self) -> str:
         return self.table()
 
     def table(self) -> str:
-        """The ladder, the settings and the remarks as text."""
+        """Return the ladder, the settings and the remarks as text."""
         from hybridsim.analysis.advise.table import table
 
         return table(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as plain values; None for what is no number."""
+        """Return all results as plain values; None replaces NaN and infinity."""
         return {
             "model": self.model.name,
             "quantity": self.quantity,
@@ -147,7 +147,7 @@ class Advice(Readable):
         return {name: found[name] for name in ("mode", "dimensions", "axes", "values", "status", "units")}
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
         text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
@@ -155,7 +155,7 @@ class Advice(Readable):
 
     def plot(self) -> Any:
         """Draw the errors of the ladder, or the map of a region; see `hybridsim.plot.advice`."""
-        # pictures are a floor above: looked up when they are asked for, so that nothing down here depends on them
+        # The plot package is a layer above this one, so it is imported only on demand.
         return import_module("hybridsim.plot").advice(self)
 
 
@@ -167,11 +167,11 @@ def _remarks(advice: Advice) -> list[str]:
         found.append("no simpler model could be tried: no rung applies to this model")
     elif untried := [step.name for step in advice.ladder if step.verdict == WHERE_TRIED]:
         found.append(
-            f"the map says what is simplest at each point; whether {' or '.join(untried)} would do at all of them "
-            f"was not tried: rungs=[{untried[-1]!r}] tells"
+            f"the map gives the simplest model at each point; whether {' or '.join(untried)} would be adequate at all "
+            f"of them was not tried: pass rungs=[{untried[-1]!r}] to find out"
         )
     elif simplest.verdict == FULL and len(advice.ladder) > 1:
-        found.append(f"no simpler model answers {advice.quantity} within {advice.tol:g}{where}")
+        found.append(f"no simpler model gives {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:
         found.append(
             f"{simplest.name} is simpler but not quicker: {duration(simplest.seconds)} against "
@@ -180,14 +180,14 @@ def _remarks(advice: Advice) -> list[str]:
     spread = advice.spread
     if spread is not None and spread.relative > advice.tol:
         found.append(
-            f"the tolerance {advice.tol:g} is finer than what the parameters are known to: their ranges alone move "
-            f"{advice.quantity} by {spread.relative:.2g}; more model is not more truth"
+            f"the ranges of the parameters alone change {advice.quantity} by {100.0 * spread.relative:.3g} %, more "
+            f"than the tolerance {advice.tol:g}: a more detailed model does not help"
         )
         enough = next(s for s in advice.ladder if s.error <= spread.relative or s.verdict == FULL)
         if spread.relative >= 1.0:
-            found.append("they leave it open by more than its own size: what helps is to know them better")
+            found.append("this is more than the value itself: measure the parameters better first")
         elif enough is not simplest:
-            found.append(f"to that spread {enough.name} would do (error {enough.error:.2g})")
+            found.append(f"within that spread {enough.name} is enough (error {enough.error:.2g})")
     if advice.settings and advice.integrator is None:
         found.append("no integrator setting that was tried is within the tolerance")
     if advice.region is not None and advice.region.failed.any():

@@ -1,4 +1,4 @@
-"""`advise`: how little model, and which integrator, answers a question within a tolerance."""
+"""This module defines `advise`, which finds the simplest model and the integrator that answer a question."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 
-_BUDGET = 120.0  # seconds of an advice that nobody has given any thought, as of a comparison
-# seconds that a rung may take at least: nobody minds them once, or a few hundred times
+_BUDGET = 120.0  # seconds; the default budget, as for a comparison
+# The least time limit of a rung in seconds: for a single point, and per point of a region.
 _LEAST, _LEAST_AT_A_POINT = 5.0, 2.0
-_PAUSE = 0.1  # seconds between two words of progress about the same
-_FINER = 1e-6  # of the tolerance: verdicts are then wrong only for errors that near to it
-_ACCURACY = (1e-10, 1e-6)  # bounds of what is asked of the runs
+_PAUSE = 0.1  # seconds between two progress reports on the same item
+_FINER = 1e-6  # of the tolerance; the accuracy of the runs relative to it
+_ACCURACY = (1e-10, 1e-6)  # bounds of the requested accuracy of the runs
 
 
 @refusing
@@ -55,8 +55,8 @@ def advise(
 ) -> Advice:
     """Find the simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
 
-    Every rung of a ladder of simpler models is run and held against the full model; what theory settles without a run
-    is said first. Errors and costs are measured, none is guessed.
+    Every rung of a ladder of simpler models is run and compared with the full model. Statements that theory
+    makes without a run come first. Errors and costs are measured, not estimated.
 
     Parameters
     ----------
@@ -68,44 +68,45 @@ def advise(
         period), "stick_fraction.f", "period"; of a run alone: "final.x", "event_time.f.2" (the second event
         of f). Or a function of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
     tol : float, optional
-        Largest relative error. Where the full model's value is zero, a rung is adequate if it gives zero too;
-        what is below 1e-6 of tol beside the largest value of the same quantity counts as zero.
+        Largest relative error. If the full model's value is zero, a rung is adequate if its value is zero
+        too. A value counts as zero if it is below 1e-6 tol times the largest value of the same quantity.
     over, mode : mapping of str to sequence, str, optional
         Values of parameters as in `sweep`: a map of the simplest adequate rung.
     uncertain : mapping of str to tuple of float, optional
-        Ranges of parameters, {"mu": (0.28, 0.32)}, to be told whether the tolerance is finer than what they leave
-        open, by the corners of the box they make: an extreme inside, as at a resonance, is not seen.
+        Ranges of parameters, {"mu": (0.28, 0.32)}. The remarks then say whether these ranges change the
+        quantity by more than the tolerance. Only the corners of the box of ranges are tried, so that an
+        extreme inside it, as at a resonance, is missed.
     t_span : tuple of float, optional
-        Of the run that is asked about; without it the question is about the steady motion.
+        The time span of the run in question; without it the question is about the steady motion.
     params, x0 : mapping of str to float, optional
         As in `simulate`.
     rungs : sequence of str, optional
-        Names of those to try; all unless given: at-rest, no-friction, viscous, no-stop, constant-mu-at-rest,
-        constant-mu-mean, mu_s=mu_k, tanh, arctan, karnopp.
+        Names of the rungs to try; by default all: at-rest, no-friction, viscous, no-stop,
+        constant-mu-at-rest, constant-mu-mean, mu_s=mu_k, tanh, arctan, karnopp.
     v0 : float, optional
-        Width of the regularised forces; a hundredth of the largest sliding speed unless given.
+        Width of the regularised forces; by default a hundredth of the largest sliding speed.
     integrators : bool, optional
-        Whether to try integrator settings for the full model; over a region none are.
+        Whether to try integrator settings for the full model; they are not tried over a region.
     workers : int, optional
-        Threads of a region.
+        Number of threads for a region.
     budget : float, optional
-        Seconds that all of it may take: 120 unless given; over a region as long as it takes. What does not
-        fit is not run, and its row says so. A rung that becomes ten times as dear as the full model is
-        stopped earlier, but not before 5 seconds (over a region, 2 at a point).
+        Time limit in seconds: 120 by default, unlimited over a region. Work that does not fit is not run, and
+        its row says so. A rung that takes ten times as long as the full model is stopped earlier, but not
+        before 5 seconds (over a region, 2 seconds per point).
     progress : callable, optional
-        Called as progress(done, total, what is next).
+        Called as progress(done, total, name of the next item).
 
     Returns
     -------
     Advice
-        What was found: ``ladder``, ``simplest``, ``integrator``, ``remarks``, ``table()``, ``plot()``.
+        The result: ``ladder``, ``simplest``, ``integrator``, ``remarks``, ``table()``, ``plot()``.
 
     Raises
     ------
     UsageError
-        For arguments that do not fit.
+        For invalid arguments.
     SimulationError
-        Where the full model itself has no answer, or none within the budget.
+        If the full model has no answer, or none within the budget.
 
     Examples
     --------
@@ -133,7 +134,9 @@ def advise(
     seen = watched(model)
     if over is not None:
         if ranges is not None:
-            raise UsageError("over and uncertain are both given", remedy="ask about ranges at one point")
+            raise UsageError(
+                "over and uncertain are both given", remedy="pass one: uncertain is for a single point"
+            )
         options = {"mode": mode, "workers": workers, "progress": progress}
         limits = Limits(spending, _LEAST_AT_A_POINT, repeat=False)
         region, ladder = over_region(seen, over, chosen, question, tol, width, limits, options)
@@ -164,7 +167,7 @@ def advise(
         told(rung.name)
         steps.append(step)
     steps.append(
-        Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "what the others are held against")
+        Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "the reference for the others")
     )
     tried = settings(seen, question, full, tol, limits, told) if integrators else ()
     known, left_out = None, ""
@@ -173,7 +176,7 @@ def advise(
         try:
             known = _spread(seen, question, full.value, ranges, limits)
         except OutOfTime:
-            left_out = f"{limits.spent}: what the ranges of parameters do was not found out"
+            left_out = f"{limits.spent}: the effect of the parameter ranges was not computed"
     return Advice(
         model,
         question.text,
@@ -215,7 +218,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[Rung, ...]:
 
 
 class _Told:
-    """Passes on what is next, and that it goes on."""
+    """Reports progress: the next item, and repeated signs of life."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1
@@ -226,7 +229,7 @@ class _Told:
         self.again()
 
     def again(self) -> None:
-        """Say the same once more, now and then: it goes on."""
+        """Repeat the last report, at most once per pause."""
         if self._progress is not None and time.monotonic() >= self._next:
             self._next = time.monotonic() + _PAUSE
             self._progress(self._done, self._total, self._what)

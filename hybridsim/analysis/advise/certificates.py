@@ -1,4 +1,4 @@
-"""What theory says of a model without running it: that nothing moves, that it is linear, that it never stops."""
+"""This module derives statements about a model without a run: nothing moves, it is linear, it never stops."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from hybridsim.analysis.rungs.no_stop import NoStop, held
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Model
 
-_UNIT_BOUND = 1.0  # no shape of a wave exceeds its amplitude
+_UNIT_BOUND = 1.0  # upper bound of a unit wave, whatever its shape
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """A statement that no run has to support.
+    """A statement about a model that needs no run.
 
-    rung : that is exact by it; "" where the full model itself is the statement. motion : in closed form, if there is
-    one. steady_only : whether it is about the steady motion alone.
+    rung : the rung that it makes exact; "" if it concerns the full model. motion : the closed form, if there is one.
+    steady_only : whether it concerns the steady motion only.
     """
 
     text: str
@@ -32,7 +32,7 @@ class Certificate:
 
 
 def certificates(model: Model) -> tuple[Certificate, ...]:
-    """All that theory says of a model, the strongest first."""
+    """Return all statements that theory makes about a model, the strongest first."""
     found = []
     if bound := _nothing_moves(model):
         load, limit = (f"{value:.6g}" for value in bound)
@@ -41,7 +41,7 @@ def certificates(model: Model) -> tuple[Certificate, ...]:
         )
         found.append(Certificate(text, AtRest.name, AtRest().apply(Scene(model))))
     elif _is_linear(model):
-        found.append(Certificate("the model is linear and has no modes: there is nothing to make simpler"))
+        found.append(Certificate("the model is linear and has no modes: there is nothing to simplify"))
     else:
         found += _never_stops(model)
     return tuple(found)
@@ -87,7 +87,7 @@ def _is_linear(model: Model) -> bool:
 
 
 def _nothing_moves(model: Model) -> tuple[float, float] | None:
-    """(largest load, limit of stick) where a single contact holds everything from the start on, for ever."""
+    """Return (largest load, stick limit) if a single contact holds everything at rest for all time."""
     plain = not (
         model.surfaces or model.impacts or model.components or model.discrete or model.schedules or model.flow
     )
@@ -105,7 +105,7 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
     unknowns = {contact.name, *(i.name for i in model.inputs)}
     try:
         slide = affine(contact.velocity, unknowns | start.keys(), values, definitions)
-        # where nothing moves the states are what they are at the start, and no product of them counts
+        # If nothing moves, the states keep their start values, so that products of states are constants.
         rates = {
             s.name: affine(substitute(inlined(model, s.der), at_start), unknowns, values, {})
             for s in model.states
@@ -121,7 +121,7 @@ def _nothing_moves(model: Model) -> tuple[float, float] | None:
     effect = pull.linear.get(contact.name, 0.0)
     if effect >= 0.0:
         return None
-    # in stick the force is what makes the rate of the relative velocity zero; then no state may have a rate at all
+    # In stick the force makes the rate of the relative velocity zero. Then every state must have a zero rate.
     for rate in rates.values():
         left = rate.plus(pull, -rate.linear.get(contact.name, 0.0) / effect)
         if _largest(model, left, contact.name, values) != 0.0:
@@ -135,7 +135,7 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
 
 
 def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
-    """A bound of |form|, whatever the time and without the contact's force."""
+    """Return a bound of |form| for all times, without the contact's force."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():

@@ -1,4 +1,4 @@
-"""The ladder of one scene: every rung with its value, its error against the full model, its cost and its verdict."""
+"""This module runs the ladder of one scene: each rung with its value, error, cost and verdict."""
 
 from __future__ import annotations
 
@@ -20,33 +20,29 @@ from hybridsim.model import Model
 
 ADEQUATE, NOT_ADEQUATE, NOT_APPLICABLE, FULL = "adequate", "not adequate", "does not apply", "full model"
 NOTHING_TO_DROP, WHERE_TRIED = "nothing to drop", "adequate where tried"
-WITHOUT_TRIAL = (NOT_APPLICABLE, NOTHING_TO_DROP)  # verdicts that no run stands behind
-_AGAIN_BELOW = (
-    2.0  # seconds: what takes longer is not done twice to have it without making the model's functions
-)
+WITHOUT_TRIAL = (NOT_APPLICABLE, NOTHING_TO_DROP)  # verdicts without a run
+_AGAIN_BELOW = 2.0  # seconds; only shorter runs are repeated, to measure their time without set-up
 Watch = Callable[[float], None]
-"""Called from time to time by what takes time; see `Allowance`."""
+"""The type of progress callbacks that long computations call from time to time; see `Allowance`."""
 
-_DEARER = (
-    10.0  # times the full model's cost: whoever takes a simpler model for its cost has given it up by then
-)
+_DEARER = 10.0  # times the full model's cost; a simpler model that takes longer is stopped
 
 
 @dataclass(frozen=True)
 class Step:
-    """One rung as it fared.
+    """One rung of the ladder with its result.
 
     Parameters
     ----------
-    name, title, drops : of the rung.
-    value : of the quantity; None where the rung gives none.
-    error : relative to the full model's value; inf where that is zero and this one is not.
-    seconds : measured, for the value.
-    verdict : "adequate", "not adequate", "does not apply", "nothing to drop" where the model has not got what the
-        rung would drop, "full model"; "stopped" for a rung that has become far
-        dearer than the full model, "not started" where the budget was spent; over a region "adequate where tried".
-    why : a sentence.
-    model : the simpler model, where it is one.
+    name, title, drops : the texts of the rung.
+    value : the quantity; None if the rung gives none.
+    error : relative to the full model's value; inf if that is zero and this one is not.
+    seconds : the measured time for the value.
+    verdict : "adequate", "not adequate", "does not apply", "nothing to drop" if the model lacks the feature that the
+        rung would drop, "full model", "stopped" for a rung that became far
+            slower than the full model, "not started" if the budget was spent; over a region "adequate where tried".
+        why : the reason, in a sentence.
+        model : the simpler model, if the rung is a model.
     """
 
     name: str
@@ -61,12 +57,12 @@ class Step:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether it answers within the tolerance."""
+        """Whether its value is within the tolerance."""
         return self.verdict in (ADEQUATE, FULL)
 
 
 def relative_error(value: Number, full: Number) -> float:
-    """|value - full|/|full|; where the full value is zero nothing but zero meets it."""
+    """Return |value - full|/|full|; if the full value is zero, 0 for a zero value and inf otherwise."""
     if full == 0:
         return 0.0 if value == 0 else math.inf
     return abs(value - full) / abs(full)
@@ -74,14 +70,14 @@ def relative_error(value: Number, full: Number) -> float:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the parts of an advice may take.
+    """The limits on time for the parts of an advice.
 
     Parameters
     ----------
-    budget : of all of it.
-    least : seconds that a part may take however cheap the full model is.
-    repeat : whether what is quick is done twice, so that its cost is that of a model whose functions are ready.
-    told : called at every look at the time.
+    budget : the time for everything.
+    least : seconds that each part may take, however quick the full model is.
+    repeat : whether quick runs are repeated, so that their time excludes set-up.
+    told : called at each check of the time.
     """
 
     budget: Budget
@@ -90,23 +86,23 @@ class Limits:
     told: Callable[[], None] | None = None
 
     def allowance(self, full: Answer | None = None) -> Allowance:
-        """For one part: by the cost of the full model where that is known, and by what is left."""
+        """Return the allowance of one part, from the cost of the full model (if known) and the remaining budget."""
         own = math.inf if full is None else max(_DEARER * full.seconds, self.least)
         return Allowance(min(own, self.budget.left), self.told)
 
     def reason(self, fault: OutOfTime, full: Answer) -> str:
-        """Why a part was stopped."""
+        """Return the reason why a part was stopped."""
         if not self.budget.left:
             return self.spent
-        return f"dearer than the full model: {fault}, and that takes {duration(full.seconds)}"
+        return f"slower than the full model: {fault}, and that takes {duration(full.seconds)}"
 
     @property
     def spent(self) -> str:
-        """Why a part was not started, or ended."""
+        """The reason why a part was not started, or was ended."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:
-        """The answer, with what it costs when all that is made once has been made."""
+        """Return the answer; quick runs are repeated, so that their cost excludes one-time set-up."""
         first = ask(watch)
         if not self.repeat or first.seconds > _AGAIN_BELOW:
             return first
@@ -115,12 +111,12 @@ class Limits:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as a person says them."""
+    """Return a time as text, in ms or s."""
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
-    """What rungs may know of the full motion."""
+    """Return the scene for the rungs: the model and the sliding speeds of the full motion."""
     if isinstance(motion, Measures):
         means, peak = speeds(model, motion)
         return Scene(model, means, peak or None, v0)
@@ -130,7 +126,7 @@ def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
 def climb(
     rungs: Sequence[Rung], scene: Scene, question: Question, full: Answer, tol: float, limits: Limits
 ) -> Iterator[Step]:
-    """The steps, one after the other, from the simplest up."""
+    """Yield the steps one by one, from the simplest rung up."""
     for rung in rungs:
         if limits.budget.left:
             yield _step(rung, scene, question, full, tol, limits)
@@ -155,9 +151,7 @@ def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float
         return _without(rung, NOT_APPLICABLE, str(reason), model)
     except NoAnswer as reason:
         why = str(reason).partition("\n")[0]
-        if isinstance(
-            reason.__cause__, ModelError
-        ):  # that is no motion of the simpler model, but none at all
+        if isinstance(reason.__cause__, ModelError):  # the simpler model cannot be run at all
             return _without(rung, NOT_APPLICABLE, f"its model cannot be run: {why}")
         return _without(rung, NOT_ADEQUATE, f"it gives no {question.text}: {why}", model)
     except OutOfTime as fault:
@@ -169,14 +163,14 @@ def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float
 
 
 def _formula(rung: Rung, scene: Scene, question: Question, _: Watch | None = None) -> Answer:
-    """The answer of a rung that is a formula: to make it is all that it costs."""
+    """Return the answer of a rung that is a formula; its cost is the time to evaluate the formula."""
     watch = Stopwatch()
     motion = rung.apply(scene)
     return Answer(question.read(motion), watch.seconds, motion)
 
 
 def _without(rung: Rung, verdict: str, why: str, model: Model | None = None) -> Step:
-    """A step without a value."""
+    """Return a step without a value."""
     return Step(rung.name, rung.title, rung.drops, None, math.inf, math.nan, verdict, why, model)
 
 
@@ -188,7 +182,7 @@ def _why(error: float, tol: float, full: Number) -> str:
 
 
 def by_theory(certificates: Sequence[Certificate], question: Question) -> Answer | None:
-    """The full model's answer without a run, where a certificate gives it."""
+    """Return the full model's answer without a run, if a certificate gives it."""
     for certificate in certificates:
         if certificate.motion is None or (certificate.steady_only and question.t_span is not None):
             continue

@@ -1,4 +1,4 @@
-"""What is asked of a model: one number, read off its steady motion or off a run."""
+"""This module defines the question about a model: one number, read from its steady motion or from a run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OF_CONTACT = ("dissipated", "stick_fraction")
 OF_RUN = ("final", "event_time")
 OF_MOTION = ("period",)
 HEADS = (*OF_QUANTITY, *OF_CONTACT, *OF_MOTION, *OF_RUN)
-# what can be zero but for rounding
+# quantities that rounding can make non-zero
 _SIGNED = (
     "amplitude",
     "maximum",
@@ -31,18 +31,18 @@ _SIGNED = (
     "harmonic",
     "final",
 )
-_NEUTRAL = 1e-6  # a disturbance that a period takes less of than that stays
+_NEUTRAL = 1e-6  # 1 minus a multiplier of a disturbance; a smaller decay per period counts as none
 _STICK = "stick"  # the mode of every contact in which nothing slides
 
 Number = float | complex
 
 
 class NoAnswer(Exception):
-    """A model has no such quantity, or no steady motion to read it off; the text says why."""
+    """The model has no such quantity, or no steady motion to read it from; the text gives the reason."""
 
 
 class OverRun(Measures):
-    """The same measures over a run instead of a period."""
+    """The measures of a steady state, taken over a run instead of a period."""
 
     period = math.nan
 
@@ -50,7 +50,7 @@ class OverRun(Measures):
         self.solution = solution
 
     def _extreme(self, name: str, side: int) -> float:
-        """Of this quantity alone: fixed steps leave a piece for each, and turning points are looked for on all."""
+        """Return an extreme of this quantity only, because a search on all quantities is slow for fixed steps."""
         if name not in self._alone:
             orbit = self._orbit
             q = slice(orbit.column(name), orbit.column(name) + 1)
@@ -65,7 +65,7 @@ class OverRun(Measures):
 
 @dataclass(frozen=True)
 class Answer:
-    """A value, what it took to find the motion, and the motion it was read off."""
+    """A value, the time needed to find the motion, and the motion from which it was read."""
 
     value: Number
     seconds: float
@@ -74,14 +74,14 @@ class Answer:
 
 @dataclass(frozen=True)
 class Question:
-    """A quantity by its words, or a function of the motion.
+    """A quantity given by name, or by a function of the motion.
 
     Parameters
     ----------
-    text : "amplitude.x", "harmonic.x.3", "final.x", ...; the function's name.
-    function : of a `SteadyState`, or of a `Solution` where there is a span.
-    t_span : of the run that is asked about; None for the steady motion.
-    accuracy : relative, of what is computed.
+    text : "amplitude.x", "harmonic.x.3", "final.x", ...; or the function's name.
+    function : of a `SteadyState`, or of a `Solution` if t_span is given.
+    t_span : the span of the run in question; None for the steady motion.
+    accuracy : the relative accuracy of the computation.
     """
 
     text: str
@@ -91,27 +91,27 @@ class Question:
 
     @property
     def head(self) -> str:
-        """The kind of quantity."""
+        """The kind of quantity, such as "amplitude"."""
         return self.text.partition(".")[0]
 
     @property
     def name(self) -> str:
-        """What it is of."""
+        """The name of the state, output or contact in question."""
         return self.text.split(".")[1] if "." in self.text else ""
 
     @property
     def number(self) -> int:
-        """Of a harmonic or an event; 1 where none is given."""
+        """The number of the harmonic or event; 1 by default."""
         parts = self.text.split(".")
         return int(parts[2]) if len(parts) > 2 else 1
 
     def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
-        """The value, from a steady state or a run, with its cost but for compiling; `progress` as in these.
+        """Return the value from a steady state or a run, with its cost without compiling.
 
         Raises
         ------
         NoAnswer
-            With the reason.
+            If the model gives no value; the text says why.
         """
         watch = Stopwatch()
         try:
@@ -123,7 +123,7 @@ class Question:
         return Answer(value, seconds, motion)
 
     def motion(self, model: Model, progress: Callable[[float], None] | None = None) -> Any:
-        """The steady state, or the run."""
+        """Return the steady state, or the run."""
         from hybridsim.analysis.steady import steady_state
         from hybridsim.simulate import simulate
 
@@ -139,9 +139,10 @@ class Question:
         return OverRun(solution)
 
     def read(self, motion: Any) -> Number:
-        """The value of a motion; of a formula as far as it goes.
+        """Return the value for a motion, or for a closed form if it has the quantity.
 
-        What is below the accuracy beside the largest value of the same quantity in the motion is zero.
+        A value is zero if it is below the accuracy relative to the largest value of the same quantity in the
+        motion.
         """
         if self.function is not None:
             return self._call(motion)
@@ -176,13 +177,13 @@ class Question:
     def _call(self, motion: Any) -> Number:
         assert self.function is not None
         if not isinstance(motion, Measures):
-            raise NoAnswer("a formula has no trajectory to hand to a function")
+            raise NoAnswer("a closed form has no trajectory to pass to a function")
         given = motion if self.t_span is None else motion.solution
         value = self.function(given)
         try:
             found = complex(value) if isinstance(value, complex) else float(value)
         except (TypeError, ValueError, OverflowError):
-            raise NoAnswer(f"it returned {value!r}, which is no number") from None
+            raise NoAnswer(f"it returned {value!r}, which is not a number") from None
         if not math.isfinite(abs(found)):
             raise NoAnswer(f"it returned {value!r}")
         return found
@@ -199,29 +200,30 @@ class Question:
 
 
 def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
-    """A vibration of a free, undamped system is no steady state: its size is that of the start."""
+    """Refuse a vibration of an undamped free system, because its amplitude depends on the start."""
     from hybridsim.engine.period import system_period
     from hybridsim.engine.recent import system_of
 
     if steady.kind != "periodic" or system_period(system_of(model)) is not None:
         return
     if max(abs(steady.multipliers), default=0.0) > 1.0 - _NEUTRAL:
-        raise NoAnswer("it has no limit cycle: its vibration keeps the size with which it starts")
+        raise NoAnswer("it is undamped: its amplitude depends on the initial state")
 
 
 def stuck(solution: Solution, contact: str) -> float:
-    """Part of a run that a contact spends in stick; 0 for one that has lost that mode."""
+    """Return the fraction of a run that a contact spends in stick; 0 for a contact without that mode."""
     spent = sum(i.t1 - i.t0 for i in solution.modes.get(contact, ()) if i.mode == _STICK)
     return float(spent / (solution.t_end - solution.t_start))
 
 
 def _of(values: Any, name: str, head: str) -> float:
     if name not in values:
-        raise NoAnswer(f"it says nothing of {head}.{name}")
+        raise NoAnswer(f"it has no value of {head}.{name}")
     return float(values[name])
 
 
-# -- what is added to a model so that every rung can be read ----------------------------------------------------
+# -- outputs added to a model so that every rung can be read
+# ------------------------------------------------------
 
 
 def _power(contact: str) -> str:
@@ -237,7 +239,7 @@ def _speed(contact: str) -> str:
 
 
 def watched(model: Model) -> Model:
-    """The model with the velocity, speed and power of each contact as outputs, which outlive the contact."""
+    """Return the model with the velocity, speed and power of each contact as outputs, which all rungs keep."""
     known = {output.name for output in model.outputs}
     more = []
     for contact in model.contacts:
@@ -257,7 +259,7 @@ def watched(model: Model) -> Model:
 
 
 def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
-    """Mean speed of each contact while it slides, and the largest of any."""
+    """Return the mean speed of each contact while it slides, and the largest speed of all contacts."""
     means, peak = {}, 0.0
     for contact in model.contacts:
         sliding = 1.0 - stuck(motion.solution, contact.name)
@@ -266,22 +268,23 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
     return means, peak
 
 
-# -- from words to a question -----------------------------------------------------------------------------------
+# -- from text to a question
+# --------------------------------------------------------------------------------------
 
 
 def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float) -> Question:
-    """The question, checked against the model.
+    """Return the question, checked against the model.
 
     Raises
     ------
     UsageError
-        For words that name nothing, and a run's quantity without t_span.
+        For an unknown quantity, or a quantity of a run without t_span.
     """
     if callable(quantity):
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
         raise UsageError(
-            f"quantity is {quantity!r}", remedy=f"give words such as {'amplitude.x'!r}, or a function"
+            f"quantity is {quantity!r}", remedy=f"give a name such as {'amplitude.x'!r}, or a function"
         )
     head, *rest = quantity.split(".")
     if head not in HEADS:
@@ -289,11 +292,11 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         named = nearest(quantity, meant) if meant else nearest(head, HEADS, kind="quantities")
         raise UsageError(f"there is no quantity {quantity!r}", remedy=named)
     if head in OF_RUN and t_span is None:
-        raise UsageError(f"{quantity} is of a run, and there is no t_span", remedy="give t_span=(0, ...)")
+        raise UsageError(f"{quantity} is read from a run and needs t_span", remedy="give t_span=(0, ...)")
     if head in OF_MOTION:
         if t_span is not None or rest:
             raise UsageError(
-                f"quantity is {quantity!r}", remedy="a period is asked for without name and t_span"
+                f"quantity is {quantity!r}", remedy="write 'period' without a name, and leave t_span out"
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)

@@ -1,4 +1,4 @@
-"""Advice over a region of parameters: the simplest adequate rung at every point."""
+"""This module gives advice over a region of parameters: the simplest adequate rung at each point."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hybridsim.analysis.sweep import Sweep, sweep
 from hybridsim.errors import SimulationError
 from hybridsim.model import Model
 
-# tried only where nothing simpler serves: they cost as much as the full model
+# Rungs as slow as the full model; they are tried only if nothing simpler is adequate.
 _DEAR = (
     "tanh",
     "arctan",
@@ -40,7 +40,7 @@ _DEAR = (
 
 @dataclass(frozen=True)
 class _Point:
-    """What is measured at a point; it can be sent to another process."""
+    """The measurement at one point; it can be sent to another process."""
 
     rungs: tuple[Rung, ...]
     question: Question
@@ -88,7 +88,7 @@ def over_region(
     limits: Limits,
     options: Mapping[str, Any],
 ) -> tuple[Sweep, tuple[Step, ...]]:
-    """The map, and the ladder as it fared over all of it."""
+    """Return the map, and the ladder summed up over all points."""
     found = sweep(model, over, _Point(tuple(rungs), question, tol, v0, limits), **options)
     if found.failed.all():
         raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")
@@ -96,7 +96,7 @@ def over_region(
 
 
 def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
-    """For each rung where it serves, and its largest error; it is adequate where it serves at every point."""
+    """Return for each rung the count of points where it is adequate, and its largest error."""
     done = ~found.failed
     total = int(done.sum())
     errors, simplest = found["errors"][done], found["simplest"][done]
@@ -112,11 +112,11 @@ def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
             verdict = WHERE_TRIED
         elif not np.isfinite(known).any():
             verdict = NOT_APPLICABLE
-        why = f"serves at {serves} of {total} points, is the simplest at {first}"
+        why = f"adequate at {serves} of {total} points, the simplest at {first}"
         if tried < total:
-            why = f"serves at {serves} of the {tried} points where nothing simpler does"
+            why = f"adequate at {serves} of the {tried} points where nothing simpler is"
         if given_up := int(found["stopped"][done][:, k].sum()):
-            why += f", dearer than the full model at {given_up} and stopped there"
+            why += f", slower than the full model at {given_up} and stopped there"
         steps.append(
             Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why)
         )

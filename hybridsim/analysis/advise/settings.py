@@ -1,4 +1,4 @@
-"""Which integrator setting answers a question within the tolerance, and at what cost: each is run, none is guessed."""
+"""This module runs integrator settings to find the quickest that answers a question within the tolerance."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 
-# From loose to tight: each family is followed until it is within the tolerance, so that its cheapest is found.
+# Each family is tried from loose to tight until it is within the tolerance, which finds its cheapest setting.
 _RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
-_STEPS = (75, 300, 1200, 4800)  # a period; 1200 is the published one
-_MORE = 4 / 3  # times the steps, with which the outcome of a fixed step has to be adequate too
+_STEPS = (75, 300, 1200, 4800)  # steps per period; 1200 is the published value
+_MORE = 4 / 3  # factor of the steps; a fixed step must also be adequate with so many more
 _UNCONTROLLED = (
-    1.5  # what the time of a fixed step counts for: its error is that of this run, and times are noisy
+    1.5  # weight of the time of a fixed step, because its error is uncontrolled and times are noisy
 )
 _FAMILIES: tuple[tuple[str, str], ...] = (
     ("exact", ""),
@@ -40,9 +40,9 @@ _FAMILIES: tuple[tuple[str, str], ...] = (
 _SHOOTING = "steady_state"
 FAILED = "failed"
 _FEWEST, _MOST = 8, 1000  # periods of settling
-_NEUTRAL = 1.0 - 1e-6  # a multiplier from there on stands for what stays
-_SHARE = 0.01  # of the tolerance: what settling may leave over
-_RUN_STEPS = 10  # periods that a run asked about is taken to have, for fixed steps
+_NEUTRAL = 1.0 - 1e-6  # the multiplier from which a disturbance counts as persistent
+_SHARE = 0.01  # of the tolerance; the transient that settling may leave
+_RUN_STEPS = 10  # periods assumed in a run with t_span, to choose fixed steps
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Setting:
 
     Parameters
     ----------
-    integrator, options : as for `simulate`; "steady_state" is the call of that name.
-    value, error : of the quantity; the error is relative to the accurate value.
-    seconds : measured.
-    verdict : "adequate", "not adequate", "does not apply" where the integrator cannot run the model, "failed",
+    integrator, options : as for `simulate`; "steady_state" stands for a call of that function.
+    value, error : the quantity, and its error relative to the accurate value.
+    seconds : the measured time.
+    verdict : "adequate", "not adequate", "does not apply" if the integrator cannot run the model, "failed",
         "stopped", "not started".
-    why : what went wrong, if anything.
+    why : the reason of a failure, or empty.
     """
 
     integrator: str
@@ -69,18 +69,18 @@ class Setting:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether it is within the tolerance."""
+        """Whether its value is within the tolerance."""
         return self.verdict == ADEQUATE
 
     @property
     def title(self) -> str:
-        """Integrator and options in a line."""
+        """The integrator and its options in one line."""
         return " ".join([self.integrator, *(f"{name}={value:g}" for name, value in self.options.items())])
 
 
 @dataclass(frozen=True)
 class _Settling:
-    """How long a run has to be, and how much of its end is read."""
+    """The length of a run that settles, and the part of its end that is read."""
 
     question: Question
     span: tuple[float, float]
@@ -88,7 +88,7 @@ class _Settling:
     step_base: float
 
     def options(self, option: str, value: float) -> dict[str, float]:
-        """What `simulate` is given; a number of steps is one in a period."""
+        """Return the options for `simulate`; a number of steps counts per period."""
         if not option:
             return {}
         return {"step": self.step_base / value} if option == "steps" else {option: value}
@@ -117,12 +117,12 @@ def settings(
     limits: Limits,
     told: Callable[[str], None],
 ) -> tuple[Setting, ...]:
-    """Every family from its loosest setting on until one is within the tolerance, the adequate ones by `rank`."""
+    """Try every family from its loosest setting until one is adequate; return all, sorted by `rank`."""
     found = []
     if question.t_span is None:
         loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
         found.append(_measured(_SHOOTING, {}, partial(loose.ask, model), full, tol, limits))
-    # a run has no period of its own, and a function of a steady state cannot be handed a run
+    # A run has no period, and a function of a steady state cannot take a run.
     if question.t_span is not None or (question.function is None and question.head != "period"):
         settling = _settling(question, full.motion, tol)
         for name, option in _FAMILIES:
@@ -145,13 +145,13 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Adequate ones first, quickest first; one that does not control its error has to be clearly quicker."""
+    """Return the sort key: adequate settings first, then quick ones; a fixed step must be clearly quicker."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 
 
 def confirmed(one: Setting, finer: Setting, tol: float) -> Setting:
-    """A setting with a fixed step that is adequate, unless with a shorter one it is not: then its error is chance."""
+    """Return a fixed-step setting, marked not adequate if a shorter step is not: its small error was chance."""
     if finer.is_adequate or finer.value is None:
         return one
     why = f"{finer.title} is off by {finer.error:.2g}, beyond {tol:g}: the error does not fall with the step"
@@ -181,7 +181,7 @@ def _measured(
 
 
 def _settling(question: Question, motion: Any, tol: float) -> _Settling:
-    """A run from the model's start that is long enough: by how fast the slowest disturbance decays."""
+    """Return a run from the model's start that is long enough for the slowest disturbance to decay."""
     if question.t_span is not None:
         t0, t1 = question.t_span
         return _Settling(question, (t0, t1), "all", (t1 - t0) / _RUN_STEPS)
@@ -192,7 +192,7 @@ def _settling(question: Question, motion: Any, tol: float) -> _Settling:
     if slowest <= 0.0:
         count = _FEWEST
     elif slowest >= _NEUTRAL:
-        count = max(motion.periods, _FEWEST)  # nothing decays, so that it was reached by following alone
+        count = max(motion.periods, _FEWEST)  # no disturbance decays; the motion was reached by following it
     else:
         count = min(max(math.ceil(math.log(_SHARE * tol) / math.log(slowest)), _FEWEST), _MOST)
     return _Settling(question, (0.0, count * period), period, period)

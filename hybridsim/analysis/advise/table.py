@@ -1,4 +1,4 @@
-"""An advice as text."""
+"""This module writes an advice as text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def table(advice: Advice) -> str:
-    """Heading, certificates, ladder, settings, remarks."""
+    """Return the heading, certificates, ladder, settings and remarks as text."""
     lines = [f"{advice.quantity} of {advice.model.name} within {advice.tol:g}: {_conclusion(advice)}"]
     lines += [f"  by theory: {text}" for text in advice.certificates]
     lines += ["", *aligned(_ladder(advice))]
@@ -34,7 +34,7 @@ def _conclusion(advice: Advice) -> str:
     simplest, setting = advice.simplest, advice.integrator
     how = f"; run the full model by {setting.title}" if setting is not None else ""
     if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
-        return f"no simpler model could be tried, so the full model it is{how}"
+        return f"no simpler model could be tried, so the full model is needed{how}"
     if simplest.verdict == FULL:
         return f"the full model is needed{how}"
     return f"{simplest.title} is enough{how}"

@@ -1,4 +1,4 @@
-"""How far the quantity itself is known, when parameters are known in ranges only."""
+"""This module finds how much a quantity varies when parameters are known only within ranges."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from hybridsim.arguments import is_row, number
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
-_MOST = 6  # ranges: 2**6 corners are as many runs
+_MOST = 6  # ranges; 2**6 corners need as many runs
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The quantity over the corners of a box of parameters.
+    """The variation of a quantity over the corners of a box of parameters.
 
-    low, high : least and greatest value found. relative : half of the difference, in units of the full model's value.
+    low, high : least and greatest value. relative : half of their difference, relative to the full model's value.
     """
 
     ranges: Mapping[str, tuple[float, float]]
@@ -29,7 +29,7 @@ class Spread:
 
 
 def ranges_of(model: Model, given: Any) -> dict[str, tuple[float, float]]:
-    """Ranges by parameter, checked: each holds the model's own value, which is what the answer is given for."""
+    """Return the checked ranges by parameter; each must contain the model's own value."""
     if not isinstance(given, Mapping) or not given:
         raise UsageError(f"uncertain is {given!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}")
     if len(given) > _MOST:
@@ -43,13 +43,13 @@ def ranges_of(model: Model, given: Any) -> dict[str, tuple[float, float]]:
             raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high) with low < high")
         if name not in known:
             raise UsageError(
-                f"uncertain has {name!r}, and model {model.name} has no parameter of that name",
+                f"uncertain has {name!r}, but model {model.name} has no parameter of that name",
                 remedy=model.remedy_for_parameter(str(name)),
             )
         if not low <= known[name] <= high:
             raise UsageError(
-                f"uncertain says that {name} is in [{low:g}, {high:g}], and the model has {name} = {known[name]:g}",
-                remedy="give a range that holds the model's own value, or another value with params",
+                f"the range [{low:g}, {high:g}] of {name} does not contain the model's value {known[name]:g}",
+                remedy="give a range that contains the model's value, or set another value with params",
             )
         found[str(name)] = (low, high)
     return found
@@ -62,7 +62,7 @@ def spread(
     ranges: Mapping[str, tuple[float, float]],
     watch: Callable[[float], None] | None = None,
 ) -> Spread:
-    """The quantity at the corners of the ranges, and at both ends of each with the others as declared."""
+    """Evaluate the quantity at the corners of the ranges, and at both ends of each range alone."""
     values = [abs(full) if isinstance(full, complex) else full]
     for point in _points(ranges):
         value = question.ask(model.with_(**point), watch).value

@@ -1,4 +1,4 @@
-"""Exact solutions of particular systems, each recognised by its structure, as references for comparisons."""
+"""This package holds exact solutions of particular systems, which it recognises by structure, as references."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from hybridsim.model import Model
 
 __all__ = ["ClosedForm", "find_closed_form"]
 
-# Each takes a model and a span, and returns a closed form where the model is its system.
+# Each entry takes a model and a span, and returns a closed form if it recognises the model.
 _KNOWN = (coulomb_oscillator,)
 
 
 def find_closed_form(model: Model, t_span: tuple[float, float]) -> ClosedForm | None:
-    """The closed form of a model from its initial values over the span, None where none is known."""
+    """Return the closed form of a model from its initial values over the span, or None."""
     for known in _KNOWN:
         found = known(model, t_span)
         if found is not None:

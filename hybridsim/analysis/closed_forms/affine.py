@@ -1,4 +1,4 @@
-"""Reads an expression as a linear form in chosen names plus sine waves of time, or finds that it is none."""
+"""This module reads an expression as a linear form in chosen names plus sine waves of time, if it is one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Affine:
         return not self.linear and not self.waves
 
     def plus(self, other: Affine, factor: float = 1.0) -> Affine:
-        """self + factor * other."""
+        """Return self + factor * other."""
         linear, waves = dict(self.linear), dict(self.waves)
         for name, value in other.linear.items():
             linear[name] = linear.get(name, 0.0) + factor * value
@@ -36,7 +36,7 @@ class Affine:
 
 
 class NotAffine(Exception):
-    """The expression is no linear form with sines."""
+    """The expression is not a linear form with sines."""
 
 
 def affine(
@@ -45,7 +45,7 @@ def affine(
     values: Mapping[str, float],
     definitions: Mapping[str, Expression],
 ) -> Affine:
-    """The form of an expression in the `unknowns`, parameters being at their `values`, or `NotAffine`."""
+    """Return the linear form of an expression in the `unknowns`; raise `NotAffine` if there is none."""
     try:
         return _read(expression.tree, unknowns | {TIME}, values, definitions)
     except (NoValue, KeyError) as fault:

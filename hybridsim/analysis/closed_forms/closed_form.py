@@ -1,4 +1,4 @@
-"""What a closed form gives to a comparison."""
+"""This module defines the closed form of a motion, as comparisons use it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class ClosedForm:
 
     Parameters
     ----------
-    title : what it is, for the report.
+    title : its description for the report.
     exact : the motion.
-    nudged : the motion after its numbers were changed in their last digits; how far the two are apart is how
-        well the question itself determines the answer in double precision.
+    nudged : the motion after a change of all numbers in their last digits. Its distance from `exact` shows how
+        well the answer is determined in double precision.
     """
 
     title: str

@@ -1,7 +1,7 @@
-"""Recognises a model that is a forced linear oscillator with one Coulomb contact, and gives its exact motion.
+"""This module recognises a forced linear oscillator with one Coulomb contact, and gives its exact motion.
 
-It goes by what the model declares (one contact whose force does not depend on the speed, rates that are
-linear in the states, one sine), never by its name.
+It uses the declarations of the model (one contact whose force does not depend on the speed, rates that are
+linear in the states, one sine) and never its name.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Recognised:
-    """The system, and which of the model's states is what."""
+    """The recognised system, with the names of its position and velocity."""
 
     system: ForcedCoulombOscillator
     position: str
@@ -35,14 +35,14 @@ class Recognised:
 
 
 def coulomb_oscillator(model: Model, t_span: tuple[float, float]) -> ClosedForm | None:
-    """The exact motion, if the model is that system, from its initial values forward in time."""
+    """Return the exact motion of the model forward in time, or None if it is another system."""
     found = recognise(model)
     if found is None or t_span[1] < t_span[0]:
         return None
     system, contact, start = found.system, model.contacts[0], model.start_values()
     x0, v0 = start[found.position], start[found.velocity]
-    # The same question with its numbers changed in their last digits: what this moves is not known to anybody
-    # who computes in double precision.
+    # The same system with all numbers changed in their last digits. The difference shows the uncertainty that
+    # is inherent in double precision.
     nudged = replace(
         system,
         mass=system.mass * (1 - _EPS),
@@ -55,7 +55,7 @@ def coulomb_oscillator(model: Model, t_span: tuple[float, float]) -> ClosedForm 
 
     def trajectory(motion: Motion) -> Trajectory:
         def states(t: NDArray[np.float64], side: str) -> NDArray[np.float64]:
-            return motion(t)[::-1] if swap else motion(t)  # continuous: both sides are one
+            return motion(t)[::-1] if swap else motion(t)  # the motion is continuous, so both sides are equal
 
         events = tuple(ExactEvent(c.t, contact.name, c.source, c.target) for c in motion.changes)
         return Trajectory(states, t_span, events, {contact.name: motion.first_mode})
@@ -68,7 +68,7 @@ def coulomb_oscillator(model: Model, t_span: tuple[float, float]) -> ClosedForm 
 
 
 def recognise(model: Model) -> Recognised | None:
-    """The oscillator that a model declares, or None if it declares anything else."""
+    """Return the oscillator that a model declares, or None for any other model."""
     automata = model.surfaces or model.impacts or model.components
     plain = not (automata or model.discrete or model.inputs or model.schedules)
     if not plain or len(model.states) != 2 or len(model.contacts) != 1:
@@ -112,7 +112,7 @@ def _read_model(model: Model) -> Recognised | None:
 def _oscillator(
     rate: Affine, names: tuple[str, str], force: str, slip_force: float, stick_limit: float
 ) -> ForcedCoulombOscillator | None:
-    """From v' = constant + sum of linear terms + one sine."""
+    """Return the oscillator with the rate v' = constant + sum of linear terms + one sine, or None."""
     linear: Mapping[str, float] = rate.linear
     if not linear.keys() <= {*names, force} or not linear.get(force, 0.0) < 0 or len(rate.waves) > 1:
         return None

@@ -1,11 +1,11 @@
-"""Den Hartog's steady motion without stops, of an oscillator with Coulomb and viscous friction, and where it holds.
+"""This module gives Den Hartog's steady motion without stops of an oscillator with Coulomb and viscous friction.
 
 J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) 107.
 Displacement is in F0/k, time in 1/wn; r = w/wn, f = mu N/F0. Over the half period in which the velocity is negative
 
     x = f + R cos(r s + psi) + exp(-zeta s) (a cos(kappa s) + b sin(kappa s)),    R = 1/|1 - r^2 + 2 i zeta r|
 
-and the other half is its mirror image: two linear equations give a and b, the turning point gives psi.
+and the other half is its mirror image. Two linear equations give a and b, and the turning point gives psi.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Samples of the velocity over the half period; it is smooth, and the largest one is looked for between them as well.
+# Samples of the velocity over the half period. The velocity is smooth, and its maximum is interpolated
+# between samples.
 _SAMPLES = 801
 
 
 def linear_amplitude(r: float, zeta: float) -> float:
-    """R: the amplitude without friction, in F0/k."""
+    """Return R, the amplitude without friction in F0/k."""
     return 1.0 / math.hypot(1.0 - r * r, 2.0 * zeta * r)
 
 
 @dataclass(frozen=True)
 class NoStops:
-    """The symmetric motion with two turning points a period.
+    """The symmetric motion with two turning points per period.
 
-    amplitude : X in F0/k; nan where the friction is too large for the formula.
+    amplitude : X in F0/k; nan if the friction is too large for the formula.
     holds : whether the velocity keeps its sign over the half period, so that this is the motion.
     """
 
@@ -37,7 +38,7 @@ class NoStops:
 
 
 def no_stops(r: float, zeta: float, f: float) -> NoStops:
-    """The motion without stops at a frequency ratio, a damping ratio (< 1) and a friction ratio."""
+    """Return the motion without stops at a frequency ratio, a damping ratio (< 1) and a friction ratio."""
     R, (a, b), turning = linear_amplitude(r, zeta), *_free(r, zeta)
     sine = f * turning / (R * r)
     if abs(sine) > 1.0:
@@ -49,12 +50,13 @@ def no_stops(r: float, zeta: float, f: float) -> NoStops:
     decay = np.exp(-zeta * s)
     free = decay * ((b * kappa - a * zeta) * np.cos(kappa * s) - (a * kappa + b * zeta) * np.sin(kappa * s))
     velocity = f * free - R * r * np.sin(r * s + psi)
-    # both ends are zeros of the velocity: divided by them, it goes on to the acceleration at the turning point over r
+    # The velocity is zero at both ends. Divided by sin(r s), it tends to the acceleration at the turning
+    # point over r.
     shape = velocity / np.sin(r * s)
     at_turning = (f * (-2.0 * zeta * turning - a) - R * r * r * math.cos(psi)) / r
     top = int(np.argmax(shape))
     highest = max(float(shape[top]), at_turning)
-    # the parabola through the largest sample and its neighbours
+    # Use the parabola through the largest sample and its neighbours.
     if 0 < top < len(s) - 1 and shape[top] > at_turning:
         left, middle, right = shape[top - 1 : top + 2]
         bend = left - 2.0 * middle + right
@@ -63,11 +65,11 @@ def no_stops(r: float, zeta: float, f: float) -> NoStops:
 
 
 def _free(r: float, zeta: float) -> tuple[tuple[float, float], float]:
-    """(a, b) of the free vibration and its velocity at the turning point, for f = 1."""
+    """Return (a, b) of the free vibration and its velocity at the turning point, for f = 1."""
     kappa = math.sqrt(1.0 - zeta * zeta)
     half = math.pi / r
     decay, c, s = math.exp(-zeta * half), math.cos(kappa * half), math.sin(kappa * half)
-    # y(half) + y(0) = -2 and y'(half) + y'(0) = 0
+    # Conditions of symmetry: y(half) + y(0) = -2 and y'(half) + y'(0) = 0.
     equations = np.array(
         [
             [1.0 + decay * c, decay * s],
@@ -82,7 +84,7 @@ def _free(r: float, zeta: float) -> tuple[tuple[float, float], float]:
 
 
 def largest_friction(r: float, zeta: float, tol: float = 1e-12) -> float:
-    """The friction ratio f = mu N/F0 up to which the motion does not stop, by halving."""
+    """Return the friction ratio f = mu N/F0 up to which the motion does not stop, by bisection."""
     low, high = 0.0, 1.0
     while high - low > tol:
         middle = 0.5 * (low + high)

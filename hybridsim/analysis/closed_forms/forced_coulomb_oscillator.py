@@ -1,9 +1,9 @@
-"""The exact motion of a forced linear oscillator with Coulomb friction, event by event.
+"""This module gives the exact motion of a forced linear oscillator with Coulomb friction, event by event.
 
     m x'' + c x' + k x + f = b + F sin(w t + phase),    slip: f = +-slip_force,    stick: |f| <= stick_limit
 
-A slip phase has a closed form, and a stick ends where a sine crosses a level; only the end of a slip phase is
-a root to be found. Nothing is shared with the engine, neither a root finder nor a rule about events.
+A slip phase has a closed form, and a stick phase ends when a sine crosses a level; only the end of a slip phase
+needs a root search. The module shares no code with the engine.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from hybridsim.analysis.closed_forms.slip_phase import SlipPhase
 
 SLIP_FORWARD, SLIP_BACKWARD, STICK = "slip+", "slip-", "stick"
 _DIRECTION = {SLIP_FORWARD: 1.0, SLIP_BACKWARD: -1.0, STICK: 0.0}
-_TURN, _TURN_LOW = 2 * math.pi, 2.4492935982947064e-16  # 2 pi in two doubles: a thousand turns lose no digit
+_TURN, _TURN_LOW = (
+    2 * math.pi,
+    2.4492935982947064e-16,
+)  # 2 pi as the sum of two doubles, so that thousands of turns lose no digit
 
 
 @dataclass(frozen=True)
 class ForcedCoulombOscillator:
-    """The system, with w the `frequency` and b the `offset`.
+    """The oscillator, with w the `frequency` and b the `offset`.
 
-    Raises ValueError where the closed form does not hold (overdamped) or would lose half of its digits
+    Raises ValueError if the closed form does not hold (overdamped) or would lose half of its digits
     (driven at resonance without damping).
     """
 
@@ -50,7 +53,7 @@ class ForcedCoulombOscillator:
             raise ValueError("driven at resonance without damping there is no bounded sine response")
 
     def motion(self, x0: float, v0: float, t_span: tuple[float, float]) -> Motion:
-        """The exact motion from (x0, v0) over t_span = (t0, t1), t1 >= t0."""
+        """Return the exact motion from (x0, v0) over t_span = (t0, t1), t1 >= t0."""
         t0, t1 = map(float, t_span)
         clock = _Clock(t0, self.frequency, self.phase)
         x, v = float(x0), float(v0)
@@ -65,7 +68,7 @@ class ForcedCoulombOscillator:
                     break
                 angle, mode = release
                 clock.forward_to(angle)
-                # Known, not measured: at the limit the friction falls from stick_limit to slip_force.
+                # This is exact: at the limit the friction falls from stick_limit to slip_force.
                 acceleration = _DIRECTION[mode] * (self.stick_limit - self.slip_force) / self.mass
             else:
                 slip = self._slip(_DIRECTION[mode], clock.angle, x, v, acceleration)
@@ -94,7 +97,7 @@ class ForcedCoulombOscillator:
         )
 
     def _push(self, x: float, angle: float) -> float:
-        """The force on the resting body, without friction."""
+        """Return the force on the resting body without friction."""
         return self.offset + self.force * math.sin(angle) - self.stiffness * x
 
     def _acceleration(self, mode: str, x: float, v: float, angle: float) -> float:
@@ -109,10 +112,10 @@ class ForcedCoulombOscillator:
         return SLIP_FORWARD if push > 0 else SLIP_BACKWARD
 
     def _release(self, x: float, angle: float) -> tuple[float, str] | None:
-        """Angle of the forcing at which the push leaves the stick limits next, and the slip that follows."""
+        """Return the forcing angle at which the push next leaves the stick limits, and the slip that follows."""
         exits = []
         for direction, mode in ((1.0, SLIP_FORWARD), (-1.0, SLIP_BACKWARD)):
-            # The push times `direction` rises through the limit where |force| sin(angle') = level.
+            # The push times `direction` rises through the limit at |force| sin(angle') = level.
             level = self.stick_limit - direction * (self.offset - self.stiffness * x)
             if abs(level) < abs(self.force):  # equality only touches
                 turned = 0.0 if direction * self.force > 0 else math.pi
@@ -148,7 +151,7 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Piece:
-    """One phase: its mode, the time and the position at its start, and its motion where it slips."""
+    """One phase: its mode, its start time and position, and its motion if it slips."""
 
     mode: str
     start: float
@@ -158,7 +161,7 @@ class _Piece:
 
 @dataclass(frozen=True)
 class Change:
-    """A mode change of the exact motion at time t and position x, where the velocity is zero."""
+    """A change of mode of the exact motion at time t and position x, where the velocity is zero."""
 
     t: float
     source: str
@@ -187,7 +190,7 @@ class Motion:
         )
 
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Position and velocity at the times t, shape (2, ...)."""
+        """Return position and velocity at the times t, shape (2, ...)."""
         t = np.asarray(t, dtype=float)
         states = np.zeros((2, *t.shape))
         index = np.searchsorted([piece.start for piece in self.pieces[1:]], t, side="right")

@@ -1,6 +1,6 @@
-"""One slip phase of a forced linear oscillator in closed form, and the instant where it comes to rest.
+"""This module gives one slip phase of a forced linear oscillator in closed form, and its end.
 
-x'' + c x' + k (x - centre) = F sin(angle + w s),      s the time since the start of the phase
+x'' + c x' + k (x - centre) = F sin(angle + w s),      s is the time since the start of the phase
 x(s) = centre + Re(own exp(rate s)) + Im(response exp(i (angle + w s)))
 """
 
@@ -13,15 +13,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_TERMS = 24  # of the velocity's series for arguments up to 1/2: the first one left out is below 1e-30
-_MOST_STEPS = 100_000  # of the search for the rest, which needs some fifty; beyond, a NaN has come in
+_TERMS = 24  # terms of the velocity's series for arguments up to 1/2; the first omitted term is below 1e-30
+_MOST_STEPS = 100_000  # limit of the search for the end, which needs about fifty steps; only NaN exceeds it
 
 
 class SlipPhase:
-    """The motion from (x, v) at an angle of the forcing, in `direction` (+1 or -1).
+    """The motion from (x, v) at a forcing angle, in `direction` (+1 or -1).
 
-    Stiffness, damping and force are per mass; the system is underdamped. The acceleration at the start is
-    given, because after a release it is known to be zero where a formula would only come close.
+    Stiffness, damping and force are per mass; the system is underdamped. The acceleration at the start is an
+    argument, because after a release it is exactly zero, but a formula would only come close to zero.
     """
 
     def __init__(
@@ -53,8 +53,7 @@ class SlipPhase:
     def _velocity_series(
         self, v: float, acceleration: float, force: float, damping: float, stiffness: float
     ) -> Sequence[float]:
-        """Taylor coefficients of the velocity: where v and v' start at zero, the closed form is a small
-        difference of large terms, and this series is exact."""
+        """Return the Taylor coefficients of the velocity, which are exact even if v and v' start at zero."""
         w = self.frequency
         drive = [force * w * math.cos(self.angle), -force * w**2 * math.sin(self.angle)]
         derivatives = [v, acceleration]
@@ -64,22 +63,22 @@ class SlipPhase:
         return [value / math.factorial(n) for n, value in enumerate(derivatives)]
 
     def derivative(self, n: int, s: ArrayLike) -> NDArray[np.float64]:
-        """The n-th derivative of the position; s may be an array."""
+        """Return the n-th derivative of the position; s may be an array."""
         s = np.asarray(s, dtype=float)
         own = self.rate**n * self.own * np.exp(self.rate * s)
         forced = (1j * self.frequency) ** n * self.response * np.exp(1j * (self.angle + self.frequency * s))
         return (own.real if n else self.centre + own.real) + forced.imag
 
     def bound(self, n: int, s: float) -> float:
-        """What the magnitude of the n-th derivative does not exceed from s on, n > 0."""
+        """Return a bound of the n-th derivative's magnitude from s on, n > 0."""
         own = abs(self.own) * math.exp(self.rate.real * s) * self.natural**n
         return own + abs(self.response) * self.frequency**n
 
     def time_to_rest(self, horizon: float) -> float | None:
-        """The first s > 0 where the velocity is zero, None where that is beyond the horizon.
+        """Return the first s > 0 with zero velocity, or None if it is beyond the horizon.
 
-        From a point where the body moves, v + v' h - bound h^2 / 2 stays below the velocity. So the step to
-        its zero passes none of the velocity, however close two are, and is Newton's near the first.
+        While the body moves, v + v' h - bound h^2 / 2 is a lower bound of the velocity. A step to the zero of
+        this bound therefore passes no zero of the velocity, and near the first zero it becomes Newton's step.
         """
         v, acceleration, half_jerk = self.series[:3]
         if v != 0:
@@ -100,10 +99,10 @@ class SlipPhase:
                 return None
             if step <= 2 * math.ulp(s):
                 return s
-        raise ArithmeticError(f"no end found of the slip that starts at angle {self.angle} of the forcing")
+        raise ArithmeticError(f"no end was found of the slip phase that starts at forcing angle {self.angle}")
 
     def _velocity_and_slope(self, s: float) -> tuple[float, float]:
-        """In the direction of the slip."""
+        """Return the velocity and its slope in the direction of the slip."""
         v = slope = 0.0
         if s > self.series_reach:
             v, slope = float(self.derivative(1, s)), float(self.derivative(2, s))

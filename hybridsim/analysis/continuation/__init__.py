@@ -1,4 +1,4 @@
-"""Branches of periodic orbits over a parameter, those that repel included."""
+"""This package follows branches of periodic orbits over a parameter, including unstable orbits."""
 
 from hybridsim.analysis.continuation.branch import Branch, BranchPoint
 from hybridsim.analysis.continuation.continuation import continuation

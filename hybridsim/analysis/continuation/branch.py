@@ -1,4 +1,4 @@
-"""A branch of periodic orbits: one point for each orbit, and where something happens along it."""
+"""This module defines a branch of periodic orbits: its points, and the bifurcations along it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.steady.shooting import Orbit
 
 _ON_THE_CIRCLE = 1e-9
-_CLEAR = 1e-7  # from +1: what is nearer is there to stay, but for the rounding of derivatives
+_CLEAR = 1e-7  # distance from +1; a closer multiplier is +1 up to the rounding of derivatives
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class BranchPoint:
     parameter : its value.
     orbit, motion : the orbit, and the model at that value.
     multipliers : Floquet multipliers, largest first; without forcing the one along the motion is left out.
-    word : the modes it goes through.
-    is_free : whether its period is its own.
+    word : the sequence of its modes.
+    is_free : whether the period is unknown, as it is without forcing.
     """
 
     parameter: float
@@ -47,21 +47,21 @@ class BranchPoint:
 
     @cached_property
     def steady(self) -> SteadyState:
-        """Its measures: amplitude, energy, stick fraction and so on, as `steady_state` gives them."""
+        """The steady state of the orbit: amplitude, energy, stick fraction and so on, as from `steady_state`."""
         message = f"orbit of a branch; residual {self.orbit.residual:.1e}"
         return SteadyState(self.motion, "periodic", self.orbit, self.is_free, 0, 0, message)
 
 
 @dataclass(frozen=True)
 class Special:
-    """Where a branch changes its kind, between two of its points.
+    """A bifurcation, or a change of the mode sequence, between two points of a branch.
 
-    kind : "fold" (the branch turns back in the parameter), "branch point" (a multiplier passes +1 and it does not turn:
-        another branch crosses, as where a symmetry breaks), "period doubling" (a multiplier passes -1), "torus" (a pair
-        passes the unit circle), "sequence" (the modes it goes through change: a graze, or a stop that appears).
-    parameter : its value there, interpolated between two points of the branch: three or four digits of a period
-        doubling, more of a fold.
-    index : number of the point before it.
+    kind : "fold" (the branch turns back in the parameter), "branch point" (a multiplier passes +1 without a fold:
+        another branch crosses, as at a loss of symmetry), "period doubling" (a multiplier passes -1), "torus" (a pair
+        passes the unit circle), "sequence" (the sequence of modes changes: a graze, or a new stop).
+    parameter : its value there, interpolated between two points of the branch: accurate to three or four digits at
+        a period doubling, more at a fold.
+    index : the number of the point before it.
     """
 
     kind: str
@@ -71,18 +71,18 @@ class Special:
 
 @dataclass(frozen=True)
 class Branch(Readable):
-    """Periodic orbits along a curve.
+    """A curve of periodic orbits over a parameter.
 
     Parameters
     ----------
     name : str
-        Of the parameter.
+        The name of the parameter.
     points : tuple of BranchPoint
         In order along the branch; the parameter need not be monotone.
     special : tuple of Special
         Folds, branch points, period doublings, tori, changes of the sequence of modes.
     message : str
-        Why it ended, at both ends.
+        The reasons why it ended, at both ends.
 
     Examples
     --------
@@ -104,7 +104,7 @@ class Branch(Readable):
 
     @property
     def stable(self) -> np.ndarray:
-        """Whether each orbit attracts (K,)."""
+        """Whether each orbit is stable (K,)."""
         return np.array([p.stable for p in self.points])
 
     @property
@@ -113,7 +113,7 @@ class Branch(Readable):
         return np.array([p.orbit.period for p in self.points])
 
     def amplitude(self, name: str) -> np.ndarray:
-        """(max - min)/2 of a quantity on each orbit (K,)."""
+        """Return (max - min)/2 of a quantity on each orbit (K,)."""
         return np.array([p.steady.amplitude[name] for p in self.points])
 
     def __repr__(self) -> str:
@@ -126,7 +126,7 @@ class Branch(Readable):
 
 
 def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
-    """What happens between consecutive points."""
+    """Return the bifurcations and changes of the mode sequence between consecutive points."""
     found: list[Special] = []
     for i, (a, b) in enumerate(pairwise(points)):
         if a.word != b.word:
@@ -138,9 +138,10 @@ def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
 
 
 def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[Special]:
-    """Where a multiplier passes +1 and the branch does not turn: another one begins there.
+    """Return the points where a multiplier passes +1 without a fold, so that another branch begins.
 
-    The sign of the product of 1 - m over all multipliers tells; each fold accounts for the change next to it.
+    They are sign changes of the product of 1 - m over all multipliers; each fold explains the sign change
+    next to it.
     """
     folds = [s.index for s in found if s.kind == "fold"]
     branchings = []
@@ -161,7 +162,7 @@ def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[S
 
 
 def _crossings(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:
-    """Multipliers that pass -1, or as a pair the unit circle."""
+    """Return the points where a multiplier passes -1, or a pair passes the unit circle."""
     if a.word != b.word or len(a.multipliers) != len(b.multipliers):
         return []
     found = []
@@ -181,7 +182,7 @@ def _has_real(point: BranchPoint) -> bool:
 
 
 def _turn(a: BranchPoint, b: BranchPoint, c: BranchPoint) -> float:
-    """The extreme value of the parameter on a parabola through three points, over the distance along the branch."""
+    """Return the extreme parameter on a parabola through three points, over the distance along the branch."""
     scale = np.maximum(np.abs(b.orbit.start.values), np.finfo(float).tiny)
     d1 = float(np.linalg.norm((b.orbit.start.values - a.orbit.start.values) / scale))
     d2 = float(np.linalg.norm((c.orbit.start.values - b.orbit.start.values) / scale))

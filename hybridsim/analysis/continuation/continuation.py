@@ -1,4 +1,4 @@
-"""`continuation`: a branch of periodic orbits followed over a parameter, around folds and where it repels."""
+"""This module follows a branch of periodic orbits over a parameter, around folds and through unstable orbits."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 _CORRECTIONS = 8
-_TOL = 1e-9  # of the states' sizes and the range: how closely an orbit closes
-# steps along the branch, in units of the range and of the states
+_TOL = 1e-9  # of the states' sizes and the range; the tolerance for closing an orbit
+# steps along the branch, relative to the range and the states
 _FIRST, _LARGEST, _SMALLEST = (
     0.01,
     0.05,
     1e-6,
 )
 _MORE, _LESS = 1.5, 0.4
-_FEW = 3  # corrections after which a step may grow
-_DIFFERENCE = 1e-6  # of the parameter, for the forcing's period
+_FEW = 3  # corrections, at most, after which the next step may grow
+_DIFFERENCE = 1e-6  # of the parameter, to differentiate the forcing's period
 
 
 @dataclass(frozen=True)
 class _Closing:
-    """What Newton's method knows of an orbit: its change over a period with derivatives."""
+    """The data of Newton's method for one orbit: its change over a period, with derivatives."""
 
     point: BranchPoint
     change: np.ndarray
-    jacobian: np.ndarray  # (n + d [+ 1], n + d [+ 1] + 1): by start, period where it is free, parameter
+    jacobian: np.ndarray  # (n + d [+ 1], n + d [+ 1] + 1): by start, period if it is free, parameter
 
 
 @refusing
@@ -64,39 +64,40 @@ def continuation(
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Branch:
-    """Follow the periodic orbit that a model settles on over a parameter, both ways, to the bounds or its end.
+    """Follow the periodic orbit of a model over a parameter in both directions, to the bounds or its end.
 
-    Pseudo-arclength continuation (H. B. Keller, in Applications of Bifurcation Theory, ed. P. H. Rabinowitz, Academic
-    Press 1977, 359) of the shooting equations; derivatives come from the variational flow through
-    the events. Orbits that repel are found as well as those that attract: the branch goes around folds. Where
-    the sequence of events changes the map has a corner: the branch goes on beyond it where Newton's method does.
+    This is pseudo-arclength continuation (H. B. Keller, in Applications of Bifurcation Theory, ed. P. H.
+    Rabinowitz, Academic Press 1977, 359) of the shooting equations. The derivatives come from the variational
+    flow through the events. Stable and unstable orbits are both followed, and the branch passes folds. If the
+    sequence of events changes, the map has a corner; the branch continues beyond it if Newton's method
+    converges.
 
     Parameters
     ----------
     model : str, path or Model
         As in `steady_state`, which finds the first orbit at the model's own value.
     parameter, bounds : str, tuple of float
-        Its name; the least and greatest value, between which the model's own value lies.
+        The name of the parameter; its least and greatest value, which enclose the model's own value.
     params, x0 : mapping of str to float, optional
         As in `steady_state`.
     max_points : int, optional
-        Orbits each way, at most.
+        The largest number of orbits in each direction.
     integrator, rtol : str, float, optional
-        As in `simulate`, of the runs over which the orbits are followed.
+        As in `simulate`, for the runs along the branch.
     progress : callable, optional
-        Called with the finished fraction, from time to time.
+        Called with the finished fraction from time to time.
     **options : Any
         Further options of `steady_state`, for the first orbit.
 
     Returns
     -------
     Branch
-        With folds, branch points, period doublings, tori and changes of the sequence of modes marked.
+        The branch, with folds, branch points, period doublings, tori and changes of the mode sequence.
 
     Raises
     ------
     UsageError
-        For names and bounds that do not fit, or a model that settles on no periodic orbit.
+        For invalid names or bounds, or a model that does not settle on a periodic orbit.
 
     Examples
     --------
@@ -119,14 +120,14 @@ def continuation(
     value = model.parameter_values()[parameter]
     if not low <= value <= high or low == high:
         raise UsageError(
-            f"bounds {bounds!r} do not hold the model's own {parameter} = {value:g}",
-            remedy=f"give bounds around it, or another start with params={{{parameter!r}: ...}}",
+            f"bounds {bounds!r} do not contain the model's value {parameter} = {value:g}",
+            remedy=f"give bounds that contain it, or another start with params={{{parameter!r}: ...}}",
         )
     method = {"integrator": integrator, "rtol": rtol, **options}
     start = steady_state(model, x0=x0, **method)
     if start.kind != "periodic" or start._closed is None:
         raise UsageError(
-            f"model {model.name} settles on no periodic orbit at {parameter} = {value:g}: {start.message}",
+            f"model {model.name} does not settle on a periodic orbit at {parameter} = {value:g}: {start.message}",
             remedy="start from other parameters or another x0",
         )
     follower = _Follower(model, parameter, (low, high), method, start._closed, start._is_free, most)
@@ -147,7 +148,7 @@ def continuation(
 
 
 class _Follower:
-    """Steps along one branch."""
+    """Follows one branch step by step."""
 
     def __init__(
         self,
@@ -164,15 +165,15 @@ class _Follower:
         solution = Motion(model, method).run(orbit.start, orbit.period)
         largest = np.concatenate([sizes(solution), np.abs(orbit.start.discrete)])
         scale = np.where(largest > 0.0, largest, 1.0)
-        # start of the orbit, its period where that is free, the parameter
+        # start of the orbit, its period if that is free, the parameter
         self.unit = np.concatenate([scale, [orbit.period] if is_free else [], [bounds[1] - bounds[0]]])
-        self.fault = ""  # what stood in the way last
+        self.fault = ""  # the reason of the last failure
         first = solution._segments[0]
         rates = np.abs(rates_of(solution._system, float(first.s[0]), first.x[0], first.p, first.z))
         self.section = int(np.argmax(rates / scale[: len(rates)])) if len(rates) else 0
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
-        """Points from the first one on, the parameter falling (sign -1) or rising at first; and why it ended."""
+        """Return the points from the first one on, going down (sign -1) or up at first, and why they end."""
         found: list[BranchPoint] = []
         here, step = first, _FIRST
         direction = np.zeros(len(self.unit))
@@ -187,7 +188,7 @@ class _Follower:
                     at = here.point.parameter
                     return (
                         found,
-                        f"{self.parameter} = {at:.9g} (no orbit next to it was found: a graze, or its end)",
+                        f"{self.parameter} = {at:.9g} (no orbit next to it was found: it grazes or ends there)",
                     )
                 continue
             value = there.point.parameter
@@ -203,7 +204,7 @@ class _Follower:
         return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
-        """The orbit at the bound between two points, if Newton's method finds it."""
+        """Return the orbit at the bound between two points, if Newton's method finds it."""
         bound = self.bounds[0] if outside.parameter < self.bounds[0] else self.bounds[1]
         share = (bound - inside.parameter) / (outside.parameter - inside.parameter)
         a, b = self._unknowns(inside), self._unknowns(outside)
@@ -213,7 +214,7 @@ class _Follower:
         return [] if found is None else [found.point]
 
     def _unknowns(self, point: BranchPoint) -> np.ndarray:
-        """Start, period and parameter in units of their own."""
+        """Return start, period and parameter, each scaled by its own unit."""
         orbit = point.orbit
         return (
             np.concatenate([orbit.start.values, [orbit.period] if self.is_free else [], [point.parameter]])
@@ -221,7 +222,7 @@ class _Follower:
         )
 
     def _tangent(self, here: _Closing, towards: np.ndarray) -> np.ndarray:
-        """Unit vector along the branch, the way of `towards`."""
+        """Return the unit vector along the branch in the direction of `towards`."""
         matrix = np.concatenate([here.jacobian, towards[None, :]])
         right = np.zeros(len(matrix))
         right[-1] = 1.0
@@ -231,7 +232,7 @@ class _Follower:
     def _correct(
         self, previous: BranchPoint, unknowns: np.ndarray, tangent: np.ndarray
     ) -> tuple[_Closing | None, int]:
-        """Newton's method from a predicted point, in the plane across the tangent."""
+        """Apply Newton's method to a predicted point, in the plane across the tangent."""
         start, last = unknowns.copy(), math.inf
         for count in range(_CORRECTIONS):
             closing = self._closing(previous, unknowns)
@@ -249,7 +250,7 @@ class _Follower:
         return None, _CORRECTIONS
 
     def close(self, orbit: Orbit, value: float) -> _Closing | None:
-        """What is known of an orbit that closes already."""
+        """Return the Newton data of an orbit that closes already."""
         motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
         point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
         return self._closing(point, self._unknowns(point))
@@ -265,7 +266,7 @@ class _Follower:
                 return None
             n = len(previous.orbit.start.x)
             before = previous.orbit.start
-            share = before.at / previous.orbit.period  # of the period, at which the section is
+            share = before.at / previous.orbit.period  # position of the section within the period
             start = replace(before, x=values[:n], discrete=values[n:count], at=share * period)
             start = motion.on_constraints(start)
             solution = motion.run(start, period)
@@ -279,12 +280,12 @@ class _Follower:
         rates, at_start = (self._rates(solution, k, count) for k in (-1, 0))
         columns = [found.by_start - np.eye(count)]
         columns += [rates[:, None]] if self.is_free else []
-        moved = rates * (1.0 + share) - found.by_start @ at_start * share  # by both ends of the period
+        moved = rates * (1.0 + share) - found.by_start @ at_start * share  # effect of both ends of the period
         columns += [(found.by_parameter[:, 0] + moved * growth)[:, None]]
         unit = self.unit
         jacobian = np.concatenate(columns, axis=1) * unit[None, :] / unit[:count, None]
         change = (end.values - start.values) / unit[:count]
-        if self.is_free:  # the section: one state keeps its value
+        if self.is_free:  # the phase condition: one state keeps its value
             row = np.zeros(len(unit))
             row[self.section] = 1.0
             jacobian = np.concatenate([jacobian, row[None, :]])
@@ -297,14 +298,14 @@ class _Follower:
 
     @staticmethod
     def _rates(solution: Solution, k: int, count: int) -> np.ndarray:
-        """Rates (count,) of all unknowns at the beginning (k = 0) or the end (-1) of a run."""
+        """Return the rates (count,) of all unknowns at the start (k = 0) or the end (-1) of a run."""
         segment, found = solution._segments[k], np.zeros(count)
         states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
         found[: len(states)] = states
         return found
 
     def _forced(self, value: float) -> tuple[float, float]:
-        """The period of the forcing, and its derivative by the parameter."""
+        """Return the period of the forcing, and its derivative by the parameter."""
         from hybridsim.engine.period import common_period
         from hybridsim.engine.recent import system_of
 
@@ -320,6 +321,6 @@ class _Follower:
 
 
 def _word(solution: Solution) -> tuple[str, ...]:
-    """The modes of the orbit in order, from wherever: the rotation that comes first in the alphabet."""
+    """Return the modes of the orbit in order, in the rotation that is first in alphabetical order."""
     word = word_of(solution)
     return min((word[i:] + word[:i] for i in range(len(word))), default=word)

@@ -1,4 +1,4 @@
-"""`equilibria`: all rest and steady sliding of a model, with the intervals over which bodies can stick."""
+"""This module finds all equilibria and steady sliding of a model, with the ranges in which bodies can stick."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from hybridsim.readable import Readable, in_numbers
 if TYPE_CHECKING:
     from hybridsim.model import Model
 
-_MOST = 4096  # vectors of modes that are looked at
+_MOST = 4096  # combinations of modes that are tried
 _ROUNDS = 30
 _SETTLED = 1e-14
 
 
 @dataclass(frozen=True)
 class Equilibrium(Readable):
-    """Where nothing moves in one vector of modes: a point, or a set of them where bodies stick.
+    """An equilibrium in one combination of modes: a point, or a set of points if bodies stick.
 
     Parameters
     ----------
     modes : dict of str to str
-        Of each component.
+        The mode of each component.
     x : array
         (n,) states at the point, or in the middle of the set.
     low, high : array
-        (n,) least and greatest value of each state over the set; infinite where nothing bounds it.
+        (n,) least and greatest value of each state over the set; infinite if no guard bounds it.
     growth : float
-        Largest real part of the eigenvalues of the free states' motion; 0 along a set.
+        Largest real part of the eigenvalues for the free states; 0 along a set.
 
     Examples
     --------
@@ -71,12 +71,12 @@ class Equilibrium(Readable):
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find rest and steady sliding of a model that is not driven in time, in each vector of modes that lasts there.
+    """Find the equilibria and the steady sliding of an unforced model, in each combination of modes that can hold.
 
-    In each vector of modes Newton's method finds where all rates vanish; points that violate a guard are left out.
-    Where contacts stick the points form a set: the least and greatest value of each state over it come from linear
-    programs, repeated about their solutions where the model is not linear. There it is what is found from the model's
-    start, and there may be others.
+    In each combination of modes Newton's method finds a point with zero rates; points that violate a guard
+    are left out. If contacts stick, the points form a set. Linear programs then give the least and greatest
+    value of each state over it; they are repeated about their solutions if the model is nonlinear. For a
+    nonlinear model the search starts at the model's start values and can miss other equilibria.
 
     Parameters
     ----------
@@ -88,12 +88,12 @@ def equilibria(
     Returns
     -------
     tuple of Equilibrium
-        One for each vector of modes.
+        One for each combination of modes.
 
     Raises
     ------
     UsageError
-        For a model that is driven in time, or has too many combinations of modes.
+        For a model that is forced in time, or has too many combinations of modes.
 
     Examples
     --------
@@ -108,18 +108,18 @@ def equilibria(
     system = system_of(model)
     if model.schedules:
         raise UsageError(
-            f"model {model.name} has {model.schedules[0].name}, which changes it at its times: nothing rests",
-            remedy="see hs.steady_state",
+            f"model {model.name} has {model.schedules[0].name}, which changes it over time: there is no equilibrium",
+            remedy="use hs.steady_state",
         )
     if is_driven(system):
         raise UsageError(
-            f"model {model.name} is driven in time: nothing rests",
-            remedy="see hs.steady_state, or hs.linearize",
+            f"model {model.name} is forced in time: there is no equilibrium",
+            remedy="use hs.steady_state, or hs.linearize",
         )
     count = int(np.prod([len(a.modes) for a in system.automata]))
     if count > _MOST:
         raise UsageError(
-            f"model {model.name} has {count} combinations of modes; at most {_MOST} are looked at",
+            f"model {model.name} has {count} combinations of modes; at most {_MOST} are tried",
             remedy="find one with hs.linearize(model, mode)",
         )
     found = []
@@ -151,7 +151,7 @@ def _in_modes(field: Field) -> Equilibrium | None:
         low = high = x
     _, A, g, G = field(x)
     rounding = INSIDE * (np.abs(G) @ field.sizes(x))
-    # slip without a velocity is the end of a stick
+    # slip at zero velocity is a limit of stick
     slips = np.array([a.has_surface and z != a.hold for a, z in zip(system.automata, field.z, strict=True)])
     if (g <= np.where(slips[system.owner[field.guards]], rounding, -rounding)).any():
         return None
@@ -162,7 +162,7 @@ def _in_modes(field: Field) -> Equilibrium | None:
 
 
 def _scaled(A: np.ndarray) -> np.ndarray:
-    """Rows and columns of about unit size, so that a rank means something."""
+    """Scale rows and columns to about unit size, so that the rank is meaningful."""
     rows = np.abs(A).max(axis=1, initial=0.0)
     A = A / np.where(rows > 0.0, rows, 1.0)[:, None]
     columns = np.abs(A).max(axis=0, initial=0.0)
@@ -170,7 +170,7 @@ def _scaled(A: np.ndarray) -> np.ndarray:
 
 
 def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Least and greatest value of each state over the equilibria around x; None where no guard allows any."""
+    """Return the range of each state over the equilibria around x; None if the guards allow none."""
     n = len(x)
     low, high = np.empty(n), np.empty(n)
     for i in range(n):
@@ -183,7 +183,7 @@ def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None
 
 
 def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
-    """The least (side 1) or greatest (side -1) value of state i: linear programs about their own solutions."""
+    """Return the least (side 1) or greatest (side -1) value of state i, by repeated linear programs."""
     at = x
     for _ in range(_ROUNDS):
         solved = _program(field, at, i, side)
@@ -199,14 +199,14 @@ def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
 
 
 def _program(field: Field, at: np.ndarray, i: int, side: float) -> tuple[str, np.ndarray] | None:
-    """min side*x_i with f + f_x (x - at) = 0 and g + g_x (x - at) >= 0."""
+    """Solve min side*x_i with f + f_x (x - at) = 0 and g + g_x (x - at) >= 0."""
     from scipy.optimize import linprog
 
     f, A, g, G = field(at)
     n = len(at)
     held = field.projected(at)
     rows, right = [A], [A @ at - f]
-    if field.held:  # where a constraint puts a state
+    if field.held:  # the constraint values of held states
         slopes = np.array([(field.projected(at + d) - held) for d in np.eye(n)]).T
         rows.append((np.eye(n) - slopes)[field.held])
         right.append((held - slopes @ at)[field.held])
@@ -229,7 +229,7 @@ def _program(field: Field, at: np.ndarray, i: int, side: float) -> tuple[str, np
 
 
 def _nearest_inside(field: Field, middle: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """An equilibrium near the middle of the set."""
+    """Return an equilibrium near the middle of the set."""
     try:
         return equilibrium_near(field, middle)
     except SimulationError:

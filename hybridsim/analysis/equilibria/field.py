@@ -1,4 +1,4 @@
-"""Rates and guards of one vector of modes with their derivatives, at a frozen instant."""
+"""This module evaluates the rates and guards of one combination of modes, with derivatives, at a fixed time."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
 
-INSIDE = 1e-12  # of a guard's terms: rounding
+INSIDE = 1e-12  # relative to a guard's terms: the rounding error
 
 
 class Field:
-    """x' = f(x) and the guards g(x) >= 0 of the modes z at time t.
+    """The rates x' = f(x) and the guards g(x) >= 0 of the modes z at time t.
 
-    held (h,): indices of the states that the modes hold on a constraint; free: of the others. by_state: numbers of the
-    components whose modes follow the state, in `at_sides`.
+    held (h,): indices of the states that the modes hold on a constraint; free: indices of the others.
+    by_state: numbers of the components whose modes follow from the state, in `at_sides`.
     """
 
     def __init__(self, system: System, z: np.ndarray, t: float = 0.0, by_state: tuple[int, ...] = ()) -> None:
         if not system.has_tape:
             raise UsageError(
-                f"model {system.model.name} is made of Python functions, of which derivatives are not known",
+                f"model {system.model.name} consists of Python functions, whose derivatives are unknown",
                 remedy="write it in expressions",
             )
         self.system, self.z, self.t, self.by_state = system, z, t, by_state
@@ -41,20 +41,20 @@ class Field:
         self.free = [i for i in range(system.n) if i not in self.held]
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """f (n,), f_x (n, n), g (G,), g_x (G, n) with held states on their constraints."""
+        """Return f (n,), f_x (n, n), g (G,), g_x (G, n) with held states on their constraints."""
         found = self._tape(np.zeros(1), x[None, :], self.p, self._seeds)
         n = self.system.n
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
 
     def at_sides(self, x: np.ndarray) -> Field:
-        """The field in the modes that the state decides at x: on its side of each corner and jump, in its piece."""
+        """Return the field in the modes that follow from x: sides of corners and jumps, pieces of tables."""
         if not self.by_state:
             return self
         z = modes_by_state(self.system, self.by_state, 0.0, x, self.p, self.z)
         return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
 
     def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
-        """Components that x leaves on a border to another mode, to rounding, each with that mode."""
+        """Return the components that x leaves, to rounding, on a border to another mode, each with that mode."""
         _, _, g, G = self(x)
         rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
         value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))
@@ -68,38 +68,38 @@ class Field:
         return found
 
     def sizes(self, x: np.ndarray) -> np.ndarray:
-        """What is large for each state at x: its value or its nominal size, 1 where both are nothing."""
+        """Return the scale of each state at x: its value or its nominal size, or 1 if both are zero."""
         found = np.maximum(np.abs(x), [state.nominal or 0.0 for state in self.system.model.states])
         return np.where(found > 0.0, found, 1.0)
 
     def projected(self, x: np.ndarray) -> np.ndarray:
-        """x with held states evaluated from their constraints."""
+        """Return x with held states evaluated from their constraints."""
         return self.system.project(0.0, x, self.p, self.z)
 
 
 def is_driven(system: System) -> bool:
-    """Whether the equations depend on time."""
+    """Return whether the equations depend on time."""
     tape = system.code.data["tape"]
     if tape is None:
         raise UsageError(
-            f"model {system.model.name} is made of Python functions, of which derivatives are not known",
+            f"model {system.model.name} consists of Python functions, whose derivatives are unknown",
             remedy="write it in expressions",
         )
     return tape["time"] >= 0 or bool(system.model.inputs)
 
 
 def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Mode numbers from names by component, and the components whose modes are left to the state.
+    """Return the mode numbers from names by component, and the components whose modes follow from the state.
 
-    A text is the mode of the only component. The state decides the modes of corners, tables and jumps of a rate, which
-    the author of the model did not declare, unless their mode is given.
+    A string is the mode of the only component. The state determines the modes of corners, tables and jumps of
+    a rate, which are not declared as components, unless their mode is given.
     """
     written = {component.name for component in system.written.all_components()}
     declared = tuple(a for a in system.declared if a.name in written) or system.declared
     if isinstance(mode, str):
         if len(declared) != 1:
             raise UsageError(
-                f"mode is {mode!r}, and model {system.model.name} has {len(declared)} components",
+                f"mode is {mode!r}, but model {system.model.name} has {len(declared)} components",
                 remedy="give a mapping from components to modes",
             )
         mode = {declared[0].name: mode}
@@ -110,7 +110,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
     for name in given:
         if name not in names:
             raise UsageError(
-                f"mode names {name!r}, which is no component of model {system.model.name}",
+                f"mode contains {name!r}, which is not a component of model {system.model.name}",
                 remedy=nearest(str(name), names, kind="components"),
             )
     numbers, by_state = [], []
@@ -120,7 +120,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             by_state.append(c)
         elif chosen is None and automaton.initial < 0:
             raise UsageError(
-                f"mode gives none for {automaton.name}", remedy=f"give one of {', '.join(automaton.modes)}"
+                f"mode has no entry for {automaton.name}", remedy=f"give one of {', '.join(automaton.modes)}"
             )
         if chosen is not None and chosen not in automaton.modes:
             raise UsageError(

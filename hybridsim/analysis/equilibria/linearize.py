@@ -1,4 +1,4 @@
-"""`linearize`: a mode of a model as a linear system about a point, and its complex eigenvalues."""
+"""This module linearises one mode of a model about a point and computes the complex eigenvalues."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 _STEPS = 50
-_DUST = 1e-10  # of the largest state
-_CLOSED = 1e-13  # of the terms of a rate: what it is to rounding
+_DUST = 1e-10  # of the largest state: a smaller state may be rounding
+_CLOSED = 1e-13  # of the terms of a rate: a smaller rate is zero to rounding
 _HALVINGS = 20
-_ALIKE = 1e-9  # of the terms of a rate: Jacobians that differ by less are one
+_ALIKE = 1e-9  # of the terms of a rate: Jacobians that differ by less are equal
 
 
 @dataclass(frozen=True)
 class Linearization(Readable):
-    """The linear system d' = A d for small changes d of the free states about x, in one vector of modes.
+    """The linear system d' = A d for small changes d of the free states about x, in one combination of modes.
 
     Parameters
     ----------
     states : tuple of str
-        Names of the m free states; those that the modes hold on a constraint have no motion of their own.
+        Names of the m free states; states that the modes hold on a constraint are not among them.
     A : array
         Shape (m, m), the Jacobian.
     x : array
         (n,) all states of the model at the point.
     is_equilibrium : bool
-        Whether nothing moves there.
+        Whether all rates vanish there.
     admissible : bool
-        Whether the modes last there: all their guards are >= 0.
+        Whether the modes can hold there: all their guards are >= 0.
 
     Examples
     --------
@@ -86,12 +86,12 @@ class Linearization(Readable):
 
     @property
     def growth(self) -> float:
-        """Largest real part: above zero small motions grow, as in squeal."""
+        """Largest real part of the eigenvalues: if positive, small motions grow, as in squeal."""
         return float(self.eigenvalues.real.max(initial=-np.inf))
 
     @property
     def stable(self) -> bool:
-        """Whether all small motions die out."""
+        """Whether all small motions decay."""
         return self.growth < 0.0
 
     @property
@@ -101,7 +101,7 @@ class Linearization(Readable):
 
     @property
     def damping_ratios(self) -> np.ndarray:
-        """Damping ratio ``-Re/|lambda|`` of each of these pairs; below zero they grow."""
+        """Damping ratio ``-Re/|lambda|`` of each of these pairs; negative for growing motions."""
         pairs = self.eigenvalues[self.eigenvalues.imag > 0.0]
         return -pairs.real / np.abs(pairs)
 
@@ -115,26 +115,26 @@ def linearize(
     at: Mapping[str, float] | Sequence[float] | None = None,
     t: float = 0.0,
 ) -> Linearization:
-    """Linearize one vector of modes about a point: its Jacobian and complex eigenvalues.
+    """Linearise one combination of modes about a point: compute its Jacobian and complex eigenvalues.
 
-    The Jacobian is differentiated from the declaration, to rounding. Corners (`abs`, `min`, `max`, conditionals, pieces
-    of a table) and jumps of a rate are taken on the side on which the point lies; a point on one of them, where the
-    sides differ, has no single linearization and is refused. With `hs.sweep` over a parameter it finds the
-    onset of a friction-induced instability: where the growth of steady sliding passes zero.
+    The Jacobian is exact to rounding, because the expressions are differentiated. At corners (`abs`, `min`,
+    `max`, conditionals, pieces of a table) and jumps of a rate, the side on which the point lies is used. A
+    point exactly on one of them is refused if the sides differ. Over a parameter in `hs.sweep`, the function
+    finds the onset of a friction-induced instability, where the growth of steady sliding passes zero.
 
     Parameters
     ----------
     model : str, path or Model
         As in `simulate`.
     mode : mapping of str to str, or str, optional
-        Of each component by name, such as {"f": "slip+"}; a text where there is one component.
+        The mode of each component by name, such as {"f": "slip+"}; a string if there is one component.
     params : mapping of str to str or float, optional
         Parameter values that replace the declared ones.
     at : mapping of str to float or sequence of float, optional
-        The states, as x0 of `simulate`; None takes the equilibrium of the modes that Newton's method finds
-        from the model's start, and the start itself where the model is driven in time.
+        The states, as x0 of `simulate`. By default the equilibrium that Newton's method finds from the
+        model's start; for a model that is forced in time, the start itself.
     t : float, optional
-        The instant at which a driven model is frozen.
+        The time at which a forced model is frozen.
 
     Returns
     -------
@@ -144,9 +144,9 @@ def linearize(
     Raises
     ------
     UsageError
-        For modes or states that the model does not have, and a point on a corner.
+        For modes or states that the model does not have, or a point on a corner.
     SimulationError
-        Where no equilibrium is found.
+        If no equilibrium is found.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def linearize(
 
 
 def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
-    """Refuse a point on a corner or a jump whose sides do not agree in their rates or in their Jacobians."""
+    """Refuse a point on a corner or a jump whose sides differ in their rates or in their Jacobians."""
     system = field.system
     rates = field(x)[0]
     scale = field.sizes(x)
@@ -195,14 +195,14 @@ def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
         if free == field.free and (gap <= _ALIKE * bound / _CLOSED).all() and (abs(f - rates) <= bound).all():
             continue
         raise UsageError(
-            f"the point lies on the corner {system.automata[c].name}: there is one linearization on each side, and "
-            "no single one",
+            f"the point lies on the corner {system.automata[c].name}: the linearizations on its two sides "
+            "differ",
             remedy="give a point on one side of it with at=",
         )
 
 
 def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
-    """A point at which nothing moves, by Newton's method; of a continuum of them the one next to where it goes."""
+    """Return an equilibrium found by Newton's method from x; of a continuum, one close to the path."""
     x = field.projected(x)
     field = field.at_sides(x)
     f, A, *_ = field(x)
@@ -220,7 +220,7 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
                 break
             move *= 0.5
         else:
-            break  # as close as rounding lets it come, or nowhere near
+            break  # converged to rounding, or diverged
         field, x, f, A = there, trial, found[0], found[1]
     x, f, A = _without_dust(field, x, f, A)
     if (np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all():
@@ -229,7 +229,7 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
     raise SimulationError(
         f"no equilibrium of model {field.system.model.name} was found from its start"
         + (f", in the modes {modes}" if modes else ""),
-        remedy="start the model nearer to it, declare nominal sizes of its states, or give a point to linearise about "
+        remedy="start the model closer to it, declare nominal values of its states, or pass a point to linearise about "
         "with at=",
     )
 
@@ -237,7 +237,7 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
 def _without_dust(
     field: Field, x: np.ndarray, f: np.ndarray, A: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """With zeros where rounding has left next to nothing and less is no worse: a velocity at rest has no other size."""
+    """Set states that are rounding errors of zero to zero, if the rates do not get worse."""
     scale = np.abs(A).max(axis=1, initial=0.0)
     scale[scale == 0.0] = 1.0
     for j in field.free:
@@ -251,5 +251,5 @@ def _without_dust(
 
 
 def _terms(A: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Size of the terms that a rate is made of."""
+    """Return the sizes of the terms of each rate."""
     return np.abs(A) @ sizes + np.finfo(float).tiny

@@ -1,4 +1,4 @@
-"""A second opinion on a run: a hybrid Taylor integrator in multiple precision that decides events by itself."""
+"""This package gives an independent reference run: a hybrid Taylor integrator in multiple precision."""
 
 from __future__ import annotations
 

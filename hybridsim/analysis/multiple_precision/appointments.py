@@ -1,4 +1,4 @@
-"""Instants known beforehand: scheduled resets, clock ticks, knots of inputs, the end of the run."""
+"""This module lists the times known in advance: schedules, clock ticks, knots of inputs, the end."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.model.schedule import Schedule
 
-# Times are declared as doubles: 0.1*3 and 0.3 are meant to be one instant and are one unit in the last place apart.
+# Times are declared as doubles. 0.1*3 and 0.3 differ by one unit in the last place but are one instant.
 _SAME = 2.0**-51
 
 
 @dataclass(frozen=True)
 class Appointment:
-    """An instant to be stepped to, and the numbers of the schedules that are due then."""
+    """A time at which a step must end, and the numbers of the schedules that are due then."""
 
     t: Number
     schedules: tuple[int, ...]
 
 
 class Appointments:
-    """The appointments of one run over (t0, t1]; the first time of a schedule counts also where it is t0."""
+    """The appointments of one run over (t0, t1]; a schedule's first time counts even if it equals t0."""
 
     def __init__(
         self, model: Model, signals: Sequence[Signal], precision: Precision, t0: Number, t1: Number
@@ -43,7 +43,7 @@ class Appointments:
                 clock.count += 1
 
     def next(self, t: Number) -> Appointment:
-        """The nearest appointment after t; at last the end. Schedules in it are taken as kept."""
+        """Return the next appointment after t, at last the end of the run; `keep` marks its schedules as done."""
         ahead = [(time, k) for k, clock in enumerate(self._clocks) if (time := clock.next) is not None]
         nearest = min((time for time, _ in ahead), default=self._t1)
         knots = [knot for signal in self._signals if (knot := signal.next_knot(t)) is not None]
@@ -57,13 +57,13 @@ class Appointments:
         return Appointment(nearest, due)
 
     def keep(self, appointment: Appointment) -> None:
-        """Note that the schedules of an appointment have had their turn."""
+        """Mark the schedules of an appointment as done."""
         for k in appointment.schedules:
             self._clocks[k].count += 1
 
 
 class _Clock:
-    """The times of one schedule, and how many of them are past."""
+    """The times of one schedule, and the number of past ones."""
 
     def __init__(self, schedule: Schedule, values: dict[str, float], precision: Precision) -> None:
         self._times = sorted(precision.number(evaluate(time, values)) for time in schedule.times)
@@ -75,7 +75,7 @@ class _Clock:
         self.count = 0
 
     def time(self, k: int) -> Number | None:
-        """The k-th time."""
+        """Return the k-th time, or None."""
         if self._most is not None and k >= self._most:
             return None
         if self._times:
@@ -83,7 +83,7 @@ class _Clock:
         return self._start if self._period is None else self._start + k * self._period
 
     def times_at(self, k: int, t: Number) -> int:
-        """How many of the times from the k-th on are at t."""
+        """Return how many times from the k-th on are equal to t."""
         count = 0
         while (time := self.time(k + count)) is not None and _same(time, t):
             count += 1

@@ -1,8 +1,8 @@
-"""Where a series changes its sign within a step: all such places, in order.
+"""This module finds all sign changes of a series within a step, in order.
 
-A polynomial in Bernstein form has, within its interval, no more zeros than its coefficients have changes of sign, and
-as many but for an even number (R. T. Farouki, Computer Aided Geometric Design 29 (2012) 379,
-doi:10.1016/j.cagd.2012.03.001). So halving leaves intervals with no zero or with one.
+A polynomial in Bernstein form has, within its interval, at most as many zeros as its coefficients have sign
+changes, and the difference is even (R. T. Farouki, Computer Aided Geometric Design 29 (2012) 379,
+doi:10.1016/j.cagd.2012.03.001). Bisection therefore leaves intervals with no zero or with one.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 from hybridsim.analysis.multiple_precision.expansion import Coefficients, rate_at, value_at
 from hybridsim.analysis.multiple_precision.precision import Number, Precision
 
-# An interval of 2^-40 of a step in which the signs still leave two zeros possible holds a touch, which is no crossing.
+# An interval of 2^-40 of a step that may still contain two zeros is a touch, not a crossing.
 _DEEPEST = 40
-# Bernstein coefficients in double precision are good to 1e-14 of the largest coefficient: of the sums of up to forty
-# terms, each rounded at 1e-16. Beyond ten times that their signs are sure.
+# Bernstein coefficients in double precision are accurate to 1e-14 of the largest coefficient, as sums of up
+# to forty terms with rounding of 1e-16. Above ten times this bound their signs are certain.
 _SURE = 1e-13
 
 
 def crossings(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
-    """Times in (0, h] at which a series changes its sign.
+    """Return the times in (0, h] at which a series changes its sign.
 
     Parameters
     ----------
-    c : coefficients, the first of which is not zero: leading zeros are what a step starts from and no crossing.
+    c : coefficients; the first must not be zero, because a zero at the start of a step is not a crossing.
     """
     scaled, power = [], precision.context.one
     for value in c:
@@ -53,7 +53,7 @@ def crossings(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
 def _isolate(
     p: Sequence[Number], bernstein: list[Number], low: Number, width: Number, depth: int, precision: Precision
 ) -> list[Number]:
-    """Places in (low, low + width] at which p changes its sign."""
+    """Return the places in (low, low + width] at which p changes its sign."""
     signs = [value > 0 for value in bernstein if value != 0]
     changes = sum(a != b for a, b in itertools.pairwise(signs))
     if changes == 0:
@@ -68,19 +68,19 @@ def _isolate(
     half = width / 2
     found = _isolate(p, left, low, half, depth + 1, precision)
     found += _isolate(p, right[::-1], low + half, half, depth + 1, precision)
-    # in the middle itself, seen by neither half
+    # A zero at the middle itself is in neither half.
     if row[0] == 0 and _side_at_end(left) != _side_at_end(right):
         found = sorted([*found, low + half])
     return found
 
 
 def _side_at_end(row: Sequence[Number]) -> bool:
-    """Whether the last coefficient that is not zero is positive."""
+    """Return whether the last non-zero coefficient is positive."""
     return bool(next(value for value in reversed(row) if value != 0) > 0)
 
 
 def _refine(p: Sequence[Number], low: Number, high: Number, precision: Precision) -> Number:
-    """The only zero in an interval: Newton's method, halving where it leaves the interval."""
+    """Return the only zero in an interval, by Newton's method with bisection as a safeguard."""
     rising = value_at(p, high) > value_at(p, low)
     resolution = precision.context.eps
     u = (low + high) / 2
@@ -101,7 +101,7 @@ def _refine(p: Sequence[Number], low: Number, high: Number, precision: Precision
 
 @functools.cache
 def _fractions(n: int) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Row j of the change to Bernstein form for n coefficients: binomials (j over i) and (n - 1 over i), i <= j."""
+    """Return the rows of the change to Bernstein form for n coefficients, as pairs of binomials."""
     return tuple(tuple((math.comb(j, i), math.comb(n - 1, i)) for i in range(j + 1)) for j in range(n))
 
 

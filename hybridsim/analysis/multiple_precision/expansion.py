@@ -1,4 +1,4 @@
-"""Series of the motion from one instant on: how far they reach, and on which side of zero they set out."""
+"""This module holds the Taylor series of the motion from one instant: their reach, and their signs just after it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from hybridsim.analysis.multiple_precision.precision import Number, Precision
 
 Coefficients = Sequence[Number]
 
-# 2 to the power of this is no step that anybody takes; it stands for "as far as one likes".
+# A step of 2 to the power of this stands for an unlimited one.
 _FOREVER = 1000.0
 
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a sum, whose size says what rounding of the sum amounts to; ``late`` where it is a part of its rate."""
+    """A term of a sum, whose size bounds the rounding of the sum; ``late`` if it belongs to its rate."""
 
     log2_factor: int
     c: Coefficients
@@ -26,7 +26,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Watched:
-    """The series of a state, a guard, a monitor or a surface, and the terms that it is the sum of."""
+    """The series of a state, guard, monitor or surface, and the terms of its sum."""
 
     c: Coefficients
     terms: tuple[Term, ...]
@@ -34,11 +34,11 @@ class Watched:
 
 @dataclass(frozen=True)
 class Expansion:
-    """Series of the states, of the guards of each component's mode, of the monitors and of the surfaces.
+    """The series of the states, the guards of each component's mode, the monitors and the surfaces.
 
     Parameters
     ----------
-    longest : no series is looked at farther than this: the length of the run.
+    longest : the maximum reach of a series: the length of the run.
     """
 
     precision: Precision
@@ -51,16 +51,16 @@ class Expansion:
 
     @property
     def watched(self) -> tuple[Watched, ...]:
-        """All that a step must resolve besides the states."""
+        """The quantities that a step must resolve in addition to the states."""
         return (*(guard for row in self.guards for guard in row), *self.monitors)
 
     @cached_property
     def reach(self) -> Number:
-        """How far the series hold by themselves."""
+        """The reach of the series by their own terms."""
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:
-        """How far the series hold: the last two terms are below 10^-digits of the largest, or of a state's size."""
+        """Return the reach: the last two terms are below 10^-digits of the largest term, or of a state's size."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
         log2_reach += [self._log2_reach(watched.c, self.precision.context.zero) for watched in self.watched]
         reach = min(log2_reach, default=_FOREVER)
@@ -83,15 +83,15 @@ class Expansion:
         return reach
 
     def _log2(self, c: Coefficients) -> list[tuple[int, int]]:
-        """(n, binary magnitude) of the coefficients that are not zero."""
+        """Return (n, binary magnitude) of the non-zero coefficients."""
         if id(c) not in self._logs:
             self._logs[id(c)] = [(n, self.precision.log2(value)) for n, value in enumerate(c) if value != 0]
         return self._logs[id(c)]
 
     def side_after(self, watched: Watched) -> tuple[int, int]:
-        """Sign just after the start, and the order of the first coefficient that is not zero (0: all are zero).
+        """Return the sign just after the start, and the order of the first non-zero coefficient (0: all are zero).
 
-        A coefficient is zero where it is below 10^-20 (for 32 digits) of the terms of the sum that it comes from.
+        A coefficient counts as zero if it is below 10^-20 (for 32 digits) of the terms of its sum.
         """
         scale, power = self.scale(watched), self.precision.context.one
         for n, value in enumerate(watched.c):
@@ -101,11 +101,11 @@ class Expansion:
         return 0, 0
 
     def is_zero(self, watched: Watched) -> bool:
-        """Whether it is zero at the start."""
+        """Return whether it is zero at the start."""
         return bool(abs(watched.c[0]) <= self.precision.zero * self.scale(watched))
 
     def scale(self, watched: Watched) -> Number:
-        """The size of the largest of its terms within reach, to the next power of two."""
+        """Return the size of the largest of its terms within reach, to the next power of two."""
         log2_reach = self.precision.log2(self.reach)
         sizes = [
             max(log + n * log2_reach for n, log in logs) + term.log2_factor + log2_reach * term.late
@@ -116,7 +116,7 @@ class Expansion:
 
 
 def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
-    """The terms of a sum, constant factors multiplied out; a state also counts the terms of its rate."""
+    """Return the terms of a sum with constant factors multiplied out; a state also has the terms of its rate."""
     found: list[Term] = []
     log2 = node.context.mag
     open_ = [(node, 0, False)]
@@ -139,7 +139,7 @@ def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
 
 
 def value_at(c: Coefficients, s: Number) -> Number:
-    """The value of a series after a time s."""
+    """Return the value of a series at a time s."""
     total = c[-1]
     for value in reversed(c[:-1]):
         total = total * s + value
@@ -147,5 +147,5 @@ def value_at(c: Coefficients, s: Number) -> Number:
 
 
 def rate_at(c: Coefficients, s: Number) -> Number:
-    """The slope of a series after a time s."""
+    """Return the slope of a series at a time s."""
     return value_at([n * value for n, value in enumerate(c)][1:] or [0 * s], s)

@@ -1,4 +1,4 @@
-"""The functions of expressions as series: each is the integral of its slope."""
+"""This module builds the functions of expressions as series; each is the integral of its slope."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from hybridsim.errors import UsageError
 
 
 class Functions:
-    """Builds nodes for the smooth functions in one arithmetic."""
+    """Builds the nodes of smooth functions in one arithmetic."""
 
     def __init__(self, context: Any) -> None:
         self.context = context
         self.one = Held(context, 1)
 
     def build(self, name: str, u: Node) -> Node:
-        """The node of a smooth function of one argument."""
+        """Return the node of a smooth function of one argument."""
         made: Node = getattr(self, "_" + name)(u)
         return made
 
     def _exp(self, u: Node) -> Node:
-        return Integral(self.context, u, self.context.exp)  # its own slope
+        return Integral(self.context, u, self.context.exp)  # exp is its own slope
 
     def _pair(self, u: Node, names: tuple[str, str], minus: bool) -> tuple[Integral, Integral]:
-        """Two functions, each the slope of the other; the second's slope counts with a minus or not."""
+        """Return two functions that are each the slope of the other; `minus` negates the second's slope."""
         first, second = (Integral(self.context, u, getattr(self.context, name)) for name in names)
         first.slope, second.slope = (second, False), (first, minus)
         return first, second
@@ -86,8 +86,8 @@ class Functions:
         def value(x: Number) -> Number:
             if not allowed(x):
                 raise UsageError(
-                    f"{name}({float(x):g}) on the way has no Taylor series",
-                    remedy="the multiple-precision run cannot pass it",
+                    f"{name}({float(x):g}), reached during the run, has no Taylor series",
+                    remedy="use reference='runs', as the multiple-precision run cannot pass this point",
                 )
             return function(x)
 

@@ -1,4 +1,4 @@
-"""What holds a surface at zero: how the unknowns act on the surfaces, and which states follow from them.
+"""This module solves for the forces that hold surfaces at zero, and for the states that follow from them.
 
 With J the slopes of the surfaces along the states and G the effects of the unknowns on the rates, both at the start
 of a series, the n-th coefficients of the unknowns change the (n + 1)-th ones of the surfaces by J G / (n + 1).
@@ -16,7 +16,7 @@ from hybridsim.errors import UsageError
 
 
 class Holding:
-    """The held surfaces of one vector of modes, with numbers for the point at which a series starts."""
+    """The held surfaces of one combination of modes, with the numbers at the start of a series."""
 
     def __init__(self, reading: Reading, context: Any) -> None:
         self.context = context
@@ -30,14 +30,14 @@ class Holding:
         self.pins: list[int] = []
 
     def begin(self, effects: list[list[Number]]) -> None:
-        """Take note of the rates' changes under each unknown; find the slopes, and a state for each surface."""
+        """Store the change of the rates per unknown; find the slopes, and a pinned state for each surface."""
         self._effects = effects
         self._find_slopes()
         self._product = [[self.context.fdot(row, effect) for effect in effects] for row in self._slopes]
         self.pins = self._choose_pins()
 
     def coefficients(self, n: int) -> list[Number]:
-        """The n-th coefficients of the surfaces, from those of the states; nothing is kept."""
+        """Return the n-th coefficients of the surfaces from those of the states, without storing them."""
         for node in self._nodes:
             if len(node.c) <= n:
                 node.extend(n)
@@ -47,28 +47,28 @@ class Holding:
         return values
 
     def values(self) -> list[Number]:
-        """The surfaces at the start."""
+        """Return the surfaces at the start."""
         return [surface.coefficient(0) for surface in self._surfaces]
 
     def unknowns_for(self, rates: list[Number]) -> list[Number]:
-        """The changes of the unknowns that take these rates of the surfaces away."""
+        """Return the changes of the unknowns that cancel these rates of the surfaces."""
         return [-value for value in self._solve(self._product, rates)]
 
     def reach_of(self, unknowns: Sequence[Number]) -> Number:
-        """The largest rate of a surface that unknowns of this size make."""
+        """Return the largest rate of a surface that unknowns of this size cause."""
         return max(abs(a * u) for row in self._product for a, u in zip(row, unknowns, strict=True))
 
     def pin_changes(self, values: list[Number]) -> list[Number]:
-        """By how much the pinned states' coefficients are to fall, so that these of the surfaces vanish."""
+        """Return the decrease of the pinned states' coefficients that makes these surface coefficients zero."""
         return self._solve([[row[i] for i in self.pins] for row in self._slopes], values)
 
     def coupled(self, index: int) -> set[int]:
-        """The surfaces whose rates the unknown of one of them changes, or the reverse."""
+        """Return the surfaces that are coupled with one of them through an unknown."""
         product = self._product
         return {j for j in range(len(product)) if product[index][j] != 0 or product[j][index] != 0}
 
     def _find_slopes(self) -> None:
-        """The slope of each surface along each state, from its first-order coefficient."""
+        """Compute the slope of each surface along each state, from its first-order coefficient."""
         zero, one = self.context.zero, self.context.one
         rows = []
         for i in range(-1, len(self._states)):
@@ -80,7 +80,7 @@ class Holding:
         self._slopes = [[row[j] - rows[0][j] for row in rows[1:]] for j in range(len(self._surfaces))]
 
     def _choose_pins(self) -> list[int]:
-        """For each surface a state that it can be solved for: elimination with the largest pivots."""
+        """Choose for each surface a state to solve it for, by elimination with the largest pivots."""
         moved = [any(effect[i] != 0 for effect in self._effects) for i in range(len(self._states))]
         rows = [
             [slope if moves else 0 * slope for slope, moves in zip(row, moved, strict=True)]
@@ -110,7 +110,7 @@ class Holding:
             return list(self.context.lu_solve(self.context.matrix(matrix), self.context.matrix(right)))
         except ZeroDivisionError:
             raise UsageError(
-                f"the holding forces {', '.join(self.names)} have no unique values",
+                f"the holding forces {', '.join(self.names)} are not unique",
                 remedy="merge contacts that act as one",
             ) from None
 

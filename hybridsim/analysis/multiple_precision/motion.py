@@ -1,4 +1,4 @@
-"""What a multiple-precision run leaves: pieces of Taylor series, evaluated in double or in full precision."""
+"""This module stores a multiple-precision run: pieces of Taylor series, evaluated in double or full precision."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Piece:
 
 @dataclass
 class Motion:
-    """States at any time of a run; ``motion(times, side)`` in double precision, ``motion.state(t)`` in full.
+    """The states of a run; ``motion(times, side)`` in double precision, ``motion.state(t)`` in full precision.
 
     Parameters
     ----------
-    last : states (n,) after what happens at the very end.
+    last : states (n,) after the events at the end.
     """
 
     precision: Precision
@@ -35,9 +35,9 @@ class Motion:
     last: tuple[Number, ...] = ()
 
     def __call__(self, times: NDArray[np.float64], side: str = "+") -> NDArray[np.float64]:
-        """States (n, k) at times (k,); of the two states at an event, "+" gives the one after it, "-" the one before.
+        """Return states (n, k) at times (k,); at an event, "+" gives the state after it and "-" the state before.
 
-        Which piece holds is decided by times rounded to doubles, as those of the events are.
+        The piece is chosen by times rounded to doubles, like the times of the events.
         """
         times = np.asarray(times, dtype=float)
         states = np.empty((len(self.last), len(times)))
@@ -51,7 +51,7 @@ class Motion:
         return states
 
     def state(self, t: float | Number, side: str = "+") -> tuple[Number, ...]:
-        """States at a time in full precision."""
+        """Return the states at a time in full precision."""
         t = self.precision.number(t)
         past = [piece for piece in self.pieces if (piece.t <= t if side == "+" else piece.t < t)]
         if side == "+" and t >= self.pieces[-1].t + self.pieces[-1].h:
@@ -68,7 +68,7 @@ class Motion:
         return float(self.pieces[-1].t + self.pieces[-1].h)
 
     def _values(self, piece: Piece, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Horner's scheme in doubles, in the fraction of the step that has passed: off by some ulps."""
+        """Evaluate a piece by Horner's scheme in doubles, in the fraction of the step; the error is a few ulps."""
         high = float(piece.t)
         low = float(piece.t - high)
         fraction = np.clip(((times - high) - low) / float(piece.h), 0.0, 1.0) if piece.h else 0.0 * times

@@ -1,9 +1,9 @@
-"""Quantities as truncated power series of the time, grown by one coefficient at a time.
+"""This module represents quantities as truncated power series in time, computed one coefficient at a time.
 
-A node gets its n-th coefficient from the coefficients of its operands up to the n-th (A. Griewank, A. Walther,
-Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 13, doi:10.1137/1.9780898717761). So a whole step costs a number
-of products that grows as the square of the order, and the states' own coefficients can be found on the way:
-x_(n+1) = (rate of x)_n / (n + 1).
+A node computes its n-th coefficient from the coefficients of its operands up to the n-th (A. Griewank, A.
+Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 13, doi:10.1137/1.9780898717761). A step costs a
+number of products that grows as the square of the order. The coefficients of the states follow order by
+order: x_(n+1) = (rate of x)_n / (n + 1).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hybridsim.errors import UsageError
 
 
 class Node:
-    """One quantity; ``c`` are its coefficients so far. A constant one has no other than c[0]."""
+    """One quantity; ``c`` holds its coefficients so far. A constant has only c[0]."""
 
     __slots__ = ("c", "constant", "context", "operands")
 
@@ -28,15 +28,15 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Nodes of which only lower coefficients are used: they need not come first."""
+        """Nodes of which only lower coefficients are used, so that they need not be computed first."""
         return ()
 
     def coefficient(self, n: int) -> Number:
-        """The n-th coefficient, zero beyond the first of a constant."""
+        """Return the n-th coefficient; it is zero beyond the first of a constant."""
         return self.c[n] if n < len(self.c) else self.context.zero
 
     def extend(self, n: int) -> None:
-        """Append the n-th coefficient; of a constant, the first only."""
+        """Append the n-th coefficient; a constant has the first only."""
         raise NotImplementedError
 
     def forget(self, n: int) -> None:
@@ -45,7 +45,7 @@ class Node:
 
 
 class Held(Node):
-    """A number that lasts while a mode does: a parameter, a discrete state, a literal."""
+    """A number that is fixed during a mode: a parameter, a discrete state, a literal."""
 
     __slots__ = ("value",)
 
@@ -66,11 +66,11 @@ class Given(Node):
         super().__init__(context, (), constant=False)
 
     def extend(self, n: int) -> None:
-        """Nothing: whoever owns it appends."""
+        """Do nothing: the owner appends the coefficients."""
 
 
 class Sum(Node):
-    """a + sign*b."""
+    """The sum a + sign*b."""
 
     __slots__ = ("minus",)
 
@@ -89,7 +89,7 @@ class Sum(Node):
 
 
 class Negative(Node):
-    """-a."""
+    """The negative -a."""
 
     __slots__ = ()
 
@@ -98,7 +98,7 @@ class Negative(Node):
 
 
 class Product(Node):
-    """a*b."""
+    """The product a*b."""
 
     __slots__ = ()
 
@@ -113,7 +113,7 @@ class Product(Node):
 
 
 class Quotient(Node):
-    """a/b."""
+    """The quotient a/b."""
 
     __slots__ = ()
 
@@ -121,7 +121,8 @@ class Quotient(Node):
         a, b = self.operands
         if b.c[0] == 0:
             raise UsageError(
-                "a division by zero on the way", remedy="the multiple-precision run cannot pass it"
+                "division by zero",
+                remedy="use reference='runs', as the multiple-precision run cannot pass it",
             )
         value = a.coefficient(n)
         if n and not b.constant:
@@ -130,7 +131,7 @@ class Quotient(Node):
 
 
 class Power(Node):
-    """u**exponent for a fixed exponent that is no small whole number: u must not be zero."""
+    """The power u**exponent for a fixed exponent that is not a small integer; u must not be zero."""
 
     __slots__ = ("exponent",)
 
@@ -142,8 +143,8 @@ class Power(Node):
         u = self.operands[0].c
         if u[0] < 0 or (u[0] == 0 and (self.exponent < 0 or not self.constant)):
             raise UsageError(
-                f"the power {float(self.exponent):g} of {float(u[0]):g} on the way has no Taylor series",
-                remedy="the multiple-precision run cannot pass it",
+                f"the power {float(self.exponent):g} of {float(u[0]):g}, reached during the run, has no Taylor series",
+                remedy="use reference='runs', as the multiple-precision run cannot pass this point",
             )
         if n == 0:
             self.c.append(u[0] ** self.exponent)
@@ -153,14 +154,14 @@ class Power(Node):
 
 
 class Integral(Node):
-    """f(u) with f' = slope, a node itself that may depend on f: n f_n = sum of k u_k slope_(n-k)."""
+    """The function f(u) with f' = slope, a node that may depend on f: n f_n = sum of k u_k slope_(n-k)."""
 
     __slots__ = ("first", "slope", "weights")
 
     def __init__(self, context: Any, u: Node, first: Callable[[Number], Number]) -> None:
         super().__init__(context, (u,))
         self.first = first
-        self.slope: tuple[Node, bool] = (self, False)  # the node, and whether it counts with a minus
+        self.slope: tuple[Node, bool] = (self, False)  # the node, and whether it is negated
         self.weights: list[Any] = []  # k u_k
 
     @property
@@ -181,7 +182,7 @@ class Integral(Node):
 
 
 class Pointwise(Node):
-    """A quantity that has a value but no series where its operands move: a corner, a jump, a condition."""
+    """A quantity with a value but without a series if its operands move: a corner, a jump, a condition."""
 
     __slots__ = ("function", "text")
 
@@ -196,15 +197,15 @@ class Pointwise(Node):
         if n:
             raise UsageError(
                 f"'{self.text}' is not smooth, and the multiple-precision run follows smooth modes only",
-                remedy="write its sides as modes with guards, or compare against runs",
+                remedy="write its sides as modes with guards, or use reference='runs'",
             )
         self.c.append(self.function(*(node.c[0] for node in self.operands)))
 
 
 def in_order(wanted: Sequence[Node]) -> list[Node]:
-    """All nodes that the wanted ones depend on, operands first.
+    """Return all nodes that the wanted ones depend on, operands first.
 
-    A circle is an error: nodes of which only lower coefficients are used do not close one.
+    A cycle is an error, unless it passes a node of which only lower coefficients are used.
     """
     order: list[Node] = []
     done: set[int] = set()
@@ -222,7 +223,7 @@ def in_order(wanted: Sequence[Node]) -> list[Node]:
             if id(node) in done:
                 continue
             if id(node) in open_:
-                raise UsageError("a quantity depends on itself", remedy="solve the circle by hand")
+                raise UsageError("a quantity depends on itself", remedy="remove the circular definition")
             open_.add(id(node))
             stack.append((node, True))
             stack += [(other, False) for other in node.operands if id(other) not in done]

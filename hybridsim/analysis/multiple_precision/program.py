@@ -1,8 +1,8 @@
-"""The motion of one vector of modes as Taylor series, forces that hold a surface solved for on the way.
+"""This module computes the motion of one combination of modes as Taylor series, including holding forces.
 
 A holding mode (stick) keeps its surface s(t, x) = 0 with an unknown (the friction force) that enters the rates
-linearly. Its n-th coefficient follows from s_(n+1) = 0, a small linear system for each order. Afterwards one state for
-each surface is taken from s_(n+1) = 0 itself, so that a surface such as v - v_belt stays zero exactly.
+linearly. Its n-th coefficient follows from s_(n+1) = 0, a small linear system for each order. Afterwards one state
+for each surface is computed from s_(n+1) = 0 itself, so that a surface such as v - v_belt stays exactly zero.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from hybridsim.errors import UsageError
 if TYPE_CHECKING:
     from hybridsim.expr import Expression
 
-# A force found from a linear equation leaves rounding of it; ten to the minus this is far above that.
+# A force from a linear equation is exact to rounding; ten to the minus this is far above that.
 _LINEAR = 20
 
 
 @dataclass(frozen=True)
 class Point:
-    """Where a series starts: time, states, discrete states, and the pieces of the inputs that hold there."""
+    """The start of a series: time, states, discrete states, and the current pieces of the inputs."""
 
     t: Number
     x: tuple[Number, ...]
@@ -36,7 +36,7 @@ class Point:
 
 
 class Program:
-    """Taylor series of the states, and of what is watched, in one vector of modes."""
+    """The Taylor series of the states and the watched quantities in one combination of modes."""
 
     def __init__(self, reading: Reading, precision: Precision, longest: Number) -> None:
         self.reading, self.precision, self.context = reading, precision, precision.context
@@ -54,7 +54,7 @@ class Program:
         self._known = {id(n) for n in (*nodes, reading.time, *self.states, *self.unknowns)}
 
     def begin(self, point: Point) -> None:
-        """Set everything up to the values at a point, the unknowns solved for."""
+        """Set all nodes to their values at a point, including the solved unknowns."""
         reading = self.reading
         for held, value in zip(reading.discrete.values(), point.discrete, strict=True):
             held.value = value
@@ -72,7 +72,7 @@ class Program:
         self._first_coefficients()
 
     def expand(self, point: Point) -> Expansion:
-        """The series from a point on."""
+        """Return the series from a point on."""
         self.begin(point)
         zero = self.context.zero
         self._states(1)
@@ -101,7 +101,7 @@ class Program:
         )
 
     def value(self, expr: Expression, point: Point) -> Number | bool:
-        """The value of an expression at a point."""
+        """Return the value of an expression at a point."""
         self.begin(point)
         node = self.reading.node(expr)
         for part in in_order([node]):
@@ -111,11 +111,13 @@ class Program:
         return node.c[0]
 
     def project(self, point: Point) -> Point:
-        """The point with the held surfaces exactly zero: one state each is set."""
+        """Return the point with the held surfaces exactly zero; one state per surface is changed."""
         if self.holding is None:
             return point
         x = list(point.x)
-        for _ in range(3):  # Newton's method; most surfaces are linear in their velocities, and zero at once
+        for _ in range(
+            3
+        ):  # Newton's method; most surfaces are linear in the velocities and need one iteration
             self.begin(replace(point, x=tuple(x)))
             changes = self.holding.pin_changes(self.holding.values())
             for i, change in zip(self.holding.pins, changes, strict=True):
@@ -123,7 +125,7 @@ class Program:
         return replace(point, x=tuple(x))
 
     def coupled(self, index: int) -> set[int]:
-        """The held surfaces whose rates the unknown of one of them changes, or the reverse."""
+        """Return the held surfaces that are coupled with one of them through an unknown."""
         return set() if self.holding is None else self.holding.coupled(index)
 
     # -- orders ---------------------------------------------------------------------------------------------
@@ -134,10 +136,10 @@ class Program:
                 node.extend(n)
 
     def _first_coefficients(self) -> None:
-        """Order 0: rates with every unknown zero, then with one of them 1; from these the unknowns."""
+        """Compute order 0: rates with all unknowns zero and with each of them 1, and from these the unknowns."""
         one, zero = self.context.one, self.context.zero
         rates: list[list[Number]] = []
-        for j in (*range(len(self.unknowns)), -1):  # at last with all of them zero
+        for j in (*range(len(self.unknowns)), -1):  # finally with all of them zero
             for k, unknown in enumerate(self.unknowns):
                 unknown.c = [one if k == j else zero]
             self._again(0)
@@ -150,13 +152,13 @@ class Program:
             self._solve(0)
 
     def _again(self, n: int) -> None:
-        """The n-th coefficients anew of all that depends on the unknowns."""
+        """Recompute the n-th coefficients of all nodes that depend on the unknowns."""
         for node in self.forced:
             node.forget(n)
         self._extend(self.nodes, n)
 
     def _solve(self, n: int) -> None:
-        """Find the n-th coefficients of the unknowns: with them, the surfaces have no coefficient n + 1."""
+        """Find the n-th coefficients of the unknowns, such that the surfaces have zero coefficients n + 1."""
         if self.holding is None:
             return
         rates = self._surface_rates(n)
@@ -172,7 +174,7 @@ class Program:
                 )
 
     def _surface_rates(self, n: int) -> list[Number]:
-        """The n-th coefficients of the held surfaces' rates of change, as the states' rates make them."""
+        """Return the n-th coefficients of the held surfaces' rates, from the rates of the states."""
         assert self.holding is not None
         for state, rate in zip(self.states, self.reading.rates, strict=True):
             state.c.append(rate.coefficient(n) / (n + 1))
@@ -192,7 +194,7 @@ class Program:
 
 
 def _depending(nodes: Sequence[Node], sources: Sequence[Node]) -> list[Node]:
-    """The nodes, in order, whose values depend on the sources, also by way of a slope."""
+    """Return the nodes, in order, whose values depend on the sources, directly or through a slope."""
     marked = {id(node) for node in sources}
     while True:
         more = {

@@ -1,4 +1,4 @@
-"""The equations of a model in each vector of modes that occurs, and series from the instant at hand."""
+"""This module caches the equations of each combination of modes, and the series at one instant."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ UNDECIDED = ""
 
 
 class Programs:
-    """Makes what is asked for, and keeps it.
+    """Builds the equations and series on demand and caches them.
 
     Parameters
     ----------
-    longest : no series is looked at farther than this.
+    longest : the maximum reach of a series.
     """
 
     def __init__(
@@ -39,15 +39,15 @@ class Programs:
 
     @property
     def first_modes(self) -> Modes:
-        """Modes before the first decision."""
+        """The modes before the first decision."""
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:
-        """Components without a mode are read as holding; their surfaces are the same functions in every mode."""
+        """Return the modes with undecided components holding; their surfaces are the same functions in every mode."""
         return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
 
     def held(self, modes: Modes, components: Iterable[int]) -> Modes:
-        """The same modes with some components holding."""
+        """Return the same modes with some components holding."""
         changed = list(modes)
         for c in components:
             surface = self.components[c].surface
@@ -56,7 +56,7 @@ class Programs:
         return tuple(changed)
 
     def given(self, point: Point, modes: Modes) -> Modes:
-        """Components without a mode are read on the side on which the state is, and as holding where it is on none."""
+        """Return the modes with undecided components on the side of their state, or holding if on neither."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)
@@ -70,29 +70,29 @@ class Programs:
         return tuple(changed)
 
     def program(self, modes: Modes) -> Program:
-        """The equations in these modes."""
+        """Return the equations in these modes."""
         if modes not in self._programs:
             reading = Reading(self.model, modes, self.precision, self.signals)
             self._programs[modes] = Program(reading, self.precision, self.longest)
         return self._programs[modes]
 
     def new_instant(self) -> None:
-        """Forget the series of the instant before."""
+        """Clear the series of the previous instant."""
         self._expansions.clear()
 
     def expand(self, point: Point, modes: Modes) -> Expansion:
-        """The series from a point on."""
+        """Return the series from a point on."""
         key = (modes, point)
         if key not in self._expansions:
             self._expansions[key] = self.program(modes).expand(point)
         return self._expansions[key]
 
     def value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
-        """The value of an expression at a point."""
+        """Return the value of an expression at a point."""
         return self.program(self.decided(modes)).value(expr, point)
 
     def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
-        """The guards, (component, number), that are negative just after."""
+        """Return the guards, as (component, number), that are negative just after."""
         return [
             (c, j)
             for c, row in enumerate(expansion.guards)

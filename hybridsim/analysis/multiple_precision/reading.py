@@ -1,4 +1,4 @@
-"""Expressions of a model as nodes, with the modes of its components put in."""
+"""This module converts the expressions of a model to nodes, for given modes of its components."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SMOOTH = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", 
 
 
 class Reading:
-    """The quantities of a model while its components are in the modes z, as nodes; equal expressions share theirs.
+    """The quantities of a model in the modes z, as nodes; equal expressions share a node.
 
     Parameters
     ----------
@@ -79,15 +79,15 @@ class Reading:
         self.monitors = [self.node(monitor.expr) for monitor in model.monitors]
 
     def node(self, expr: Expression) -> Node:
-        """The node of an expression."""
+        """Return the node of an expression."""
         return self._walk(expr.tree)
 
     def product(self, a: Node, b: Node) -> Node:
-        """a*b, shared."""
+        """Return a*b as a shared node."""
         return self._share(("*", id(a), id(b)), lambda: Product(self.context, (a, b)))
 
     def sum(self, a: Node, b: Node, minus: bool = False) -> Node:
-        """a + b or a - b, shared."""
+        """Return a + b or a - b as a shared node."""
         return self._share(("-" if minus else "+", id(a), id(b)), lambda: Sum(self.context, a, b, minus))
 
     def _share(self, key: Any, make: Callable[[], Node]) -> Node:
@@ -99,7 +99,7 @@ class Reading:
         if name not in self._names:
             if name in self._open:
                 circle = " -> ".join([*self._open[self._open.index(name) :], name])
-                raise UsageError(f"a circle among quantities: {circle}", remedy="solve it by hand")
+                raise UsageError(f"circular definition of quantities: {circle}", remedy="solve it by hand")
             self._open.append(name)
             self._names[name] = self.node(self._texts[name])
             self._open.pop()
@@ -132,7 +132,7 @@ class Reading:
         return self._pointwise(tree)
 
     def _power(self, base: Node, exponent: Node, tree: ast.expr) -> Node:
-        """A whole power is a product, so that the base may be zero; any other needs a positive base."""
+        """Return a power: a product for an integer exponent, otherwise a power of a positive base."""
         if not isinstance(exponent, Held):
             if exponent.constant and base.constant:
                 return self._share(
@@ -159,7 +159,8 @@ class Reading:
         square = self.product(half, half)
         return self.product(square, base) if n % 2 else square
 
-    # -- what has a value and no series ---------------------------------------------------------------------
+    # -- quantities with a value but without a series
+    # ----------------------------------------------------------
 
     def _pointwise(self, tree: ast.expr) -> Node:
         operands, function = self._parts(tree)
@@ -190,7 +191,7 @@ class Reading:
         return {"abs": abs, "sign": sign, "min": min, "max": max, "atan2": self.context.atan2}
 
     def compare(self, kind: type[ast.cmpop], a: Number, b: Number) -> bool:
-        """A comparison in which two numbers that agree but for rounding are equal."""
+        """Return the result of a comparison; numbers that agree to rounding are equal."""
         difference = a - b
         if abs(difference) <= self.precision.zero * (abs(a) + abs(b)):
             return kind in (ast.LtE, ast.GtE, ast.Eq)

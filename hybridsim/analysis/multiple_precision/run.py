@@ -1,4 +1,4 @@
-"""The run: series after series, cut where a guard would be negative, a monitor acts or an appointment is due."""
+"""This module runs a model series by series; a step ends at a guard, a monitor or an appointment."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from hybridsim.model.schedule import Schedule
 
 _WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
-# The defect at the end of a step may be this much larger than the terms that the step was chosen by.
+# The defect at the end of a step may exceed the terms that determined the step by this factor.
 _DEFECT = 2.0**12
-# So many events within so small a part of the span are an accumulation: no run gets past it event by event.
+# This many events within this fraction of the span count as an accumulation, which cannot be passed event by
+# event.
 _CROWD, _CROWDED = 10, 1e-10
 
 
@@ -50,7 +51,7 @@ class Run:
         self.motion = Motion(precision)
         self.events: list[ExactEvent] = []
         self.initial_modes: dict[str, str] = {}
-        self.finished = False  # by a monitor or a schedule
+        self.finished = False  # set by a monitor or a schedule
         start = Point(
             self.t0,
             tuple(number(value) for value in model.start_values().values()),
@@ -79,7 +80,7 @@ class Run:
     # -- steps ----------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        """One step, up to the first event in it."""
+        """Make one step, up to the first event in it."""
         point, expansion = self.now.point, self.now.expansion
         appointment = self.appointments.next(point.t)
         bound = appointment.t - point.t
@@ -103,9 +104,9 @@ class Run:
             self._keep_schedules(appointment.schedules)
 
     def _go_on(self, point: Point, arrived: bool) -> None:
-        """Begin the next step where nothing was located; a guard may be zero at just this instant.
+        """Begin the next step if nothing was located; a guard may be zero at exactly this instant.
 
-        Corners alone decide nothing: where something is due, they take their sides with it.
+        Corners alone cause no event: if something is due, they take their sides with it.
         """
         expansion = self.programs.program(self.now.modes).expand(point)
         leaving = self.programs.leaving(expansion)
@@ -117,7 +118,7 @@ class Run:
         self._adopt(settled, is_last=not arrived)
 
     def _length(self, expansion: Expansion, bound: Number) -> Number:
-        """A step at whose end the equations are satisfied, and guards and monitors have their values."""
+        """Return a step at whose end the equations are satisfied, and guards and monitors are accurate."""
         h = min(expansion.reach_above(self.sizes), bound)
         for _ in range(60):
             if self._resolved(expansion, h):
@@ -125,11 +126,11 @@ class Run:
             h = h * self.precision.number("0.7")
         raise UsageError(
             f"no step after t = {float(self.now.point.t)!r} satisfies the equations: the motion is not smooth there",
-            remedy="compare against runs",
+            remedy="use reference='runs'",
         )
 
     def _resolved(self, expansion: Expansion, h: Number) -> bool:
-        """Whether the states at the end satisfy their equations, and what is watched has its value."""
+        """Return whether the states at the end satisfy their equations, and the watched quantities are accurate."""
         program = self.programs.program(self.now.modes)
         x = tuple(value_at(state.c, h) for state in expansion.states)
         program.begin(replace(self.now.point, t=self.now.point.t + h, x=x))
@@ -147,12 +148,12 @@ class Run:
         return True
 
     def _changes(self, expansion: Expansion, watched: Watched, h: Number) -> tuple[int, list[Number]]:
-        """Side just after the start of a step, and the times in (0, h] at which it changes."""
+        """Return the side just after the start of a step, and the times in (0, h] at which it changes."""
         side, order = expansion.side_after(watched)
         return side, crossings(watched.c[order:], h, self.precision) if side else []
 
     def _first_departure(self, expansion: Expansion, h: Number) -> tuple[list[tuple[int, int]], Number]:
-        """The guard that leaves its domain first, and when; no guard and h if none does."""
+        """Return the guard that becomes negative first, and its time; no guard and h if none does."""
         first: list[tuple[int, int]] = []
         for c, row in enumerate(expansion.guards):
             for j, guard in enumerate(row):
@@ -164,7 +165,7 @@ class Run:
     # -- events ---------------------------------------------------------------------------------------------
 
     def _adopt(self, settled: Settled, is_last: bool = True) -> None:
-        """Go on from what an event left; monitors that have left their sides fire where nothing follows at once."""
+        """Continue from the result of an event; monitors off their sides fire if it is the last event."""
         self.now = settled
         for move in settled.moves:
             name = self.rules.components[move.component].name
@@ -182,14 +183,14 @@ class Run:
             self._adopt(self.rules.settle(settled.point, settled.modes, (), resets))
 
     def _act(self, monitors: Sequence[int], point: Point) -> None:
-        """Monitors that reset or end the run, located at a point."""
+        """Process the monitors, located at a point, that reset or end the run."""
         settled = self.rules.settle(point, self.now.modes, (), self._record_monitors(monitors, point.t))
         after = self._sides(settled.expansion)
         self.sides = [after[k] if k in monitors else side for k, side in enumerate(self.sides)]
         self._adopt(settled)
 
     def _record_monitors(self, monitors: Sequence[int], t: Number) -> list[Mapping[str, Expression]]:
-        """Record monitors that fire; the resets that they ask for."""
+        """Record the monitors that fire, and return their resets."""
         fired = [self.model.monitors[k] for k in monitors]
         self.events += [ExactEvent(float(t), monitor.name, "", "", kind="monitor") for monitor in fired]
         self.finished = self.finished or any(monitor.action == "terminate" for monitor in fired)
@@ -198,14 +199,14 @@ class Run:
     def _pass_monitors(
         self, expansion: Expansion, t: Number, s: Number, arriving: bool
     ) -> tuple[list[int], Number]:
-        """Record the monitors that change their side before s; those that act there first, and when."""
+        """Record the monitors that change their side before s; return those that act there first, and the time."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
         for k, watched in enumerate(expansion.monitors):
             side, changes = self._changes(expansion, watched, s)
             for change in changes:
                 side = -side
-                if change < s - tolerance or not arriving:  # at an event its two sides are compared instead
+                if change < s - tolerance or not arriving:  # at an event the two sides are compared instead
                     seen.append((change, k, side))
         seen.sort()
         acting: list[int] = []
@@ -226,7 +227,7 @@ class Run:
         return [expansion.side_after(watched)[0] for watched in expansion.monitors]
 
     def _keep_schedules(self, due: tuple[int, ...]) -> None:
-        """What is due at an instant, with the inputs as they are from then on."""
+        """Process the schedules due at an instant, with the inputs on their next pieces."""
         point = replace(self.now.point, pieces=self._pieces(self.now.point.t))
         schedules = [self.model.schedules[k] for k in due]
         self._record_schedules(schedules)
@@ -246,6 +247,6 @@ class Run:
         recent = self._event_times[-_CROWD:]
         if len(recent) == _CROWD and t - recent[0] <= _CROWDED * (self.t1 - self.t0):
             raise UsageError(
-                f"events accumulate at t = {float(t)!r}: the multiple-precision run does not get past that",
+                f"events accumulate at t = {float(t)!r}: the multiple-precision run cannot continue past it",
                 remedy="declare the mode that they lead to",
             )

@@ -1,36 +1,37 @@
-"""What holds just after an event: transitions and resets at x-, then modes that are admissible, tried one by one.
+"""This module decides the state after an event: transitions and resets at x-, then trials of admissible modes.
 
-The rules, in words:
+The rules:
 
-0.  A corner, a step in time and the load of a contact that opens have the side on which their argument is just after.
-    They take it before anything else is looked at: at the start, at what was located, after each reset and each change
-    of another component, and in each combination of modes that is tried. While a contact has no mode yet, their values
-    alone say where they are.
-1.  Guards of the present modes that are zero here and would be negative just after have fired. Of an automaton with
-    choices the first whose condition holds at x- is taken. All resets that are due, those of schedules and monitors
-    among them, are evaluated at x- and made at once; two that set one variable to different values are an error. Of
-    guards that a reset has made negative, or that are so at a start, the first that is declared is taken. Automata
-    whose guard is negative in every combination of modes of the contacts at rest leave before these are decided, and so
-    do those that would if the contacts were decided first; a located guard that would not has only touched zero. A
-    contact that has no mode yet is read on the side on which it is.
-2.  A component with a surface (a contact) that is off its surface is in the mode of the side it is on.
-3.  One that is on its surface and cannot stay as it is, is decided together with those whose forces act on it: every
-    combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if no guard of
-    theirs becomes negative. Of the admissible ones that is taken which keeps most modes of the components whose guards
-    have not fired, then most modes of all, then holds most surfaces (stick before slip). A tie, or none at all, ends
-    the run.
-4.  Rounds of 1 to 3 are repeated until no guard of any component is about to be negative.
+0.  A corner, a step in time and the load of a contact that opens have the side on which their argument is
+just after the event. They take their sides first: at the start, at a located event, after each reset and each
+change of another component, and in each combination of modes that is tried. While a contact has no mode yet,
+their sides follow from their values alone.
+1.  Guards of the present modes that are zero here and would be negative just after have fired. For an
+automaton with choices, the first choice whose condition holds at x- is taken. All resets that are due,
+including those of schedules and monitors, are evaluated at x- and applied together; two that set one variable
+to different values are an error. Of several guards that are negative after a reset or at a start, the first
+declared one is taken. An automaton whose guard is negative in every combination of modes of the contacts at
+rest leaves before these are decided. So does one whose guard would still be negative if the contacts were
+decided first; a located guard that would not be negative has only touched zero. A contact without a mode yet
+is evaluated on the side on which it is.
+2.  A component with a surface (a contact) that is off its surface is in the mode of its side.
+3.  A component on its surface whose mode cannot continue is decided together with those whose forces act on
+it. Every combination of modes is followed for a moment, with the surfaces exactly zero, and is admissible if
+none of their guards becomes negative. Of the admissible ones, the choice keeps the most modes of the
+components whose guards have not fired, then the most modes of all, then holds the most surfaces (stick before
+slip). A tie, or no admissible combination, ends the run.
+4.  Rules 1 to 3 are repeated until no guard of any component is about to be negative.
 
-What is located at an instant comes before what is scheduled for it, and inputs jump with the latter; at the start of a
-run nothing has moved yet, and the schedule comes first.
+Located events come before scheduled events of the same instant, and inputs jump with the latter. At the start
+of a run, where no motion has happened yet, the schedule comes first.
 
-Whether a quantity is zero, and on which side of zero it sets out, is read from its Taylor coefficients in the mode that
-is tried: one that is below 10^-20 of the terms it is the sum of (with 32 digits) is zero, and the next decides. No rule
-says in advance what is zero at an event.
+The sign of a quantity just after the event, or its vanishing, follows from its Taylor coefficients in the
+trial mode. A coefficient below 10^-20 of the terms of its sum (with 32 digits) is zero, and the next one
+decides. No rule prescribes in advance which quantities are zero at an event.
 
-A monitor has the side of zero on which it is just after an event, or none where it stays zero for a while. It fires
-where it leaves its side: between events where its series changes its sign; at an event that changes a mode, or that a
-schedule sets off, where its side just after is another one or none. Its reset is made at once.
+A monitor has the side of zero on which it is just after an event, or no side if it stays zero. It fires when
+it leaves its side: between events when its series changes sign; at an event that changes a mode, or that a
+schedule causes, if its side just after differs. Its reset is applied at once.
 """
 
 from __future__ import annotations
@@ -52,12 +53,12 @@ if TYPE_CHECKING:
 
 
 _MOST_TOGETHER = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
-_MOST_ROUNDS = 50  # that one instant may take; a cascade of resets is far shorter
+_MOST_ROUNDS = 50  # rounds at one instant; a cascade of resets is far shorter
 
 
 @dataclass
 class Settled:
-    """What holds after an event."""
+    """The state after an event."""
 
     point: Point
     modes: Modes
@@ -79,7 +80,7 @@ class Rules:
         located: Iterable[tuple[int, int]] = (),
         resets: Iterable[Mapping[str, Expression]] = (),
     ) -> Settled:
-        """Settle an event at x-: the guards (component, number) located at zero, and resets that are due."""
+        """Resolve an event at x-: the guards (component, number) located at zero, and the resets that are due."""
         moves: list[Move] = []
         fired = set(located)
         self.programs.new_instant()
@@ -105,17 +106,17 @@ class Rules:
                 return Settled(point, modes, self.programs.expand(point, modes), moves)
         moving = ", ".join(sorted({self.components[move.component].name for move in moves[-8:]}))
         raise UsageError(
-            f"at t = {float(point.t)!r} the transitions of {moving} follow each other over and over: motion along a "
+            f"at t = {float(point.t)!r} the transitions of {moving} follow each other without end: motion along a "
             "surface of a general automaton is not supported by the multiple-precision run",
-            remedy="compare against runs",
+            remedy="use reference='runs'",
         )
 
     def _leaving(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """The guards that are negative just after, those of corners and loads left out: these have their sides."""
+        """Return the guards that are negative just after, except those of corners and loads."""
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
 
     def _kept(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
-        """Those of the located guards that are not negative just after if contacts are decided first."""
+        """Return the located guards that are not negative just after if contacts are decided first."""
         open_ = {c for c, _ in fired if self.components[c].surface}
         if not open_ or all(c in open_ for c, _ in fired):
             return set()
@@ -127,7 +128,7 @@ class Rules:
         return {(c, j) for c, j in fired - leaving if c not in open_}
 
     def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
-        """Let automata leave whose guards are negative and free of the forces that are still to be decided."""
+        """Change the modes of automata whose guards are negative whatever the undecided forces are."""
         for _ in range(_MOST_ROUNDS if self._surfaces() else 0):
             leaving = self.sides.leaving_in_any_case(point, modes)
             if not leaving:
@@ -140,7 +141,7 @@ class Rules:
         return [c for c, component in enumerate(self.components) if component.surface]
 
     def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
-        """Give components off their surface the mode of their side; return those on it without a mode."""
+        """Set components off their surface to the mode of their side; return those on it without a mode."""
         order = self._surfaces()
         if not order:
             return modes, set()
@@ -163,16 +164,16 @@ class Rules:
     def _decide(
         self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
     ) -> tuple[Point, Modes]:
-        """Decide the open components that are on their surfaces, each with those that its force acts on."""
+        """Decide the open components on their surfaces, each with those on which its force acts."""
         deciding = {c for c in open_ if self._on_surface(c, point, modes)}
         while deciding:
             chosen = self._with_coupled(min(deciding), deciding, point, modes)
             if len(chosen) > _MOST_TOGETHER:
                 coupled = ", ".join(self.components[c].name for c in chosen)
                 raise UsageError(
-                    f"{len(chosen)} coupled contacts start or stop at once ({coupled}), the multiple-precision run "
-                    f"decides {_MOST_TOGETHER}",
-                    remedy="compare against runs",
+                    f"{len(chosen)} coupled contacts start or stop at once ({coupled}); the multiple-precision run "
+                    f"supports at most {_MOST_TOGETHER}",
+                    remedy="use reference='runs'",
                 )
             point = self.programs.program(self.programs.held(self.programs.decided(modes), chosen)).project(
                 point
@@ -190,7 +191,7 @@ class Rules:
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
-        """A component with all, to be decided or holding, whose forces act on its surface or on each other's."""
+        """Return a component and all undecided or holding ones coupled with it through forces on surfaces."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
         program = self.programs.program(self.programs.held(self.programs.decided(modes), together))
         program.begin(point)
@@ -206,7 +207,7 @@ class Rules:
         return surface is not None and modes[c] == surface.hold
 
     def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
-        """The admissible combination that keeps most modes, of those above all that nothing happened to."""
+        """Return the admissible combination that keeps most modes, first those of components without an event."""
         scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))

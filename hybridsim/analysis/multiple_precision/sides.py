@@ -1,4 +1,4 @@
-"""Rule 0 of `settling`: corners and loads on the sides that hold, and automata that leave whatever is decided."""
+"""This module implements rule 0 of `settling`: sides of corners and loads, and automata that leave in any case."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from hybridsim.model.component import Corner, LoadAutomaton
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.one_sided import names_of
 
-_MOST_AT_REST = 4  # contacts whose combinations of modes are tried
-_ROUNDS_PER_MODE = 4  # a corner waits for those inside it, and for the orders of series before its own
+_MOST_AT_REST = 4  # contacts at rest whose combinations of modes are tried
+_ROUNDS_PER_MODE = (
+    4  # rounds per mode: a corner waits for the corners inside it, and for the series orders before its own
+)
 
 
 class Sides:
@@ -28,11 +30,11 @@ class Sides:
         self._most = _ROUNDS_PER_MODE * sum(len(self.components[c].modes) for c in self.led)
 
     def others(self, guards: Iterable[tuple[int, int]]) -> set[tuple[int, int]]:
-        """The guards (component, number) of components whose modes are decided otherwise."""
+        """Return the guards (component, number) of components whose modes do not follow from the state."""
         return {(c, j) for c, j in guards if c not in self.led}
 
     def along(self, point: Point, modes: Modes) -> Modes:
-        """The modes with each corner and load on its side along their flow; by value where a contact has no mode."""
+        """Return the modes with each corner and load on its side along the flow."""
         if not self.led:
             return modes
         has_flow = UNDECIDED not in modes
@@ -51,13 +53,13 @@ class Sides:
                 return modes
             modes = tuple(after)
         raise UsageError(
-            f"at t = {float(point.t)!r} the sides of corners follow from each other without end: that is not supported "
-            "by the multiple-precision run",
-            remedy="compare against runs",
+            f"at t = {float(point.t)!r} the sides of corners keep changing each other without end, which the "
+            "multiple-precision run does not support",
+            remedy="use reference='runs'",
         )
 
     def taken(self, point: Point, modes: Modes, moves: list[Move]) -> Modes:
-        """The same, each change noted among the moves."""
+        """Return the same modes, and add each change to the moves."""
         after = self.along(point, modes)
         for c in self.led:
             if after[c] != modes[c]:
@@ -66,9 +68,10 @@ class Sides:
         return after
 
     def leaving_in_any_case(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Guards of declared automata that are negative just after in every combination of modes of contacts at rest.
+        """Return guards of automata that are negative just after in every combination of modes of contacts at rest.
 
-        With too many combinations, those that are negative by value and free of the contacts' forces.
+        With too many combinations, it returns the guards that are negative by value and independent of
+        contact forces.
         """
         if not self._owners:
             return set()
@@ -100,5 +103,5 @@ class Sides:
         return {place for place, (side, order) in sides.items() if side < 0 and not (by_value and order)}
 
     def _is_free(self, c: int, mode: str, j: int) -> bool:
-        """Whether no force of a contact enters a guard."""
+        """Return whether a guard is independent of contact forces."""
         return not names_of(self.components[c].mode(mode).guards[j].expr.tree) & self._forced

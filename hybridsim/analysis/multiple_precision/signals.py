@@ -1,4 +1,4 @@
-"""Inputs: the polynomial that holds from an instant on, in the time that has passed since its knot."""
+"""This module represents an input as the polynomial that holds from an instant on, in the time since its knot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.model.inputs import Input
 
-# (knot as a fraction of the period, value there, slope per period) of the waves that are made of straight lines
+# (knot as a fraction of the period, value there, slope per period) of the piecewise linear waves
 _CORNERS = {
     "triangle": ((-0.25, -1, 4), (0.25, 1, -4)),
     "sawtooth": ((0, -1, 2),),
@@ -25,8 +25,8 @@ _CORNERS = {
 class Signal:
     """One input in multiple precision.
 
-    On a piece it is p0 + p1 s + p2 s^2 + p3 s^3 with s the time since the piece's knot; of a sine and a chirp this is
-    the angle.
+    On a piece it is p0 + p1 s + p2 s^2 + p3 s^3, with s the time since the knot of the piece. For a sine and
+    a chirp this polynomial is the angle.
     """
 
     def __init__(self, model: Model, declared: Input, precision: Precision) -> None:
@@ -48,7 +48,7 @@ class Signal:
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def node(self, reading: Reading, piece: Sequence[Held]) -> Node:
-        """The input as a node over its piece: the knot and the four coefficients."""
+        """Return the input as a node over its piece, given the knot and the four coefficients."""
         knot, *coefficients = piece
         passed = reading.sum(reading.time, knot, minus=True)
         total: Node = coefficients[3]
@@ -61,7 +61,7 @@ class Signal:
         return reading.sum(Held(self.context, self.values.get("offset", 0)), wave)
 
     def piece(self, t: Number) -> tuple[Number, ...]:
-        """The knot and the four coefficients that hold from t on."""
+        """Return the knot and the four coefficients that hold from t on."""
         zero = self.number(0)
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)
@@ -77,7 +77,7 @@ class Signal:
         return (knot, self.values["offset"] + scale * value, slope, zero, zero)
 
     def next_knot(self, t: Number) -> Number | None:
-        """The first knot after t."""
+        """Return the first knot after t."""
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)
             return self._times[index] if index < len(self._times) else None
@@ -90,7 +90,7 @@ class Signal:
         return min((knot for knot in knots if knot > t), default=None)
 
     def _corners(self, t: Number) -> list[tuple[Number, Any, Any]]:
-        """Corners of a wave around t."""
+        """Return the corners of a wave near t."""
         period, phase = self.values["period"], self.values["phase"]
         shape = str(self.declared.shape)
         corners: Sequence[tuple[Any, Any, Any]]
@@ -117,7 +117,7 @@ class Signal:
 
 
 def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple[Number, ...]]:
-    """The cubic in t - knot before the first knot, after each knot, and after the last."""
+    """Return the cubics in t - knot: before the first knot, after each knot, and after the last."""
     values, zero = [number(v) for v in declared.values], number(0)
     bends = _natural_bends(times, values, zero) if declared.interpolation == "cubic" else [zero] * len(times)
     rows = []
@@ -133,7 +133,7 @@ def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple
 
 
 def _natural_bends(times: Sequence[Number], values: Sequence[Number], zero: Number) -> list[Number]:
-    """Second derivatives of the natural cubic spline at its knots: a tridiagonal system, solved by elimination."""
+    """Return the second derivatives of the natural cubic spline at its knots, from a tridiagonal system."""
     n = len(times)
     diagonal, right = [zero] * n, [zero] * n
     for i in range(1, n - 1):

@@ -1,4 +1,4 @@
-"""Transitions that are declared: choices of guards, and resets, all taken at x- and made at once."""
+"""This module applies declared transitions: choices of guards and resets, evaluated at x- and applied together."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Move:
 
 
 class Transitions:
-    """Rule 1 of `settling`."""
+    """The declared transitions, rule 1 of `settling`."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs = programs
@@ -43,9 +43,9 @@ class Transitions:
         moves: list[Move],
         is_located: bool = False,
     ) -> tuple[Point, Modes]:
-        """Take the declared choices of the guards that fired, and make all resets at once.
+        """Take the declared choices of the guards that fired, and apply all resets together.
 
-        is_located: the guards came to zero together, so that none of one component is before another.
+        is_located: the guards reached zero together, so that no guard of a component precedes another.
         """
         after, modes = list(modes), self.programs.given(point, modes)
         ways: dict[int, list[tuple[str, Mapping[str, Expression]]]] = {}
@@ -74,7 +74,8 @@ class Transitions:
                 continue
             if known and known[0][0] != choice.to:
                 raise SimulationError(
-                    f"at t = {float(point.t)!r} two guards of {component.name} come to zero at once and lead apart"
+                    f"at t = {float(point.t)!r} two guards of {component.name} reach zero at once "
+                    "and lead to different modes"
                 )
             if way not in known or any(isinstance(expr, Increment) for expr in choice.reset.values()):
                 moves.append(Move(c, modes[c], choice.to, guard.name))

@@ -1,4 +1,4 @@
-"""Models made simpler on purpose: each rung says what it drops, and where it does not apply."""
+"""This package holds the simpler models of `advise`; each rung states what it drops and when it does not apply."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Sce
 
 __all__ = ["LADDER", "DoesNotApply", "NothingToDrop", "Rung", "Scene"]
 
-# From the simplest up: no motion, linear models, a formula, fewer numbers in the law, the law without its corner.
+# From the simplest up: no motion, linear models, a formula, fewer numbers in the law, the law without its
+# corner.
 LADDER: tuple[Rung, ...] = (
     AtRest(),
     NoFriction(),

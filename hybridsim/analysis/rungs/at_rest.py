@@ -1,4 +1,4 @@
-"""The simplest rung of all: nothing moves."""
+"""This module defines the simplest rung: nothing moves."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 class Rest:
-    """A motion that is none, with the measures of a steady state; of a force it knows nothing.
+    """The trivial steady state x = const, with the measures of a steady state; forces are not modelled.
 
-    x : the value at which each state stays. period : of the forcing, nan without.
+    x : the constant value of each state. period : of the forcing, nan without forcing.
     """
 
     def __init__(self, x: dict[str, float], contacts: tuple[Contact, ...]) -> None:
@@ -26,19 +26,19 @@ class Rest:
         self.energy = {name: 0.0 for name, value in x.items() if value == 0.0}
 
     def harmonic(self, name: str, k: int) -> complex:
-        """The mean, and no wave."""
+        """Return the mean for k = 0, and zero for other harmonics."""
         return complex(self.x[name] if k == 0 else 0.0)
 
 
 class AtRest(Rung):
-    """Every state stays where it starts."""
+    """The rung in which every state keeps its start value."""
 
     name = "at-rest"
     title = "nothing moves"
     drops = "all motion: contacts hold, every state stays where it starts"
 
     def apply(self, scene: Scene) -> Rest:
-        """The motion that is none."""
+        """Return the trivial motion."""
         need_contacts(scene.model)
         start = scene.model.start_values()
         if scene.model.discrete:

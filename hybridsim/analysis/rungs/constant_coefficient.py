@@ -1,4 +1,4 @@
-"""Rungs with one constant coefficient of friction in place of a law of the speed."""
+"""This module defines the rungs with a constant coefficient of friction instead of a law of the speed."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ _MEAN = "mean_speed"
 def _need_velocity_law(model: Model) -> None:
     need_stick(model)
     if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
-        raise DoesNotApply("the law of a contact is a table, or not the same forward and backward")
+        raise DoesNotApply("the law of a contact is a table, or differs between forward and backward sliding")
     if not any(SPEED in contact.law.slip.names for contact in model.contacts):
         raise NothingToDrop("mu is constant already: no friction force depends on the speed")
 
 
 class ConstantAtRest(Rung):
-    """slip := stick := slip(0)."""
+    """The rung with slip := stick := slip(0)."""
 
     name = "constant-mu-at-rest"
     title = "constant mu, of the force at rest"
     drops = "how friction changes with speed: the force is the law's at v = 0"
 
     def apply(self, scene: Scene) -> Model:
-        """The model with Coulomb's law at the force of slow sliding."""
+        """Return the model with Coulomb's law at the force of slow sliding."""
         model = scene.model
         _need_velocity_law(model)
         return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")
 
 
 class ConstantAtMeanSpeed(Rung):
-    """slip := stick := slip(mean speed of sliding in the full motion)."""
+    """The rung with slip := stick := slip(mean sliding speed of the full motion)."""
 
     name = "constant-mu-mean"
     title = "constant mu, of the force at the mean sliding speed"
     drops = "how friction changes with speed: the force is the law's at the mean speed of sliding"
 
     def apply(self, scene: Scene) -> Model:
-        """The model with Coulomb's law at the force of the mean speed, a parameter for each contact."""
+        """Return the model with Coulomb's law at the force of the mean speed, a parameter for each contact."""
         model = scene.model
         _need_velocity_law(model)
         if any(not scene.speed.get(contact.name) for contact in model.contacts):

@@ -1,4 +1,4 @@
-"""The first harmonic of a contact's friction force while its relative velocity is a cosine."""
+"""This module computes the first harmonic of a contact's friction force for a cosine velocity."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from hybridsim.analysis.rungs.rung import DoesNotApply
 from hybridsim.expr import evaluate, parse
 from hybridsim.model import Contact, Model
 
-# Gauss's rule over a quarter of a cycle; a Stribeck knee a hundredth of the largest speed wide is resolved to 1e-10.
+# Gauss's rule over a quarter cycle. It resolves a Stribeck knee of 1/100 of the largest speed to 1e-10.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
 _ANGLES = 0.25 * math.pi * (1.0 + _NODES)
 
 
 class FirstHarmonic:
-    """F1(V) = (4/pi) integral over a quarter cycle of slip(V cos a) cos a da: the force is F1 cos, f = (F1/V) v."""
+    """F1(V) = (4/pi) integral over a quarter cycle of slip(V cos a) cos a da, with force F1 cos = (F1/V) v."""
 
     def __init__(self, model: Model, contact: Contact) -> None:
         if contact.normal.names - model.constant_names():
             raise DoesNotApply(f"the normal load of contact {contact.name} varies")
         if contact.law.slip_backward is not None or contact.law.stick_backward is not None:
-            raise DoesNotApply(f"the friction of contact {contact.name} is not the same forward and backward")
+            raise DoesNotApply(f"the friction of contact {contact.name} differs between forward and backward")
         self._values = model.parameter_values()
         self._speed = _unused(set(self._values), "speed")
         self._slip = inlined(model, contact.slip_force(parse(self._speed)))

@@ -1,4 +1,4 @@
-"""The rung of equivalent viscous damping: one-term harmonic balance, solved together with the motion it gives."""
+"""This module defines the rung of equivalent viscous damping, by one-term harmonic balance."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from hybridsim.model import Model, Output
 
 Response = Callable[[np.ndarray], np.ndarray]
 
-_SOLVED = 1e-12  # relative change of the dampers at which they are solved for
+_SOLVED = 1e-12  # relative change of the dampers at convergence
 _MOST, _MOST_RUNS = 5000, 60  # rounds with a linear response, and with runs
-_BELOW, _NO_END = 1e3, 1e15  # where a search begins, and where it is given up, in dampers of the free motion
-_ONE_WAY = 1e-6  # a mean velocity below that part of its amplitude is none
-_DRIFTS = "a contact slides one way on average: friction is no damper of its vibration"
-_NOTHING = "the balance has no motion: it says that friction stops everything"
+_BELOW, _NO_END = 1e3, 1e15  # start and end of a search, in dampers of the free motion
+_ONE_WAY = 1e-6  # relative to its amplitude: a smaller mean velocity counts as zero
+_DRIFTS = "a contact slides in one direction on average, so that friction does not damp its vibration"
+_NOTHING = "the harmonic balance has no moving solution: it predicts that friction stops everything"
 
 
 class EquivalentViscous(Rung):
-    """f = c_eq v with c_eq = F1(V)/V, F1 the first harmonic of friction while v is a cosine of amplitude V.
+    """The rung f = c_eq v, c_eq = F1(V)/V, with F1 the first harmonic of friction for a cosine of amplitude V.
 
-    For Coulomb friction c_eq = 4 mu N/(pi V): a damper that takes as much work per cycle. V is the first harmonic of
-    the relative velocity in the steady motion of the model with these dampers, at the forcing's period; both are
-    solved for together, for all contacts.
+    For Coulomb friction c_eq = 4 mu N/(pi V), a damper that does the same work per cycle. V is the first
+    harmonic of the relative velocity in the steady motion of the model with these dampers, at the forcing's
+    period. V and c_eq are solved together, for all contacts.
     """
 
     name = "viscous"
@@ -39,7 +39,7 @@ class EquivalentViscous(Rung):
     drops = "stick and all harmonics of friction: a damper takes the same work per cycle at the forcing's frequency"
 
     def apply(self, scene: Scene) -> Model:
-        """The model with a damper in place of each contact."""
+        """Return the model with a damper in place of each contact."""
         model = scene.model
         need_stick(model)
         period = _period(model)
@@ -68,12 +68,12 @@ def _period(model: Model) -> float:
 
     period = system_period(system_of(model))
     if period is None:
-        raise DoesNotApply("there is no forcing of one period, whose harmonics could be balanced")
+        raise DoesNotApply("the model has no single forcing period for a harmonic balance")
     return period
 
 
 def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
-    """The response of a model that is not linear, from its own steady state."""
+    """Return the response of a nonlinear model, from its steady state."""
     from hybridsim.analysis.steady import steady_state
 
     velocities = {f"{n}_v": c.velocity for n, c in zip(names, scene.model.contacts, strict=True)}
@@ -99,10 +99,11 @@ def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
 
 
 def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
-    """The dampers (contacts,) that agree with the motion they give.
+    """Return the dampers (contacts,) that are consistent with the motion they cause.
 
-    From small dampers up, so that of several solutions that of the largest motion is found: one of them by bisection
-    of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c), each taken half way in the logarithm.
+    The search starts at small dampers, so that it finds the solution with the largest motion. A single damper
+    is found by bisection of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c) with half steps
+    in the logarithm.
     """
     c = _first(response, forces)
     if len(c) == 1:
@@ -115,7 +116,7 @@ def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.nda
         c = np.sqrt(c * wanted)
         if (c > largest).any():
             raise DoesNotApply(_NOTHING)
-    raise DoesNotApply(f"the balance is not solved after {most} rounds")
+    raise DoesNotApply(f"the harmonic balance did not converge in {most} rounds")
 
 
 def _solve_one(wanted: Callable[[float], float], start: float) -> np.ndarray:
@@ -123,7 +124,9 @@ def _solve_one(wanted: Callable[[float], float], start: float) -> np.ndarray:
 
     low = start / _BELOW
     if wanted(low) < low:
-        raise DoesNotApply("the balance has no solution above a thousandth of the damper of the free motion")
+        raise DoesNotApply(
+            "the harmonic balance has no solution above 1/1000 of the damping of the free motion"
+        )
     high = 2.0 * low
     while wanted(high) > high:
         low, high = high, 2.0 * high
@@ -141,11 +144,11 @@ def _wanted(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> n
 
 
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
-    """Dampers of the motion without friction; where that has no bound, of one with next to no damping."""
+    """Return the dampers of the frictionless motion; if that is unbounded, of a motion with very small damping."""
     try:
         found = _wanted(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):
         found = _wanted(response, forces, np.full(len(forces), 1e-6))
     if not (found > 0.0).all():
-        raise DoesNotApply("a contact without load has no friction to stand for")
+        raise DoesNotApply("a contact without load has no friction that a damper could replace")
     return found

@@ -1,4 +1,4 @@
-"""How rungs rewrite a model: forces in place of contacts, another law for a contact, more parameters."""
+"""This module rewrites a model for rungs: forces instead of contacts, other laws, more parameters."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _SPEED = parse("abs(u)")
 
 
 def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
-    """The model with a component of one mode for each contact, which sets its force to an expression.
+    """Return the model with each contact replaced by a one-mode component that sets its force.
 
-    Other automata of a contact, of lift-off and of tables, stay; the states that a law with memory brings go with it.
+    Other automata of a contact (lift-off, tables) stay. The states of a law with memory are removed with it.
     """
 
     def values(contact: Contact) -> dict[str, Expression]:
@@ -44,24 +44,24 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
 
 
 def _is_copy(contact: Contact, part: Component) -> bool:
-    """Whether an automaton is that of one of several copies of a law, whose forces are added up."""
+    """Return whether an automaton belongs to one of several copies of a law, whose forces are added."""
     number = part.name.removeprefix(f"{contact.name}_")
     return contact.law.copies is not None and number != part.name and number.isdecimal()
 
 
 def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str) -> Model:
-    """The model with each contact changed, and a title that says so."""
+    """Return the model with each contact changed, and a title that states the change."""
     contacts = tuple(change(contact) for contact in model.contacts)
     return replace(model, contacts=contacts, title=f"{model.title or model.name}, {title}")
 
 
 def at_speed(slip: Expression, speed: str) -> Expression:
-    """The slip force at a speed: a number or the name of a parameter of the law."""
+    """Return the slip force at a speed, which is a number or the name of a parameter of the law."""
     return substitute(slip, {SPEED: parse(speed)})
 
 
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:
-    """The contact with another law, without the parameters that this does not use."""
+    """Return the contact with another law, without the parameters that this law does not use."""
     used = {name for _, expression in law.expressions() for name in expression.names}
     while more := {n for u in used if (e := law.parameters.get(u)) is not None for n in e.names} - used:
         used |= more
@@ -71,7 +71,7 @@ def with_law(contact: Contact, law: FrictionLaw) -> Contact:
 
 
 def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
-    """The model with more parameters, and the free name that each wish got."""
+    """Return the model with more parameters, and the unused name chosen for each wish."""
     taken, names = names_of_model(model), {}
     for wish in wishes:
         names[wish] = free_name(taken, wish)
@@ -81,7 +81,7 @@ def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, d
 
 
 def inlined(model: Model, expression: Expression) -> Expression:
-    """An expression with the model's definitions put in."""
+    """Return an expression with the model's definitions inserted."""
     definitions = dict(model.definitions)
     while used := expression.names & definitions.keys():
         expression = substitute(expression, {name: definitions[name] for name in used})

@@ -1,4 +1,4 @@
-"""How the contacts of a linear model slide under its forcing, at its frequency, where each is a viscous damper.
+"""This module computes the harmonic response of a linear model whose contacts are viscous dampers.
 
 x' = A x + b e^{iwt} - B F,    V = W x + u e^{iwt},    F_i = c_i V_i
 """
@@ -15,20 +15,20 @@ from hybridsim.analysis.closed_forms.affine import Affine, NotAffine, affine
 from hybridsim.expr import evaluate
 from hybridsim.model import Input, Model
 
-_SAME = 1e-9  # frequencies that differ by less are one: parameters carry rounding
+_SAME = 1e-9  # relative; closer frequencies are equal, because parameters carry rounding errors
 
 
 class NotLinear(Exception):
-    """Rates or relative velocities are no linear forms in the states."""
+    """The rates or relative velocities are not linear forms in the states."""
 
 
 class LinearResponse:
-    """First harmonics of the relative velocities of a model, by the coefficients of equivalent dampers."""
+    """First harmonics of the relative velocities of a model, as functions of the damper coefficients."""
 
     def __init__(self, model: Model, frequency: float) -> None:
         automata = model.surfaces or model.impacts or model.components
         if automata or model.discrete or model.schedules or model.flow is not None:
-            raise NotLinear("it has modes, clocks or functions of its own")
+            raise NotLinear("it has modes, schedules or Python functions")
         states, forces = [s.name for s in model.states], [c.name for c in model.contacts]
         values, definitions = model.parameter_values(), dict(model.definitions)
         unknowns = {*states, *forces, *(i.name for i in model.inputs)}
@@ -47,14 +47,14 @@ class LinearResponse:
         self._b, self._u = (np.array([_wave(a, frequency, inputs) for a in rows]) for rows in (rates, slides))
 
     def __call__(self, dampers: np.ndarray) -> np.ndarray:
-        """Complex amplitudes V of the relative velocities for coefficients c, both (contacts,)."""
+        """Return the complex amplitudes V of the relative velocities for coefficients c, both (contacts,)."""
         B = self._B * dampers
         resistance = 1j * self._frequency * np.eye(len(self._A)) - self._A - B @ self._W
         x = np.linalg.solve(resistance, self._b + B @ self._u)
         return np.asarray(self._W @ x + self._u)
 
     def mean(self, dampers: np.ndarray) -> np.ndarray:
-        """Mean relative velocities (contacts,)."""
+        """Return the mean relative velocities (contacts,)."""
         B = self._B * dampers
         x = np.linalg.lstsq(self._A + B @ self._W, -(self._b0 + B @ self._u0), rcond=None)[0]
         return np.asarray(self._W @ x + self._u0)
@@ -67,13 +67,13 @@ def _matrix(rows: list[Affine], names: list[str]) -> np.ndarray:
 
 
 def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> complex:
-    """The amplitude of exp(iwt) whose real part is the row's first harmonic."""
+    """Return the amplitude of exp(iwt) whose real part is the row's first harmonic."""
     own = sum(-1j * p for w, p in row.waves.items() if abs(w - frequency) <= _SAME * frequency)
     return complex(own + sum(row.linear.get(name, 0.0) * wave for name, wave in inputs.items()))
 
 
 def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> float:
-    """The row's mean over a period, apart from the states."""
+    """Return the row's mean over a period without the states."""
     total = row.constant
     for declared in inputs:
         number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}
@@ -83,7 +83,7 @@ def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> 
 
 
 def first_harmonic(declared: Input, frequency: float, values: Mapping[str, float]) -> complex:
-    """The amplitude of a periodic input at a frequency; 0 where its own is another."""
+    """Return the amplitude of a periodic input at a frequency; 0 if its own frequency differs."""
     if declared.kind != "wave" or declared.period is None:
         raise NotLinear(f"the input {declared.name} is not periodic")
     number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

@@ -1,4 +1,4 @@
-"""The rung without friction: every contact force is zero."""
+"""This module defines the rung without friction: every contact force is zero."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from hybridsim.model import Model
 
 
 class NoFriction(Rung):
-    """f = 0."""
+    """The rung with f = 0."""
 
     name = "no-friction"
     title = "no friction"
     drops = "friction altogether: its force, its damping, and stick"
 
     def apply(self, scene: Scene) -> Model:
-        """The model with all contact forces zero."""
+        """Return the model with all contact forces zero."""
         need_contacts(scene.model)
         zero = {contact.name: parse(0) for contact in scene.model.contacts}
         return with_forces(scene.model, zero, "free", "without friction")

@@ -1,4 +1,4 @@
-"""The rung of Den Hartog's closed form: the oscillator that never stops, as a formula."""
+"""This module defines the rung of Den Hartog's closed form, for an oscillator that never stops."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.model import Model
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_DENSE = 2001  # points over which the largest velocity is looked for, before Newton's method
+_DENSE = 2001  # points of the search for the largest velocity, before Newton's method
 
 
 class NoStopMotion:
-    """Den Hartog's motion with the measures of a steady state: half a period in closed form, the other its mirror."""
+    """Den Hartog's motion with the measures of a steady state; the second half period mirrors the first."""
 
     def __init__(self, found: Recognised, contact: str, amplitude: float, angle: float) -> None:
         s = found.system
@@ -59,7 +59,7 @@ class NoStopMotion:
 
     @property
     def energy(self) -> dict[str, float]:
-        """Integrals of squares over a period."""
+        """Integrals of the squares over a period."""
         found = {}
         for name in self.amplitude:
             swing, mean = self._swing(name), self.mean[name]
@@ -67,23 +67,23 @@ class NoStopMotion:
         return found
 
     def harmonic(self, name: str, k: int) -> complex:
-        """As `SteadyState.harmonic`, t counted from a zero phase of time."""
+        """Return the harmonic as `SteadyState.harmonic` does, with t counted from phase zero."""
         if k == 0:
             return complex(self.mean[name])
         if k % 2 == 0:
-            return 0j  # the second half is minus the first
+            return 0j  # the second half period is minus the first
         w = 2.0 * math.pi * k / self.period
         wave = np.exp(-1j * w * (self._s + self._top_at))
         return complex(4.0 / self.period * (self._w @ (self._swing(name) * wave)))
 
     def _swing(self, name: str) -> np.ndarray:
-        """Deviation from the mean over the half period from the upper turning point on."""
+        """Return the deviation from the mean over the half period after the upper turning point."""
         if name == self._contact:
             return np.full(len(self._s), -self._system.slip_force)
         return self._phase.derivative(0 if name == self._x else 1, self._s) - self.mean[name]
 
     def _fastest(self) -> float:
-        """The largest speed: Newton's method on the acceleration from the fastest of many points."""
+        """Return the largest speed, by Newton's method on the acceleration from the fastest of many points."""
         s = np.linspace(0.0, 0.5 * self.period, _DENSE)
         at = float(s[int(np.argmax(np.abs(self._phase.derivative(1, s))))])
         for _ in range(4):
@@ -93,7 +93,7 @@ class NoStopMotion:
 
 @dataclass(frozen=True)
 class _Held:
-    """The form's numbers: turning point and the forcing's angle there; whether nothing else can be settled on."""
+    """The numbers of the closed form: amplitude, forcing angle at the turning point, and whether it is unique."""
 
     found: Recognised
     amplitude: float
@@ -102,17 +102,19 @@ class _Held:
 
 
 def held(model: Model) -> _Held:
-    """Den Hartog's motion of a model.
+    """Return Den Hartog's motion of a model.
 
     Raises
     ------
     DoesNotApply
-        Where the model is another one, or its motion stops.
+        If the model is another system, or its motion stops.
     """
     need_stick(model)
     found = recognise(model)
     if found is None or not found.system.force:
-        raise DoesNotApply("the model is no linear oscillator with one Coulomb contact under one sine")
+        raise DoesNotApply(
+            "it applies only to a linear oscillator with one Coulomb contact and one sine force"
+        )
     s = found.system
     natural = math.sqrt(s.stiffness / s.mass)
     r, zeta = s.frequency / natural, 0.5 * s.damping / (s.mass * natural)
@@ -120,7 +122,7 @@ def held(model: Model) -> _Held:
     try:
         form = no_stops(r, zeta, f)
     except np.linalg.LinAlgError:
-        raise DoesNotApply(f"without damping the form has no solution at r = {r:.6g}") from None
+        raise DoesNotApply(f"without damping the closed form has no solution at r = {r:.6g}") from None
     if not form.holds:
         raise DoesNotApply(
             f"the motion stops: mu N/F0 = {f:.4g} is beyond the no-stop boundary at r = {r:.4g}"
@@ -130,16 +132,17 @@ def held(model: Model) -> _Held:
     load = s.stiffness * amplitude - s.force * math.sin(angle)
     if load < s.stick_limit:
         raise DoesNotApply(
-            f"the motion stops: at its turning points the load {load:.4g} is below what stick holds"
+            f"the motion stops: at its turning points the load {load:.4g} is below the stick limit"
         )
     return _Held(found, amplitude, angle, s.damping > 0.0 and s.stick_limit == s.slip_force)
 
 
 def _angle_at_top(system: ForcedCoulombOscillator, amplitude: float) -> float:
-    """Angle of the sine at the upper turning point, from where half a period leads to the lower one.
+    """Return the forcing angle at the upper turning point from which half a period leads to the lower one.
 
-    Half a period takes (x, v) of the own motion by a matrix M, and turns the forced part into minus itself: two linear
-    equations give the forced part (Fx, Fv) at the turning point, (M + 1) (Fx, Fv) = M (A - c, 0) + (A + c, 0).
+    Half a period maps (x, v) of the free motion by a matrix M and negates the forced part. Two linear
+    equations therefore give the forced part (Fx, Fv) at the turning point: (M + 1) (Fx, Fv) = M (A - c, 0) +
+    (A + c, 0).
     """
     w, natural2 = system.frequency, system.stiffness / system.mass
     decay = 0.5 * system.damping / system.mass
@@ -155,13 +158,13 @@ def _angle_at_top(system: ForcedCoulombOscillator, amplitude: float) -> float:
 
 
 class NoStop(Rung):
-    """J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
+    """The rung of the closed form of J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
 
     name = "no-stop"
     title = "Den Hartog's closed form without stops"
-    drops = "stick, and the way to the steady motion: exact where the motion never stops"
+    drops = "stick and the transient; it is exact if the motion never stops"
 
     def apply(self, scene: Scene) -> NoStopMotion:
-        """The motion in closed form."""
+        """Return the motion in closed form."""
         form = held(scene.model)
         return NoStopMotion(form.found, scene.model.contacts[0].name, form.amplitude, form.angle)

@@ -1,4 +1,4 @@
-"""The rung without static friction above kinetic: mu_s := mu_k."""
+"""This module defines the rung with equal static and kinetic friction, mu_s := mu_k."""
 
 from __future__ import annotations
 
@@ -10,28 +10,25 @@ from hybridsim.analysis.rungs.rung import DoesNotApply, NothingToDrop, Rung, Sce
 from hybridsim.expr import evaluate
 from hybridsim.model import Contact, Model
 
-_TRIALS = 4  # points at which a jump at rest is looked for; one would do but for accidents
+_TRIALS = 4  # points at which a jump at rest is looked for; more than one excludes coincidences
 
 
 class OneCoefficient(Rung):
-    """stick := slip(0), for every contact that holds more at rest than it slides with."""
+    """The rung with stick := slip(0), for every contact whose static friction exceeds its kinetic friction."""
 
     name = "mu_s=mu_k"
     title = "mu_s := mu_k"
     drops = "static friction above kinetic: a body breaks loose at the force with which it slides"
 
     def apply(self, scene: Scene) -> Model:
-        """The model with the limit of stick lowered to the force of slow sliding."""
+        """Return the model with the stick limit lowered to the force of slow sliding."""
         model = scene.model
         need_stick(model)
         if any(contact.law.tables for contact in model.contacts):
             raise DoesNotApply("the law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
-            raise NothingToDrop(
-                "no force falls at once where a contact breaks loose: each begins to slide with the force at which it "
-                "breaks loose"
-            )
+            raise NothingToDrop("static and kinetic friction are already equal at v = 0")
         lowered = {c.name for c, jump in zip(model.contacts, jumps, strict=True) if jump}
         return with_contacts(model, lambda c: _lowered(c) if c.name in lowered else c, self.title)
 

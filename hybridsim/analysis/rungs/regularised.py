@@ -1,4 +1,4 @@
-"""Rungs with a single-valued friction force: tanh, arctan, and Karnopp's dead band."""
+"""This module defines the rungs with a single-valued friction force: tanh, arctan, and Karnopp's dead band."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ from hybridsim.analysis.rungs.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.errors import HybridsimError
 from hybridsim.model import Model
 
-SHARE = 0.01  # of the largest sliding speed: a round number for a knee that is narrow beside the motion
+SHARE = 0.01  # of the largest sliding speed; makes the regularised region narrow compared with the motion
 
 
 class _Regularised(Rung):
-    """The force as a function of the velocity within a width v0 around zero; see `Model.regularized`."""
+    """A rung that regularises the force within a width v0 around zero velocity; see `Model.regularized`."""
 
     def apply(self, scene: Scene) -> Model:
-        """The model with every contact regularised."""
+        """Return the model with every contact regularised."""
         need_stick(scene.model)
         v0 = scene.v0
         if v0 is None:
             if not scene.peak:
-                raise DoesNotApply("nothing slides in the full motion, so no v0 is small beside its speed")
+                raise DoesNotApply(
+                    "nothing slides in the full motion, so that no v0 is small compared with its speed"
+                )
             v0 = SHARE * scene.peak
         try:
             return scene.model.regularized(self.name, v0=v0)
@@ -27,7 +29,7 @@ class _Regularised(Rung):
 
 
 class Tanh(_Regularised):
-    """f = slip(|v|) tanh(v/v0)."""
+    """The rung with f = slip(|v|) tanh(v/v0)."""
 
     name = "tanh"
     title = "regularised, tanh(v/v0)"
@@ -35,7 +37,7 @@ class Tanh(_Regularised):
 
 
 class Arctan(_Regularised):
-    """f = slip(|v|) (2/pi) atan(v/v0)."""
+    """The rung with f = slip(|v|) (2/pi) atan(v/v0)."""
 
     name = "arctan"
     title = "regularised, (2/pi) atan(v/v0)"
@@ -43,7 +45,7 @@ class Arctan(_Regularised):
 
 
 class Karnopp(_Regularised):
-    """The body is stopped in |v| < v0."""
+    """The rung in which the body is stopped for |v| < v0."""
 
     name = "karnopp"
     title = "Karnopp's dead band |v| < v0"

@@ -1,4 +1,4 @@
-"""What a rung is: a model made simpler on purpose, with what it drops in words, and where it does not apply."""
+"""This module defines a rung: a simplified model, with a statement of what it drops and when it does not apply."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ if TYPE_CHECKING:
 
 
 class DoesNotApply(Exception):
-    """A rung cannot stand for a model; the text says why."""
+    """A rung cannot replace a model; the text says why."""
 
 
 class NothingToDrop(DoesNotApply):
-    """A model has not got what a rung would drop: it is on that rung already; the text says why."""
+    """A model lacks the feature that a rung would drop, so the rung changes nothing; the text says why."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """The full model and what is known of its motion, from which a rung takes the numbers it needs.
+    """The full model and the numbers of its motion that rungs need.
 
     Parameters
     ----------
     model : the full model.
-    speed : mean speed of each contact while it slides, of the full motion; empty where it is not known.
+    speed : mean sliding speed of each contact in the full motion; empty if unknown.
     peak : the largest speed of any contact in the full motion.
-    v0 : width of a regularised force; a hundredth of ``peak`` unless given.
-    progress : called from time to time by a rung that needs runs of its own; what it raises ends them.
+    v0 : width of a regularised force; by default a hundredth of ``peak``.
+    progress : called from time to time by a rung that makes runs; an exception from it ends them.
     """
 
     model: Model
@@ -40,10 +40,10 @@ class Scene:
 
 
 class Rung(ABC):
-    """A simpler model: a transformation Model -> Model, or a formula in place of one.
+    """A simpler model: a transformation Model -> Model, or a closed form instead of a model.
 
     name : one word for options and maps.
-    title, drops : what it is, and what the full model has that it has not.
+    title, drops : its title, and the feature of the full model that it lacks.
     """
 
     name: ClassVar[str]
@@ -52,12 +52,12 @@ class Rung(ABC):
 
     @abstractmethod
     def apply(self, scene: Scene) -> Model | Any:
-        """The simpler model; of a formula a motion with the measures of a steady state.
+        """Return the simpler model, or for a closed form a motion with the measures of a steady state.
 
         Raises
         ------
         DoesNotApply
-            With the reason.
+            If the rung does not apply; the text says why.
         """
 
     def __repr__(self) -> str:
@@ -65,13 +65,13 @@ class Rung(ABC):
 
 
 def need_contacts(model: Model) -> None:
-    """Rungs are about friction: without a contact there is nothing to drop."""
+    """Refuse a model without contacts, because rungs change friction only."""
     if not model.contacts:
         raise DoesNotApply("the model has no contact")
 
 
 def need_stick(model: Model) -> None:
-    """Rungs that change a law's modes are about laws that have them."""
+    """Refuse a model with a law without stick, for rungs that change the modes of a law."""
     need_contacts(model)
     if not all(contact.law.is_set_valued for contact in model.contacts):
-        raise DoesNotApply("the law of a contact gives a force of its own, without stick")
+        raise DoesNotApply("the law of a contact gives its force directly, without stick")

@@ -1,4 +1,4 @@
-"""The motion of a model whose forcing and clocks have no common period, followed with a change of its start."""
+"""This module follows a model whose forcing and clocks have no common period, and a small change of its start."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges, sizes
 from hybridsim.errors import UsageError
 
-_DIES_OUT = 1e-6  # what is left of a change of the start by then is nothing
+_DIES_OUT = 1e-6  # a change of the start that has shrunk to this factor counts as zero
 _MOST = 512  # periods of the slowest forcing
 _LONGER = 4
 _NO_PERIOD = "the periods of forcing and clocks have no common multiple"
 
 
 class Followed(NamedTuple):
-    """What became of the motion: whether it rests, whether a change of its start dies out, and that in words."""
+    """The rest orbit, if there is one, whether a change of the start decays, the periods, and a message."""
 
     rests: Orbit | None
     dies_out: bool
@@ -29,10 +29,10 @@ class Followed(NamedTuple):
 
 
 def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Followed:
-    """Follow a motion for more and more periods of its slowest forcing, until its start is forgotten.
+    """Follow a motion for more and more periods of its slowest forcing, until its start no longer matters.
 
-    Where every small change of the start dies out, the motion is that of the forcing alone, with its frequencies and
-    their sums: quasi-periodic. Where it does not there are other frequencies, or chaos.
+    If every small change of the start decays, the motion follows the forcing alone, with its frequencies and
+    their sums: it is quasi-periodic. Otherwise it has further frequencies, or is chaotic.
     """
     count = settle
     while True:

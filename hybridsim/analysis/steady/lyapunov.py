@@ -1,8 +1,8 @@
-"""The largest Lyapunov exponent of a motion with events: the growth of a small change, carried through them.
+"""This module computes the largest Lyapunov exponent of a motion with events: the growth of a small change.
 
-Benettin's method (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9,
-doi:10.1007/BF02128236), with the saltation matrices of P. C. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671,
-doi:10.1016/0960-0779(94)00170-U.
+It uses Benettin's method (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9,
+doi:10.1007/BF02128236), with the saltation matrices of P. C. Mueller, Chaos, Solitons and Fractals 5 (1995)
+1671, doi:10.1016/0960-0779(94)00170-U.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from hybridsim.analysis.variations.directions import Directions
 
 _STRETCHES = 60
 _PERIODS = 5  # in each
-_SMALLEST = 1e-280  # a change that stick has made nothing of
+_SMALLEST = 1e-280  # a smaller change has been reduced to nothing by stick
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
-    """Mean rates of growth of a change over a first and a second hundred and fifty periods; -inf where it dies out.
+    """Return the mean growth rates of a change over the first and second 150 periods; -inf if it vanishes.
 
-    Exponential growth has the same rate in both; what grows like a power of time has not.
+    Exponential growth has the same rate in both halves. Growth like a power of time has not.
     """
     n, d = len(start.x), len(start.discrete)
     change = np.ones(n + d) / math.sqrt(n + d)

@@ -1,4 +1,4 @@
-"""What measures a periodic orbit: amplitudes, means, energies, harmonics, work of friction, time spent in stick."""
+"""This module measures a periodic orbit: amplitudes, means, energies, harmonics, work of friction, time in stick."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 
-MOST_HARMONICS = 100_000  # a segment has no digits left of a higher one
-_ROUNDING = 1e-10  # of a guard's largest value: what an event leaves of it
+MOST_HARMONICS = 100_000  # a segment cannot resolve a higher one
+_ROUNDING = 1e-10  # relative to a guard's largest value; a smaller value is rounding after an event
 
 
 class Grazing(NamedTuple):
-    """The least value to which a guard comes down without an event, beside the greatest it has on the orbit."""
+    """The smallest value that a guard reaches without an event, absolute and relative to its maximum on the orbit."""
 
     guard: str
     t: float
@@ -37,13 +37,14 @@ class Grazing(NamedTuple):
 
 
 class UnknownName(UsageError, KeyError):
-    """A measure is asked of something that is not there."""
+    """A measure was requested for a name that does not exist."""
 
 
 class ByName(Mapping[str, float]):
-    """A measure of each quantity, worked out when it is asked for.
+    """A measure of each quantity, computed on demand.
 
-    Those that cannot be read (`unreadable`) are no items of it, and say why when they are asked for.
+    Quantities that cannot be read (`unreadable`) are not items of it; accessing them raises an error with the
+    reason.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class ByName(Mapping[str, float]):
 
 
 class Measures:
-    """Measures of one period, the run over which is `solution`."""
+    """Measures of one period; `solution` is the run over it."""
 
     solution: Solution
 
@@ -102,7 +103,7 @@ class Measures:
 
     @property
     def too_fast(self) -> tuple[str, ...]:
-        """Quantities that vary too fast, or jump too often, to be read off: the measures are of the others."""
+        """Quantities that vary too fast, or jump too often, to be measured."""
         return tuple(name for name in self._names if name in self._orbit.too_fast)
 
     def _extreme(self, name: str, side: int) -> float:
@@ -139,9 +140,9 @@ class Measures:
         return self._each(lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
 
     def harmonic(self, name: str, k: int = 1) -> complex:
-        """The amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), t that of the forcing.
+        """Return the amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), with the forcing's time t.
 
-        Integrated over the segments: no sampling, no aliasing.
+        It is an integral over the segments, without sampling or aliasing.
         """
         known_name(name, self._names, "the steady state has no quantity", "quantities")
         if not isinstance(k, int) or not 0 <= k <= MOST_HARMONICS:
@@ -152,7 +153,7 @@ class Measures:
 
     @property
     def dissipated(self) -> ByName:
-        """Work of friction over the period: the integral of the force times the relative velocity, by contact."""
+        """Work of friction over the period, by contact: the integral of the force times the relative velocity."""
         remember = [c.name for c in self.solution.model.contacts if c.name not in self._contacts]
         contacts, too_fast = (*self._contacts, *remember), self._orbit.too_fast
         return ByName(
@@ -163,7 +164,7 @@ class Measures:
         )
 
     def _velocity(self, contact: str) -> np.ndarray:
-        """Relative velocity of a contact at the orbit's points; of a law with memory from its expression."""
+        """Return the relative velocity of a contact at the orbit's points."""
         orbit, model = self._orbit, self.solution.model
         if f"velocity of {contact}" in orbit.names:
             return orbit.of(f"velocity of {contact}")
@@ -181,7 +182,7 @@ class Measures:
 
     @property
     def stick_fraction(self) -> ByName:
-        """Part of the period that each contact spends in stick."""
+        """Fraction of the period that each contact spends in stick."""
         return ByName(self._contacts, self._stuck, "contact")
 
     def _stuck(self, contact: str) -> float:
@@ -190,7 +191,7 @@ class Measures:
         return spent / (self.solution.t_end - self.solution.t_start)
 
     def held_mode(self, contact: str) -> str:
-        """Name of the mode that counts as stick: of a contact ``stick``, of a switching surface its sliding mode."""
+        """Return the mode that counts as stick: ``stick`` for a contact, the sliding mode for a switching surface."""
         automata = {a.name: a for a in self.solution._system.automata if a.has_surface}
         automaton = automata[
             known_name(contact, list(automata), "the steady state has no contact", "contacts")
@@ -199,11 +200,11 @@ class Measures:
 
     @property
     def stops_per_period(self) -> ByName:
-        """How often a period each contact comes to stick."""
+        """Number of stops of each contact per period."""
         return ByName(self._contacts, self._stops, "contact")
 
     def _stops(self, contact: str) -> float:
-        """Stretches of stick; one that goes on over the end of the period counts once, one without end not at all."""
+        """Count the intervals of stick; one across the end of the period counts once, permanent stick counts zero."""
         hold, intervals = (
             self.held_mode(contact),
             [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0],
@@ -213,15 +214,15 @@ class Measures:
 
     @cached_property
     def word(self) -> tuple[str, ...]:
-        """The modes in the order in which the period goes through them; components are separated by a comma."""
+        """The modes in the order of the period; the modes of several components are separated by commas."""
         return word_of(self.solution)
 
     @cached_property
     def grazing(self) -> Grazing | None:
-        """The guard that comes closest to zero and turns back, if any guard turns; small means close to a grazing.
+        """The guard that comes closest to zero and turns back, if any; a small value is close to a grazing.
 
-        A guard that an event has made zero, or is about to, is left out there; so is one that varies too fast for
-        its turns to be found.
+        A guard at an event that makes it zero is left out there. So is a guard that varies too fast for its
+        minima to be found.
         """
         orbit, solution = self._orbit, self.solution
         guards = [name for name in orbit.names if name.startswith("guard ")]
@@ -241,7 +242,7 @@ class Measures:
 
 
 def word_of(solution: Solution) -> tuple[str, ...]:
-    """The modes of a run in order, the first and the last taken together where they are the same."""
+    """Return the modes of a run in order; equal first and last modes are merged."""
     names = [a.modes for a in solution._system.declared]
     found: list[str] = []
     for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):

@@ -1,4 +1,4 @@
-"""Where a motion is when a section is passed, and the run that leads from there to later passings."""
+"""This module defines the state at a section and the runs from one passage of the section to later ones."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """All that a run starts from: states, discrete states, and modes of the components that no surface decides.
+    """The start of a run: states, discrete states, and modes of the components without a surface.
 
-    x (n,), discrete (d,); numbers: of the modes of all components, by which held states are known. What happens at the
-    very instant of the section has not happened yet. at: the time from which the forcing's phase is counted on.
+    x (n,), discrete (d,); numbers: the modes of all components, which determine the held states. Events
+    exactly at the section have not happened yet. at: the time from which the forcing's phase is counted.
     """
 
     x: np.ndarray
@@ -44,13 +44,13 @@ class Point:
         return np.concatenate([self.x, self.discrete])
 
     def moved(self, change: np.ndarray) -> Point:
-        """The same with states and discrete states changed by (n + d,)."""
+        """Return the same point with states and discrete states changed by (n + d,)."""
         n = len(self.x)
         return replace(self, x=self.x + change[:n], discrete=self.discrete + change[n:])
 
 
 class CostsMore(Exception):
-    """A run has cost what a first one may; `reached` is how long it was by then."""
+    """A run has reached its first cost limit; `reached` is its duration so far."""
 
     def __init__(self, reached: float) -> None:
         super().__init__(reached)
@@ -58,31 +58,31 @@ class CostsMore(Exception):
 
 
 class GrowsWithoutBound(SimulationError):
-    """A run ended because a state had grown beyond all sizes."""
+    """A run ended because a state grew beyond all bounds."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"the motion grows without bound: {name} has passed {_WITHOUT_BOUND:g}")
 
 
 class CostsTooMuch(SimulationError):
-    """A search has taken as much work as one may."""
+    """A search has reached its work limit."""
 
     def __init__(self) -> None:
         super().__init__(
-            "no motion was found with as much work as a search may take; declare the `duration` of some periods of the "
-            "motion, pass period=, a smaller settle, a larger tol or a stiff integrator (rodas5p), or more "
-            "max_periods, which allow more"
+            "no steady motion was found within the work limit; declare the `duration` of some periods of the motion, "
+            "pass period=, a smaller settle, a larger tol or a stiff integrator (rodas5p), or raise max_periods, which "
+            "also raises the limit"
         )
 
 
 _TELLING = 100
-# A run is looked at after so many steps or events, then after twice as many, and so on: one that has taken that share
-# of the allowance, and at its pace would take more than all of it, is not gone on with.
+# A run is checked after this many steps or events, then after twice as many, and so on. It is abandoned if it
+# has used this fraction of the allowance and would exceed the allowance at its pace.
 _LOOK, _SHARE = {"steps": 20000, "events": 20000}, 0.05
-# Seconds, roughly: of a step through which the derivative by one state is carried, of all of them over a segment's end,
-# and of a segment's end without derivatives.
+# Approximate seconds: for carrying the derivative by one state through a step, for carrying all of them over
+# a segment's end, and for a segment's end without derivatives.
 _CARRIED, _CARRIED_OVER, _RENEWED = 1e-5, 5e-4, 2e-4
-_WITHOUT_BOUND = 1e100  # in any unit: squares of it, and of products of a few such, are no numbers
+_WITHOUT_BOUND = 1e100  # in any unit; squares and products of such values overflow
 
 
 class Motion:
@@ -90,8 +90,8 @@ class Motion:
 
     Parameters
     ----------
-    model : with its parameters set.
-    options : of `simulate`: integrator, rtol and the like.
+    model : the model with its parameters set.
+    options : options of `simulate`: integrator, rtol and the like.
     first : x0 and z0 of a run from the model's start.
     progress : called from time to time during every run.
     """
@@ -107,13 +107,14 @@ class Motion:
         self.progress = progress
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
-        self.sizes = np.zeros(len(self.names))  # of the states (n,), along what was followed last
-        # What all runs together may cost, what they have cost (`hybridsim.engine.headway.cost`), and the last one a
-        # unit of time. It is counted, so that a search ends at the same place on every machine.
+        self.sizes = np.zeros(len(self.names))  # sizes of the states (n,) along the last run
+        # The allowed cost of all runs together, their cost so far (`hybridsim.engine.headway.cost`), and that
+        # of the last run per unit of time. The cost is counted, not timed, so that a search ends at the same
+        # place on every machine.
         self.allowance, self._spent, self._pace = math.inf, 0.0, 0.0
 
     def unwatched(self) -> Motion:
-        """The same, for runs that are made later, when nobody looks on any more."""
+        """Return the same without the progress callback, for later runs."""
         motion = Motion(self.model, self.options, self.first)
         motion.sizes = self.sizes
         return motion
@@ -124,18 +125,18 @@ class Motion:
         return arguments.relative_tolerance(self.options.get("rtol"))
 
     def coupled_sizes(self, point: Point) -> np.ndarray:
-        """Sizes (n,) of the states at a point; see `hybridsim.analysis.steady.scales`."""
+        """Return the sizes (n,) of the states at a point; see `hybridsim.analysis.steady.scales`."""
         system = system_of(self.model)
         return coupled_sizes(system, point.x, system.vector(Instant(point.at), point.discrete), point.numbers)
 
     def stands_still(self, point: Point) -> bool:
-        """Whether all rates at a point are rounding."""
+        """Return whether all rates at a point are rounding errors."""
         system = system_of(self.model)
         p = system.vector(Instant(point.at), point.discrete)
         return stands_still(system, point.x, p, point.numbers, self.rtol)
 
     def _tolerances(self, start: Point) -> dict[str, Any]:
-        """Absolute tolerances of a run: of a state that happens to be near zero that of the motion's size."""
+        """Return the absolute tolerances of a run; a state near zero gets that of the motion's size."""
         if "atol" in self.options or all(state.nominal for state in self.model.states):
             return {}
         found = np.maximum(self.coupled_sizes(start), self.sizes)
@@ -143,15 +144,15 @@ class Motion:
         return {"atol": [1e-3 * self.rtol * size for size in sizes]}
 
     def on_constraints(self, point: Point) -> Point:
-        """The point with the states that its modes hold where the model's parameters put them."""
+        """Return the point with held states evaluated from their constraints at the model's parameters."""
         system = system_of(self.model)
         x = system.project(0.0, point.x, system.vector(Instant(0.0), point.discrete), point.numbers)
         return replace(point, x=x)
 
     def run(self, start: Point | None, duration: float, is_carried: bool = False, **options: Any) -> Solution:
-        """From the time of a point on; None starts at time 0 where the model is declared to start.
+        """Run from the time of a point on; None starts at time 0 from the model's start.
 
-        is_carried: derivatives will be carried along the run, which has to be worth it.
+        is_carried: derivatives will be carried along the run, so that their cost counts too.
         """
         given: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
@@ -164,15 +165,15 @@ class Motion:
         is_watched = "limits" not in given and self.allowance < math.inf
         if is_watched:
             given["limits"] = _LOOK
-        with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion may grow without bound
             solution = simulate(self.model, (begin, begin + duration), progress=self.progress, **given)
             while is_watched and solution.status == "limit":
                 solution = self._longer(solution, duration, is_carried)
         spent = float(_cost_of(solution))
-        is_long = solution.stats["steps"] >= _TELLING  # a few steps tell nothing of how a longer run would be
+        is_long = solution.stats["steps"] >= _TELLING  # a few steps do not show how a longer run would go
         self._pace = spent / float(solution.t_end - begin) if is_long else 0.0
         self._spend(spent)
-        if solution.status == "interrupted":  # half of a search is no result
+        if solution.status == "interrupted":  # an interrupted search has no result
             raise KeyboardInterrupt
         if solution.status == "limit" and "limits" in options:
             raise CostsMore(solution.t_end - begin)
@@ -184,7 +185,7 @@ class Motion:
         return solution
 
     def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
-        """A run that has reached its limits, gone on with for as many steps again if it may come to its end."""
+        """Continue a run that has reached its limits, for as many steps again, if it can still finish."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
         if spent >= _SHARE * self.allowance and spent * duration > (self.allowance - self._spent) * reached:
@@ -195,7 +196,7 @@ class Motion:
         )
 
     def carry(self, solution: Solution) -> None:
-        """Count what it costs to carry derivatives along a run."""
+        """Add the cost of carrying derivatives along a run."""
         self._spend(_cost_of_carrying(solution))
 
     def _spend(self, seconds: float, ahead: float = 0.0) -> None:
@@ -204,7 +205,7 @@ class Motion:
             raise CostsTooMuch
 
     def _refuse_growth(self, solution: Solution) -> None:
-        """Say of a run that failed because of its size that it is its size."""
+        """Raise `GrowsWithoutBound` for a run that failed because of the size of a state."""
         last = np.abs(solution._segments[-1].x[-1]) if solution._segments else np.zeros(0)
         last = np.where(np.isfinite(last), last, np.inf)
         if last.max(initial=0.0) >= _WITHOUT_BOUND:
@@ -224,12 +225,12 @@ def _cost_of_carrying(solution: Solution) -> float:
 
 
 def point_at_end(solution: Solution) -> Point:
-    """Where a run is just before its end."""
+    """Return the point just before the end of a run."""
     return _point(solution, solution._segments[_last_with_length(solution)], side=-1)
 
 
 def point_at(solution: Solution, t: float) -> Point:
-    """Where a run is just before time t."""
+    """Return the point of a run just before time t."""
     index, _ = solution._places(np.array([t]), "-")
     segment = solution._segments[int(index[0])]
     point = _point(solution, segment, side=-1)

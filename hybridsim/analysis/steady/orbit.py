@@ -1,6 +1,6 @@
-"""A stretch of a run as polynomials: each quantity on Gauss points of small pieces, none of which crosses an event.
+"""This module represents part of a run as polynomials on small pieces with Gauss points, none across an event.
 
-Integrals are then sums over the points, and extrema are zeros of polynomials: nothing is sampled on a grid of time.
+Integrals are sums over the points, and extrema are zeros of polynomials, so that no time grid is needed.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from numpy.polynomial import legendre
 
 from hybridsim.errors import SimulationError
 
-POINTS = 16  # of Gauss on a piece: a polynomial of degree 15
-_DENSE = 65  # points at which a slope is looked at for changes of sign
-_STEPS = 4  # of Newton's method, from the chord through two of these points
-_AT_ONCE = 2**20  # slopes that are looked at in one go
+POINTS = 16  # Gauss points per piece: a polynomial of degree 15
+_DENSE = 65  # points at which a slope is checked for changes of sign
+_STEPS = 4  # steps of Newton's method, from the chord through two of these points
+_AT_ONCE = 2**20  # slopes per batch
 
 NODES, WEIGHTS = legendre.leggauss(POINTS)
 TO_COEFFICIENTS = np.linalg.inv(legendre.legvander(NODES, POINTS - 1))
@@ -31,16 +31,16 @@ _AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), POINTS - 1)
 
 @dataclass(frozen=True)
 class Orbit:
-    """Quantities over a stretch of a run.
+    """Quantities over part of a run.
 
     Parameters
     ----------
-    names : of the Q quantities.
-    starts, lengths : (K,) of the pieces, in time counted from the beginning of the run.
-    segments : (K,) number of the run's segment that each piece lies in.
-    values : (K, POINTS, Q) at Gauss points; no numbers where a quantity has none, or is infinite.
-    is_smooth : (K, Q) whether the polynomial through them holds, and they are not all the same.
-    too_fast : names of quantities that no pieces resolve: there are no readings of them.
+    names : names of the Q quantities.
+    starts, lengths : (K,) of the pieces, in time from the beginning of the run.
+    segments : (K,) number of the run's segment that contains each piece.
+    values : (K, POINTS, Q) at Gauss points; NaN where a quantity has no value or is infinite.
+    is_smooth : (K, Q) whether the polynomial is accurate, and the values are not all equal.
+    too_fast : names of quantities that no pieces resolve; they have no readings.
     """
 
     names: tuple[str, ...]
@@ -53,38 +53,38 @@ class Orbit:
 
     @property
     def duration(self) -> float:
-        """Length of the stretch."""
+        """Length of the part of the run."""
         return float(self.lengths.sum())
 
     @property
     def times(self) -> np.ndarray:
-        """Of the points (K, POINTS), counted from the beginning of the run."""
+        """Times of the points (K, POINTS), from the beginning of the run."""
         return self.starts[:, None] + 0.5 * self.lengths[:, None] * (1.0 + NODES)
 
     def column(self, name: str) -> int:
-        """The number of a quantity, which can be read off."""
+        """Return the number of a readable quantity."""
         if name in self.too_fast:
             raise SimulationError(
-                f"{name} varies too fast, or jumps too often, to be resolved on an orbit: there are no readings of it",
-                remedy="sample it from steady.solution as finely as it needs, and take it out of the outputs "
-                "where the others are wanted all at once",
+                f"{name} varies too fast, or jumps too often, to be resolved on an orbit: it has no readings",
+                remedy="sample it from steady.solution at the resolution that it needs, and remove it from the outputs "
+                "to read all the others at once",
             )
         return self.names.index(name)
 
     def of(self, name: str) -> np.ndarray:
-        """Values (K, POINTS) of one quantity."""
+        """Return the values (K, POINTS) of one quantity."""
         return self.values[:, :, self.column(name)]
 
     def _series(self, name: str) -> np.ndarray:
-        """Legendre coefficients (K, POINTS) of one quantity."""
+        """Return the Legendre coefficients (K, POINTS) of one quantity."""
         return self.of(name) @ TO_COEFFICIENTS.T
 
     def integral(self, values: np.ndarray) -> float:
-        """Integral over the stretch of something at the Gauss points (K, POINTS)."""
+        """Return the integral over the run of values at the Gauss points (K, POINTS)."""
         return float((values @ WEIGHTS) @ (0.5 * self.lengths))
 
     def harmonic(self, name: str, frequency: float) -> complex:
-        """2/T times the integral of q(t) exp(-i w t): the amplitude c of q = Re(c exp(i w t)); the mean for w = 0."""
+        """Return the amplitude c of q = Re(c exp(i w t)), an integral over the orbit; the mean for w = 0."""
         total = 0.0 + 0.0j
         parts = max(1, int(np.ceil(frequency * self.lengths.max() / POINTS * 2.0)))
         coefficients = self._series(name)
@@ -98,21 +98,21 @@ class Orbit:
 
     @cached_property
     def extremes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest value (Q,) of each quantity, both sides of every jump included."""
+        """Least and greatest value (Q,) of each quantity, including both sides of every jump."""
         low, high = self.values.min(axis=(0, 1)), self.values.max(axis=(0, 1))
         for _, series, is_smooth in self._blocks():
-            # where the polynomial does not hold, as around a jump of sign(x), it swings beyond what the quantity is
+            # An inaccurate polynomial, as near a jump of sign(x), overshoots the quantity.
             ends = (series @ _AT_ENDS.T).reshape(*is_smooth.shape, 2)
             low = np.minimum(low, np.where(is_smooth, ends.min(axis=2), np.inf).min(axis=0))
             high = np.maximum(high, np.where(is_smooth, ends.max(axis=2), -np.inf).max(axis=0))
-        with np.errstate(invalid="ignore"):  # what is no number somewhere has no extremes
+        with np.errstate(invalid="ignore"):  # a quantity with NaN has no extremes
             np.minimum.at(low, self.turns.quantity, self.turns.value)
             np.maximum.at(high, self.turns.quantity, self.turns.value)
         return low, high
 
     @cached_property
     def turns(self) -> Turns:
-        """Where the slope of a quantity changes its sign inside a piece."""
+        """The points inside pieces at which the slope of a quantity changes its sign."""
         found = [self._turns_of(*block) for block in self._blocks()]
         return Turns(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
@@ -132,7 +132,7 @@ class Orbit:
         return Turns(q, k, times, turned, before < 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """The first of some pieces, Legendre coefficients (k * Q, POINTS) there, and where these hold (k, Q)."""
+        """Yield batches of pieces: number, Legendre coefficients (k * Q, POINTS), and validity (k, Q)."""
         block = max(1, _AT_ONCE // (_DENSE * len(self.names)))
         for first in range(0, max(len(self.values), 1), block):
             chosen = slice(first, first + block)
@@ -140,7 +140,7 @@ class Orbit:
             yield first, rows @ TO_COEFFICIENTS.T, self.is_smooth[chosen]
 
     def passes(self, name: str, level: float, upward: bool = True) -> np.ndarray:
-        """Times, from the beginning of the run, at which a quantity rises through a level, or falls."""
+        """Return the times, from the start of the run, at which a quantity rises (or falls) through a level."""
         series = self._series(name)
         series[:, 0] -= level
         series *= 1.0 if upward else -1.0
@@ -156,7 +156,7 @@ class Orbit:
 def _zeros(
     series: np.ndarray, low: np.ndarray, high: np.ndarray, at_low: np.ndarray, at_high: np.ndarray
 ) -> np.ndarray:
-    """Zeros (m,) of Legendre series (m, degree + 1), each between two points where it has those values."""
+    """Return zeros (m,) of Legendre series (m, degree + 1), each between two points with the given values."""
     slope = series @ legendre.legder(np.eye(series.shape[1])).T
     at = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(_STEPS):

@@ -1,4 +1,4 @@
-"""Where on a motion nothing happens: a period that begins there contains each of its events once."""
+"""This module finds instants of a motion without events; a period that begins there contains each event once."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from hybridsim.engine.system import CORNER
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-_NEAR = 1e-6  # of a period: an event so close to its end may come to lie on it while the motion settles
+_NEAR = 1e-6  # of a period: an event this close to its end may move onto it while the motion settles
 _WITHOUT_EFFECT = ("near-grazing", CORNER)
-_LOOKED_AT = 4  # last periods whose events are looked at
+_LOOKED_AT = 4  # last periods whose events are used
 
 
 def event_times(solution: Solution) -> np.ndarray:
-    """Times (K,), ascending, of all that happened in a run forward in time."""
+    """Return the times (K,), ascending, of all events of a forward run."""
     return np.concatenate([np.empty(0), *(block.times for block in solution._trajectory.occurrences.blocks)])
 
 
 def is_event_near(solution: Solution, times: np.ndarray, t: float, period: float) -> bool:
-    """Whether something changes modes or states, or is recorded, next to time t; times (K,) as of `event_times`."""
+    """Return whether an event other than a near-grazing or a corner is next to time t, given all `event_times`."""
     first, end = np.searchsorted(times, [t - _NEAR * period, t + _NEAR * period])
     occurrences = solution._trajectory.occurrences
     return any(occurrences[k].kind not in _WITHOUT_EFFECT for k in range(int(first), int(end)))
 
 
 def quiet_offset(solution: Solution, period: float) -> float:
-    """How long after the section at the end of a run, modulo the period, nothing happens: 0 where that is there.
+    """Return the time from the section at the end of a run to an instant without events, modulo the period.
 
-    Elsewhere it is the middle of the longest stretch without events.
+    It is 0 if no event is at the section, else it leads to the middle of the longest event-free interval.
     """
     times, end = event_times(solution), solution.t_end
     if not any(is_event_near(solution, times, t, period) for t in (end, end - period)):
@@ -41,14 +41,14 @@ def quiet_offset(solution: Solution, period: float) -> float:
 
 
 def middle_of_longest(times: np.ndarray, period: float) -> float:
-    """The middle of the longest gap between times (K,) in [0, period), which repeat; K > 0."""
+    """Return the middle of the longest gap between times (K,) in [0, period), repeated periodically; K > 0."""
     gaps = np.diff(np.append(times, times[0] + period))
     k = int(np.argmax(gaps))
     return float((times[k] + 0.5 * gaps[k]) % period)
 
 
 def between_events(times: np.ndarray, t: float, low: float, high: float) -> float:
-    """A time within (low, high) in the middle between the events before and after t; t where there are none."""
+    """Return a time in (low, high) in the middle between the events before and after t; t if there are no events."""
     if not len(times):
         return t
     k = int(np.searchsorted(times, t))

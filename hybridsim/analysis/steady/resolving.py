@@ -1,4 +1,4 @@
-"""A run as an `Orbit`: its steps are halved until a polynomial on each piece holds for every quantity."""
+"""This module converts a run to an `Orbit`: steps are halved until a polynomial is accurate on each piece."""
 
 from __future__ import annotations
 
@@ -12,35 +12,43 @@ from hybridsim.analysis.steady.orbit import NODES, POINTS, TO_COEFFICIENTS, Orbi
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-_TAIL = 4  # last coefficients, which tell whether the polynomial holds
-_ASIDE_OF_ENDS = 2.0**-26  # of half a piece: events are at its ends, where sign(v) may be that of rounding
-_RESOLVED = 1e-13  # the misfit is below that part of the largest value of the whole stretch
-_HOLDS = 1e-6  # where rounding is more than that part, no polynomial is a picture of the quantity
-_NOISE = 1e-9  # below that part, what halving a piece does not make smaller is rounding
+_TAIL = 4  # last coefficients, which show whether the polynomial is accurate
+_ASIDE_OF_ENDS = (
+    2.0**-26
+)  # of half a piece; samples keep this distance from the ends, where sign(v) may be determined by rounding
+_RESOLVED = 1e-13  # the misfit relative to the largest value of the whole run
+_HOLDS = 1e-6  # if rounding exceeds this fraction of a quantity, no polynomial represents it
+_NOISE = 1e-9  # below this fraction, a misfit that halving does not reduce is rounding
 _SMALLER = 0.7
 _HALVINGS = 24
 _MOST, _MOST_VALUES = 2**17, 2**24  # pieces, and values on all of them: 128 MB
-_MOST_OF_A_STEP = 8.0  # pieces, on average, that are let be in any case
-_AT_ONCE = 2**19  # values that are sampled in one go
-_PROBED = 16  # steps from which rounding is told
-# Shares of a step to probe. What is fast is smooth on a short one, and leaves rounding alone; but on a share of 2^-53
-# the states themselves do not change. The first leaves them half of their digits, the second is for what is faster yet.
+_MOST_OF_A_STEP = 8.0  # pieces per step, on average, that are always allowed
+_AT_ONCE = 2**19  # values per batch
+_PROBED = 16  # steps at which rounding is measured
+# Fractions of a step to probe. A fast quantity is smooth on a short piece, where only rounding remains; but
+# on a fraction of 2^-53 the states do not change. The first fraction leaves the states half of their digits,
+# the second is for even faster quantities.
 _TINY = (2.0**-26, 2.0**-40)
-_ASIDE = (0.382, 0.618)  # where in a step: not where symmetry may put a jump, and never at one jump twice
-_ROUNDINGS = 4.0  # times what was met there
+_ASIDE = (
+    0.382,
+    0.618,
+)  # positions in a step; not at points of symmetry, where jumps are likely, and never both at one jump
+_ROUNDINGS = 4.0  # multiple of the measured rounding
 
 
 def _misfits() -> tuple[np.ndarray, np.ndarray]:
-    """Places on a piece to sample, Gauss points and two next to its ends, and the misfits (rows) of values there.
+    """Return the sample places on a piece (Gauss points and two near its ends) and the misfit weights (rows).
 
-    Misfits are the last coefficients, and how far the polynomial is off next to the ends: what begins behind the last
-    Gauss point is seen by nothing else.
+    Misfits are the last coefficients, and the errors of the polynomial near the ends. Only the latter show a
+    feature that begins behind the last Gauss point.
     """
     near = np.array([-1.0, 1.0]) * (1.0 - _ASIDE_OF_ENDS)
     beyond = legendre.legvander(near, POINTS - 1) @ TO_COEFFICIENTS
     tails = TO_COEFFICIENTS[-_TAIL:]
     off = np.concatenate([beyond, -np.eye(2)], axis=1)
-    off *= np.abs(tails).sum(axis=1).max() / np.abs(off).sum(axis=1).max()  # rounding makes as much of each
+    off *= (
+        np.abs(tails).sum(axis=1).max() / np.abs(off).sum(axis=1).max()
+    )  # rounding contributes equally to each misfit
     return np.append(NODES, near), np.concatenate([np.pad(tails, ((0, 0), (0, 2))), off])
 
 
@@ -50,8 +58,8 @@ _PLACES, _MISFITS = _misfits()
 class Sampler:
     """Values of states and other quantities inside the segments of a run.
 
-    These are outputs, discrete states, the surfaces of contacts ("velocity of f"), and all guards under their numbers
-    ("guard 3").
+    The other quantities are outputs, discrete states, surfaces of contacts ("velocity of f") and all guards
+    by number ("guard 3").
     """
 
     def __init__(self, solution: Solution, states_only: bool = False) -> None:
@@ -72,7 +80,7 @@ class Sampler:
         self.names = (*system.names, *(() if states_only else others))
 
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Values (k, Q) in the segments of these numbers (k,), at local times (k,)."""
+        """Return values (k, Q) in the segments with these numbers (k,), at local times (k,)."""
         x = self.segments.states(index, s)
         if self.states_only:
             return x
@@ -88,12 +96,12 @@ class Sampler:
         system, segment = self.system, self.segments[i]
         named = self.solution._quantities((*self.quantities, *self.discrete), segment, s, x)
         columns = [np.reshape(named, (-1, len(s))).T]
-        if not system.has_tape:  # of Python functions: no contacts, and guards that are no series
+        if not system.has_tape:  # for Python functions: no contacts, and guards without series
             return columns[0]
         surfaces = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
         guards = system.rows("guards", system.guard_count, s, x, segment.p, segment.z)
-        guards[:, ~system.active(segment.z)] = 0.0  # of other modes
-        guards[np.isinf(guards)] = 0.0  # never zero, and so as good as none
+        guards[:, ~system.active(segment.z)] = 0.0  # guards of other modes
+        guards[np.isinf(guards)] = 0.0  # never zero, so that they can be ignored
         return np.concatenate([*columns, surfaces, guards], axis=1)
 
 
@@ -108,7 +116,7 @@ class _Pieces(NamedTuple):
         return _Pieces(*(part[chosen] for part in self))
 
     def part(self, share: float, length: float) -> _Pieces:
-        """Of each a part that begins at a share of it, so long in units of it."""
+        """Return a part of each piece; its start and length are fractions of the piece."""
         whole = self.ends - self.begins
         begins = self.begins + share * whole
         return _Pieces(self.segments, begins, begins + length * whole)
@@ -120,7 +128,7 @@ class _Pieces(NamedTuple):
 
 
 class _Finished(NamedTuple):
-    """Pieces with values (k, POINTS, Q), and which quantities are polynomials there, and not constant (k, Q)."""
+    """Pieces with values (k, POINTS, Q), and a mask (k, Q) of non-constant polynomials."""
 
     pieces: _Pieces
     values: np.ndarray
@@ -128,14 +136,14 @@ class _Finished(NamedTuple):
 
 
 def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
-    """A run, or what was kept of it, as polynomials; forward in time."""
+    """Return a forward run, or its kept part, as polynomials on pieces."""
     sample = Sampler(solution, states_only)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
     steps = _Pieces(index[:-1][same], s[:-1][same], s[1:][same])
     rounding = _ROUNDINGS * _rounding(sample, steps)
     is_too_fast = np.zeros(len(sample.names), dtype=np.bool_)
-    while True:  # again without the quantities that take too many pieces: the others are small beside them
+    while True:  # repeat without the quantities that need too many pieces
         finished, left = _resolved(sample, steps, rounding, ~is_too_fast)
         if not left.any():
             break
@@ -159,21 +167,21 @@ def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
 def _resolved(
     sample: Sampler, pieces: _Pieces, rounding: np.ndarray, watched: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
-    """Pieces on which polynomials hold for the watched quantities (Q,); or those (Q,) that take too many of them."""
+    """Return pieces that resolve the watched quantities (Q,), or a mask of those that need too many."""
     count = len(sample.names)
     most = max(min(_MOST, _MOST_VALUES // (POINTS * count)), int(_MOST_OF_A_STEP * len(pieces.begins)))
     finished: list[_Finished] = []
     done, scale = 0, np.zeros(count)
-    before = np.full((len(pieces.begins), count), np.inf)  # misfits on the pieces that were halved
+    before = np.full((len(pieces.begins), count), np.inf)  # misfits on the pieces before they were halved
     for halving in range(_HALVINGS):
         values, misfits = _sampled(sample, pieces)
         low, high = values.min(axis=1), values.max(axis=1)
         scale = np.maximum(scale, np.maximum(-low, high).max(axis=0, initial=0.0))
         bound = np.maximum(_RESOLVED * scale, rounding)
         is_rounding = (misfits <= _NOISE * scale) & (misfits >= _SMALLER * before)
-        # what is no number somewhere is not smooth there, and no halving makes it so
+        # A quantity with NaN is not smooth there, and halving does not help.
         is_rough = watched & (misfits > bound) & ~is_rounding
-        # the polynomial of a constant is its rounding
+        # The polynomial of a constant shows only rounding.
         is_smooth = ((misfits <= bound) | is_rounding) & (rounding <= _HOLDS * scale) & (low < high)
         good = ~is_rough.any(axis=1) | (halving == _HALVINGS - 1)
         finished.append(_Finished(pieces.of(good), values[good], is_smooth[good]))
@@ -188,7 +196,7 @@ def _resolved(
 
 
 def _sampled(sample: Sampler, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray]:
-    """Values (K, POINTS, Q) on pieces, and the largest misfit (K, Q) of each polynomial there."""
+    """Return values (K, POINTS, Q) on pieces, and the largest misfit (K, Q) of each polynomial."""
     count = len(pieces.begins)
     values, misfits = np.empty((count, POINTS, len(sample.names))), np.empty((count, len(sample.names)))
     block = max(1, _AT_ONCE // (len(_PLACES) * len(sample.names)))
@@ -204,9 +212,10 @@ def _sampled(sample: Sampler, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rounding(sample: Sampler, steps: _Pieces) -> np.ndarray:
-    """The misfit (Q,) that rounding alone makes: on a piece so short that nothing else is left in it.
+    """Return the misfit (Q,) of rounding alone, measured on pieces so short that nothing else remains.
 
-    Of a difference of large terms, such as a balance of energy, it may be all there is: no piece is short enough then.
+    For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every
+    piece.
     """
     count = len(steps.begins)
     probed = steps.of(np.unique(np.linspace(0, count - 1, _PROBED).astype(int)) if count else slice(0))
@@ -214,7 +223,7 @@ def _rounding(sample: Sampler, steps: _Pieces) -> np.ndarray:
     values, misfits = _sampled(
         sample, _Pieces(*(np.concatenate(parts) for parts in zip(*probes, strict=True)))
     )
-    # else all points are one to a double
+    # otherwise all samples are equal in double precision
     tells = (values.min(axis=1) < values.max(axis=1)) & np.isfinite(misfits)
     least = np.where(tells, misfits, np.inf).reshape(len(probes), -1, len(sample.names)).min(axis=0)
     return np.where(np.isfinite(least), least, 0.0).max(axis=0, initial=0.0)

@@ -1,4 +1,4 @@
-"""What `steady_state` gives back."""
+"""This module defines the result of `steady_state`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 _NEUTRAL = 1e-9
-_MOST_LISTED = 10_000  # harmonics of each quantity in a record
+_MOST_LISTED = 10_000  # harmonics per quantity in a record
 
 
 class SteadyState(Readable, Measures):
@@ -34,23 +34,23 @@ class SteadyState(Readable, Measures):
     kind : str
         "periodic", "equilibrium", "quasi-periodic", "chaotic" or "not settled".
     success : bool
-        Whether it is one of the first two, and so has measures.
+        Whether the motion is periodic or an equilibrium, and so has measures.
     period, multiple : float, int
-        Time after which the motion repeats; how many periods of the forcing (rises through the section,
-        without forcing) that is: n of a period-n motion.
+        Time after which the motion repeats; the same in periods of the forcing (without forcing, in passages
+        of the section): n for a period-n motion.
     residual : float
         Largest change of a state over the period, relative to its largest size.
     newton_steps, periods : int
-        What it took: steps of Newton's method, periods that were followed.
+        The effort: steps of Newton's method, and periods that were followed.
     lyapunov : float
-        Largest Lyapunov exponent per unit of time, of a motion that does not repeat.
+        Largest Lyapunov exponent per unit of time, for a motion that does not repeat.
     message : str
         One sentence about how it was found.
 
     Other Parameters
     ----------------
     motion, kind, orbit, is_free, newton_steps, periods, message : object
-        What `steady_state` passes on; not made by hand.
+        Passed on by `steady_state`; do not construct it by hand.
 
     Examples
     --------
@@ -79,12 +79,12 @@ class SteadyState(Readable, Measures):
 
     @property
     def model(self) -> Model:
-        """What it is the steady state of."""
+        """The model with its parameters."""
         return self._motion.model
 
     @property
     def success(self) -> bool:
-        """Whether the motion repeats, or rests."""
+        """Whether the motion is periodic or an equilibrium."""
         return self.kind in ("periodic", "equilibrium")
 
     @property
@@ -93,14 +93,14 @@ class SteadyState(Readable, Measures):
         return self.kind
 
     @cached_property
-    def solution(self) -> Solution:  # type: ignore[override]  # made when asked for
-        """One period; of a motion without one a stretch of it.
+    def solution(self) -> Solution:  # type: ignore[override]  # computed on demand
+        """The run over one period; for a motion without a period, over part of it.
 
-        Under forcing it begins at t = 0, or where something happens there between two events, so that it contains each
+        With forcing it begins at t = 0, or between two events if an event is there, so that it contains each
         event once.
         """
         if self._closed is None:
-            raise UsageError(f"there is no stretch of this motion: {self.message}")
+            raise UsageError(f"there is no trajectory of this motion: {self.message}")
         return self._motion.run(self._closed.start, self._closed.period)
 
     @property
@@ -113,31 +113,34 @@ class SteadyState(Readable, Measures):
 
         if not self.success:
             raise UsageError(
-                f"the motion is {self.kind}: no period stands for it ({self.message})",
+                f"the motion is {self.kind}: no single period represents it ({self.message})",
                 remedy="run hs.simulate, or sample it with a section",
             )
         return orbit_of(self.solution)
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out.
+        """Floquet multipliers, largest first; without forcing the trivial one, which is 1, is left out.
 
-        Each contact that sticks on the way takes a rank away, and makes one of them exactly zero.
+        Each stick phase of a contact reduces the rank by one, and makes one multiplier exactly zero.
         """
         if not self.success:
-            raise UsageError(f"the motion is {self.kind}: it has no multipliers", remedy="see lyapunov")
+            raise UsageError(
+                f"the motion is {self.kind}: it has no multipliers", remedy="read lyapunov instead"
+            )
         rates = rates_at_end(self.solution) if self._is_free else None
         return multipliers(derivatives(self.solution, ()).by_start, rates)
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle, or on it as far as the tolerance tells: 100 rtol."""
+        """Whether all multipliers are inside the unit circle, or on it within the tolerance of 100 rtol."""
         return bool((np.abs(self.multipliers) <= 1.0 + max(_NEUTRAL, 100.0 * self._motion.rtol)).all())
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
-        """All that it says as plain values; harmonics up to that number, with their phases in radians.
+        """Return all results as plain values; harmonics up to the given number, with their phases in radians.
 
-        Where the motion has no multipliers ``multipliers`` and ``stable`` are None, and ``no_multipliers`` says why.
+        If the motion has no multipliers, ``multipliers`` and ``stable`` are None, and ``no_multipliers`` gives the
+        reason.
         """
         harmonics = whole_number(harmonics, "harmonics", 0, _MOST_LISTED)
         record: dict[str, Any] = {
@@ -169,7 +172,7 @@ class SteadyState(Readable, Measures):
         try:
             record["multipliers"] = [[float(m.real), float(m.imag)] for m in self.multipliers]
             record["stable"], record["no_multipliers"] = self.stable, ""
-        except HybridsimError as reason:  # the motion is known all the same
+        except HybridsimError as reason:  # the motion itself is known
             record["multipliers"] = record["stable"] = None
             record["no_multipliers"] = reason.message
         record["grazing"] = None if self.grazing is None else self.grazing._asdict()

@@ -1,4 +1,4 @@
-"""How small a motion may be before it is rounding, and the sizes of states that come near to zero."""
+"""This module estimates the sizes of states near zero, and the size of a motion that is only rounding."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from hybridsim.engine.tangents import TangentTape
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
-_ROUNDINGS = 10.0  # times the relative tolerance of a run: motion below this share of a size is rounding
-_LOOSEST = 1e-10  # for which the runs' tolerance stands; a looser one hides motions that are some
+_ROUNDINGS = 10.0  # multiple of a run's relative tolerance: relative motion below it is rounding
+_LOOSEST = 1e-10  # largest tolerance used here, because a looser one hides slow motions
 
 
 def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Sizes (n,) of the states at x, in the units in which each is of the size of those that it swings with.
+    """Return sizes (n,) of the states at x, in units in which coupled states have equal sizes.
 
-    A velocity at rest beside a spring at length x is as large as sqrt(k/m) x: an error of rounding in the spring's
-    force makes one of that size times rounding. Of two states that act on each other the ratio of their sizes is the
-    root of the ratio of what they do to each other's rates; one that decays by itself is no larger than what the other
-    makes of it meanwhile.
+    A velocity at rest next to a spring of length x has the size sqrt(k/m) x, because a rounding error of the
+    spring force changes it by that size times rounding. For two states that act on each other, the ratio of
+    sizes is the square root of the ratio of their mutual effects on the rates. A state that decays by itself
+    is at most as large as the effect of the other one within its decay time.
     """
     sizes = np.abs(x)
     if not system.has_tape or not system.n:
@@ -39,12 +39,12 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
 
 
 def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
-    """What a run of this tolerance may move states (n,) of these sizes by while nothing moves."""
+    """Return the changes of states (n,) of these sizes that a run of this tolerance may make at rest."""
     return _ROUNDINGS * min(rtol, _LOOSEST) * sizes
 
 
 def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
-    """Whether errors of the states within the tolerance of a run explain all rates at x."""
+    """Return whether errors of the states within a run's tolerance explain all rates at x."""
     if not system.has_tape or not system.n:
         return True
     f, A = _rates(system, x, p, z)
@@ -52,9 +52,9 @@ def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rt
 
 
 def _rates(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rates (n,) and their derivatives by the states (n, n)."""
+    """Return the rates (n,) and their derivatives by the states (n, n)."""
     n = system.n
     seeds = np.eye(n + 1 + len(p), n)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows without bound
+    with np.errstate(over="ignore", invalid="ignore"):  # a motion may grow without bound
         found = TangentTape(system, z)(np.zeros(1), np.ascontiguousarray(x)[None, :], p, seeds)
     return found.values[0, :n], found.slopes[0, :n]

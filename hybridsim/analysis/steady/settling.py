@@ -1,4 +1,4 @@
-"""Following a motion until it repeats: from period to period of the forcing, or from one rise to the next."""
+"""This module follows a motion until it repeats, by periods of the forcing or by passages of a section."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit
     from hybridsim.solution import Solution
 
-_CLOSER = 1e-2  # times the tolerance: what is below that and no longer shrinks has arrived
-LONGEST_WORD = 12  # periods after which a motion may repeat
+_CLOSER = 1e-2  # multiple of the tolerance: below it, a change that no longer shrinks has converged
+LONGEST_WORD = 12  # largest number of periods after which a motion may repeat
 
 
 @dataclass(frozen=True)
 class Passings:
-    """A motion at consecutive passings of a section.
+    """A motion at consecutive passages of a section.
 
     Parameters
     ----------
     times : (K,), from the beginning of the run.
-    values : (K, n + d), states and discrete states just before each passing.
-    scale : (n + d,), what a change of each is measured by; see `scale_of`.
-    last : the motion at the last one.
-    rests : whether nothing moves any more.
-    state : the state that keeps its value from passing to passing, without forcing.
-    adds_up : whether states that move on at constant rates are all that moves, without forcing.
+    values : (K, n + d), states and discrete states just before each passage.
+    scale : (n + d,), the scale of a change of each; see `scale_of`.
+    last : the point of the last passage.
+    rests : whether the motion has come to rest.
+    state : the state that defines the section, without forcing.
+    adds_up : whether all motion is states that grow at constant rates, without forcing.
     """
 
     times: np.ndarray
@@ -53,7 +53,7 @@ class Passings:
     adds_up: bool = False
 
     def residual(self, multiple: int) -> float:
-        """The largest change of a state over so many passings up to the last, relative to its scale."""
+        """Return the largest change of a state over the last `multiple` passages, relative to its scale."""
         if self.rests:
             return 0.0
         if len(self.values) <= multiple:
@@ -61,12 +61,12 @@ class Passings:
         return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
 
     def repeats_after(self, tolerance: float) -> int | None:
-        """The least number of passings after which the motion repeats, and is as close to where it goes."""
+        """Return the least number of passages after which the motion repeats, if it has converged to its limit."""
         found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
         return next((m for m in found if self._error(m, _CLOSER * tolerance) <= tolerance), None)
 
     def _error(self, multiple: int, rounding: float) -> float:
-        """How far off the limit the last passing is: the change, over what is left of it each time."""
+        """Return the distance of the last passage from the limit, from the change and its rate of decrease."""
         residual = self.residual(multiple)
         back = (len(self.values) - 1) // (2 * multiple)
         if back == 0:
@@ -77,7 +77,7 @@ class Passings:
         return float(residual / (1.0 - (residual / earlier) ** (1.0 / back)))
 
     def more(self, multiple: int, tolerance: float) -> float:
-        """How many more passings the motion needs to settle to the tolerance, at the pace of the last ones."""
+        """Return how many more passages the motion needs to settle to the tolerance, at its present pace."""
         residual, back = self.residual(multiple), (len(self.values) - 1) // (2 * multiple)
         if back == 0:
             return float("inf")
@@ -89,13 +89,13 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """The change over so many passings, as many times earlier."""
+        """Return the change over `multiple` passages, `back` times as many passages earlier."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )
 
     def drifting(self) -> int | None:
-        """The number of a state that moves on as much in each quarter of the passings, the same way."""
+        """Return the number of a state that moves by the same amount in each quarter of the passages, or None."""
         quarter = (len(self.values) - 1) // 4
         if quarter < 2:
             return None
@@ -104,27 +104,27 @@ class Passings:
         return i if np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]) else None
 
     def nearest(self) -> int:
-        """After how many passings the motion comes closest to repeating: the fewest that are about as good."""
+        """Return the least number of passages after which the motion comes close to repeating."""
         most = min(LONGEST_WORD, (len(self.values) - 1) // 2)
         residuals = [self.residual(m) for m in range(1, max(most, 1) + 1)]
         return 1 + next(i for i, r in enumerate(residuals) if r <= _ABOUT * min(residuals))
 
 
-_STEADY = 0.1  # of a drift: what it may change by
-_CONSTANT = 1e-8  # of one at a constant rate, which is not that of a slow end
+_STEADY = 0.1  # relative variation of a drift
+_CONSTANT = 1e-8  # the same for a constant rate, which excludes a slow approach to rest
 _ABOUT = 10.0
 
 
 def relative(change: np.ndarray, scale: np.ndarray) -> float:
-    """The largest entry of a change by the scale of each; what has none does not count."""
+    """Return the largest entry of a change relative to its scale; entries without a scale do not count."""
     parts = np.abs(change)[scale > 0.0] / scale[scale > 0.0]
     return float(parts.max(initial=0.0))
 
 
 def scale_of(solution: Solution, since: float) -> np.ndarray:
-    """What a change of each state and discrete state is measured by (n + d,): half of its range late in a run.
+    """Return the scale of a change of each state and discrete state (n + d,): half of its range late in a run.
 
-    It is at least a thousandth of the largest size: a state far from zero that hardly moves has no more digits.
+    It is at least a thousandth of the largest size, because a state far from zero that hardly moves has fewer digits.
     """
     low, high = ranges(solution, since)
     if solution._system.layout.discrete:
@@ -138,9 +138,9 @@ _DIGITS = 1e-3
 
 
 def forced_passings(motion: Motion, start: Point | None, period: float, count: int, phase: float) -> Passings:
-    """At so many consecutive periods of the forcing: at this time after the beginning of each.
+    """Return the passages at consecutive periods of the forcing, at the given phase of each.
 
-    Where something happens there the section goes to where nothing does, and the motion is followed as long again.
+    If an event is at this phase, the section moves to an event-free phase, and the motion is followed as long again.
     """
     solution = motion.run(start, (phase if start is None else 0.0) + count * period)
     offset = quiet_offset(solution, period)
@@ -164,11 +164,11 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
 def free_passings(
     motion: Motion, start: Point | None, duration: float, largest: np.ndarray, **limits: Any
 ) -> Passings:
-    """At every rise of the state that moves most through the middle of its range, in the later half of a run.
+    """Return the passages of the most mobile state through the middle of its range, in the later half of a run.
 
-    A state that only adds up, such as the angle of a shaft, passes there once: it is taken where there is no other.
-    largest (n,): the scale of each state when it moved most, brought up to date. A motion that has died out beside that
-    rests: what is left of it may be rounding, which may repeat.
+    A state that only grows, such as the angle of a shaft, passes there once; it is used if there is no other.
+    largest (n,): the largest scale of each state so far, updated here. A motion that has decayed relative to
+    these scales rests, because the rest of it may be rounding, which may repeat.
     """
     solution = motion.run(start, duration, **limits)
     n, scale = len(motion.names), scale_of(solution, 0.0)
@@ -184,9 +184,9 @@ def free_passings(
     motion.sizes = np.maximum(np.abs(low), np.abs(high))
     rounding = rounding_of(motion.coupled_sizes(end), motion.rtol)
     if died_out(low, high, largest) or (high - low <= rounding).all():
-        following = motion.run(end, _LONGER * duration)  # to where it goes
+        following = motion.run(end, _LONGER * duration)  # continued to its limit
         left = np.subtract(*ranges(following, following.t_end - 0.5 * duration)[::-1])
-        # what is small beside its start alone, and a motion of its own, goes on as it is
+        # a state that is small only relative to its start may have a motion of its own
         if ((left <= 0.5 * (high - low)) | (left <= np.maximum(_ROUNDED * largest, rounding))).all():
             end = point_at_end(following)
             return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
@@ -206,11 +206,11 @@ def free_passings(
 def _without_events(
     late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Times (K,) at which a section is passed by the flow and nothing else happens, and the state that tells.
+    """Return times (K,) at which the flow passes an event-free section, and the state that defines it.
 
-    times, j: of a first section, which is kept where nothing happens there. Else it goes to the middle of the longest
-    stretch of a round without events: to the level of the state that moves fastest there, among those that
-    may_be_passed (n,).
+    times, j: a first section, which is kept if no event is there. Otherwise the section moves to the middle
+    of the longest event-free interval of a period. It becomes a level of the state that moves fastest there,
+    among the states may_be_passed (n,).
     """
     events = event_times(late)
     if len(times) < 2 or not len(events):
@@ -234,21 +234,21 @@ def _without_events(
     return np.array([t for t in found if not is_event_near(late, events, t, period)]), j
 
 
-_FEW = 3  # last passings at which events are looked for
+_FEW = 3  # last passages that are checked for events
 
 
 def _goes_on(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
-    """Which states (n,), whose ranges are given, move on by the same amount in each quarter of a run, up to a share."""
+    """Return which states (n,) with the given ranges move by the same amount in each quarter of a run."""
     steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
     is_steady = np.ptp(steps, axis=1) <= steady * np.abs(steps[:, 0])
     return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))
 
 
 def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
-    """Whether nothing is left of a motion whose states (n,) stay between low and high."""
+    """Return whether a motion whose states (n,) stay between low and high has decayed to nothing."""
     return bool((high - low <= _DIED_OUT * largest).all())
 
 
 _DIED_OUT, _ROUNDED = 1e-9, 1e-13
-_LONGER = 2  # times as long again
-RESTS = 1e-12  # no state moves by more, relative to its largest size
+_LONGER = 2  # factor of the duration
+RESTS = 1e-12  # relative to its largest size; a state at rest moves by less

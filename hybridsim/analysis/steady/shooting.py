@@ -1,4 +1,4 @@
-"""Newton's method on the period map: a periodic orbit as the zero of x(T) - x(0)."""
+"""This module finds a periodic orbit by Newton's method on the period map, as a zero of x(T) - x(0)."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 _STEPS = 12
-_LESS = 0.5  # a step that leaves more of the residual than that is none
-_ROUNDING = 1e-14  # of the states' scale: no step makes the residual smaller
-# what has a multiplier beyond that is not come to by waiting: it repels, or lies among others
+_LESS = 0.5  # a step that leaves a larger part of the residual is rejected
+_ROUNDING = 1e-14  # relative to the states' scale; no step makes the residual smaller
+# An orbit with a larger multiplier is not reached by waiting: it repels, or is one of a family.
 _ATTRACTS = 1.0 - 1e-6
-_DOUBLE = 1e-3  # of two multipliers: so close to 1 they are taken apart by the direction of the motion
+_DOUBLE = 1e-3  # distance of two multipliers from 1; closer ones are separated by the direction of the motion
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """A periodic orbit, or what may become one.
+    """A periodic orbit, or an approximation of one.
 
     Parameters
     ----------
-    start : where it is at time 0.
-    period : time after which it repeats; multiple: of the forcing's periods, or passings of the section.
+    start : its point at time 0.
+    period : time after which it repeats; multiple: the same in periods of the forcing or passages of the section.
     residual : largest change of a state over the period, relative to its scale.
-    steps : of Newton's method that were taken.
-    attracts : all multipliers are inside the unit circle.
+    steps : number of steps of Newton's method.
+    attracts : whether all multipliers are inside the unit circle.
     """
 
     start: Point
@@ -54,7 +54,7 @@ def shoot(
     Parameters
     ----------
     scale : (n + d,) size of each state and discrete state.
-    section : None where the period is known; else the state that keeps its value, while the period is found.
+    section : None if the period is known; else the state that keeps its value while the period is found.
     """
     best = replace(start, residual=np.inf, converged=False)
     orbit = start
@@ -77,7 +77,7 @@ def shoot(
             rates = rates_at_end(solution)
         move, longer = _newton(matrix, change, scale, section, rates)
         best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
-        # what is left of the error is the step itself
+        # The remaining error is the step itself.
         if residual <= tol and relative(move, scale) <= tol and abs(longer) <= tol * orbit.period:
             return replace(best, converged=True)
         orbit = replace(orbit, start=orbit.start.moved(move), period=orbit.period + longer)
@@ -89,7 +89,7 @@ def shoot(
 def _newton(
     matrix: np.ndarray, change: np.ndarray, scale: np.ndarray, section: int | None, rates: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """The step of start and period that makes the linearised change vanish."""
+    """Return the step of start and period for which the linearised change vanishes."""
     count = len(change)
     unit = np.where(scale > 0.0, scale, 1.0)
     A = np.eye(count) - matrix * unit[None, :] / unit[:, None]
@@ -109,17 +109,18 @@ def _attracts(matrix: np.ndarray, rates: np.ndarray | None) -> bool:
 
 
 def rates_at_end(solution: Solution) -> np.ndarray:
-    """dx/dt (n,) where a run ends."""
+    """Return dx/dt (n,) at the end of a run."""
     last = solution._segments[-1]
     return rates_of(solution._system, float(last.s[-1]), last.x[-1], last.p, last.z)
 
 
 def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
-    """Floquet multipliers, largest first; without forcing the one along the motion, which is 1, is left out.
+    """Return the Floquet multipliers, largest first; without forcing the trivial one, which is 1, is left out.
 
-    rates (n,): dx/dt at the end of the orbit, without forcing. Where another multiplier is about 1 as well, as on the
-    closed orbits of what conserves energy, the two of them are known to the root of rounding only. The motion is the
-    eigenvector of the first one: the others are those of the matrix beside it.
+    rates (n,): dx/dt at the end of the orbit, for a motion without forcing. If another multiplier is about 1
+    as well, as on closed orbits of a conservative system, both are accurate only to the square root of
+    rounding. The rates are the eigenvector of the trivial one, and the others are multipliers of the matrix
+    across this direction.
     """
     found = np.linalg.eigvals(matrix)
     if rates is not None:
@@ -132,7 +133,7 @@ def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
 
 
 def _beside(matrix: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """The part of a matrix that acts across a direction; what it adds along the direction is left out."""
+    """Return the part of a matrix that acts across a direction; components along it are left out."""
     direction = np.zeros((len(matrix), 1))
     direction[: len(rates), 0] = rates
     across = np.linalg.qr(direction, mode="complete")[0][:, 1:]

@@ -1,4 +1,4 @@
-"""Published studies, done again: what the published method gives, what is true, and a verdict on every claim."""
+"""This package reproduces published studies: the published method, the exact result, and a verdict on each claim."""
 
 from __future__ import annotations
 

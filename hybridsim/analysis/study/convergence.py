@@ -1,4 +1,4 @@
-"""Figures 4 and 5: where A and E stop changing as the step, or the zero-velocity interval, is made smaller."""
+"""This module reproduces figures 4 and 5: convergence of A and E with the step and the zero-velocity interval."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from hybridsim.analysis.study.settings import (
 from hybridsim.analysis.study.steady import Periods, by_steps, exact
 from hybridsim.analysis.study.verdicts import Claim, Verdict
 
-# The paper varies r, N and F0 one by one and does not say over what: around its own example, r = 0.6, N = 40, F0 = 30.
+# The paper varies r, N and F0 one by one without the base point. Here it is its own example, r = 0.6, N = 40,
+# F0 = 30.
 CASES = {
     "r = 0.6": Point(0.6, 30.0 / 40.0),
     "r = 0.8": Point(0.8, 30.0 / 40.0),
@@ -38,7 +39,7 @@ CASES = {
     "F0 = 40": Point(0.6, 40.0 / 40.0),
     "F0 = 60": Point(0.6, 60.0 / 40.0),
 }
-# where the paper finds its largest deviation with the settings that it finds here
+# the place of the paper's largest deviation, with the settings that the paper chooses here
 RIDGE = "F0/N = 0.55, r = 0.64"
 ALL_CASES = {**CASES, RIDGE: Point(0.64, 0.55)}
 LIMIT = 1e-3  # Eq. 6
@@ -46,7 +47,7 @@ LIMIT = 1e-3  # Eq. 6
 
 @dataclass(frozen=True)
 class Curves:
-    """A and E of every case over the settings, by method, and the exact ones.
+    """A and E of every case over the settings, by method, and the exact values.
 
     values : method -> case -> (A, E) of shape (2, settings).
     """
@@ -57,7 +58,7 @@ class Curves:
     exact: dict[str, tuple[float, float]]
 
     def converged(self, method: str, case: str) -> float:
-        """The first setting from which on neither A nor E changes by more than 0.1 % any more; nan: never."""
+        """Return the first setting from which on A and E change by at most 0.1 %; nan if there is none."""
         pair = self.values[method][case]
         change = np.abs(np.diff(pair, axis=1)) / np.abs(pair[:, 1:])
         bad = np.flatnonzero((change > LIMIT).any(axis=0))
@@ -65,13 +66,13 @@ class Curves:
         return float(self.settings[first]) if first < len(self.settings) - 1 else float("nan")
 
     def off(self, method: str, case: str, setting: float) -> float:
-        """Deviation of A from the exact one at the setting nearest to the given one."""
+        """Return the deviation of A from the exact value at the setting nearest to the given one."""
         nearest = int(np.argmin(np.abs(np.log(np.array(self.settings) / setting))))
         return float(abs(self.values[method][case][0, nearest] / self.exact[case][0] - 1.0))
 
 
 def over_steps(size: Size, pool: Pool) -> Curves:
-    """Figure 4: over h0, at eps_v = 1e-6 m/s."""
+    """Compute figure 4: curves over h0, at eps_v = 1e-6 m/s."""
 
     def run(point: Point, variant: Variant, steps: float) -> Periods:
         eps = EPS_V_SMALL if variant.integrator == "rk4-dichotomy" else None
@@ -81,7 +82,7 @@ def over_steps(size: Size, pool: Pool) -> Curves:
 
 
 def over_eps(size: Size, pool: Pool) -> Curves:
-    """Figure 5: over eps_v, at h0 = 1200."""
+    """Compute figure 5: curves over eps_v, at h0 = 1200."""
 
     def run(point: Point, variant: Variant, eps: float) -> Periods:
         return by_steps(point, variant, size.periods, size.last, STEPS_PER_PERIOD, eps)
@@ -109,7 +110,7 @@ def _curves(
 
 
 def claim_figure_4(curves: Curves) -> Claim:
-    """Converged at about T/1200, with and without stick."""
+    """Judge the claim of convergence at about T/1200, with and without stick."""
     ours = {method: _row(curves, method, STEPS_PER_PERIOD) for method in curves.values}
     with_ = {m: row for m, row in ours.items() if m in (LITERAL.name, ZEROED.name)}
     without = {m: row for m, row in ours.items() if m not in with_}
@@ -141,7 +142,7 @@ def claim_figure_4(curves: Curves) -> Claim:
 
 
 def claim_figure_5(curves: Curves) -> Claim:
-    """Converged at about eps_v = 8e-4."""
+    """Judge the claim of convergence at about eps_v = 8e-4."""
     ours = {method: _row(curves, method, EPS_V) for method in curves.values}
     closest = min(ours, key=lambda m: abs(np.log(_sortable(ours[m]["latest"], 1e-9) / EPS_V)))
     best = ours[closest]
@@ -172,7 +173,7 @@ def claim_figure_5(curves: Curves) -> Claim:
 
 
 def _row(curves: Curves, method: str, setting: float) -> dict[str, Any]:
-    """When each case has converged, and how far off the exact motion it is at the published setting."""
+    """Return for each case when it has converged, and its error at the published setting."""
     found = {case: curves.converged(method, case) for case in CASES}
     values = np.array(list(found.values()))
     rising = curves.settings[-1] > curves.settings[0]

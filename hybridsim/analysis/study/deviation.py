@@ -1,4 +1,4 @@
-"""Figures 10 and 11: how far the motion without stick is off the one with it, over F0/N and r."""
+"""This module reproduces figures 10 and 11: the deviation of the motion without stick, over F0/N and r."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ EXACT = "exact"
 
 @dataclass(frozen=True)
 class Maps:
-    """Steady A and E over F0/N (rows) and r (columns), by method: mean, least, greatest of the last periods."""
+    """Steady A and E over F0/N (rows) and r (columns), by method: mean, least and greatest of the last periods."""
 
     ratios: np.ndarray
     r: np.ndarray
     mean: dict[str, dict[str, np.ndarray]]  # method -> A, E
     least: dict[str, dict[str, np.ndarray]]
     greatest: dict[str, dict[str, np.ndarray]]
-    stick: np.ndarray  # share of the exact period spent in stick
+    stick: np.ndarray  # fraction of the exact period spent in stick
 
     def deviation(self, quantity: str, without: str, with_: str) -> np.ndarray:
-        """|Q1 - Q2|/Q2, Eq. 9."""
+        """Return |Q1 - Q2|/Q2, Eq. 9."""
         one, two = self.mean[without][quantity], self.mean[with_][quantity]
         return np.asarray(np.abs(one - two) / two)
 
     def spread(self, quantity: str, method: str) -> np.ndarray:
-        """(greatest - least)/mean over the last periods: of a motion that does not repeat, not zero."""
+        """Return (greatest - least)/mean over the last periods, which is zero for a periodic motion."""
         width = self.greatest[method][quantity] - self.least[method][quantity]
         return np.asarray(width / self.mean[method][quantity])
 
 
 def maps(size: Size, pool: Pool) -> Maps:
-    """The steady states of all points by the exact method and every reading of the published ones."""
+    """Compute the steady states of all points by the exact method and every reading of the published ones."""
     ratios, r = np.array(size.ratios), np.array(size.r)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     methods: tuple[Variant, ...] = (*SIGNS, *MATTERING)
@@ -68,8 +68,9 @@ def maps(size: Size, pool: Pool) -> Maps:
     return Maps(ratios, r, mean, least, greatest, stick)
 
 
-# What the paper reads off its figures. It gives each region as a rectangle; what lies in it is a ridge from the corner
-# at the threshold to the opposite one, so that the upper ends of both ranges are where it falls below the level.
+# The paper's readings of its figures. It gives each region as a rectangle; the region is a ridge from the
+# corner at the threshold to the opposite one, so that the upper ends of both ranges show where it falls below
+# the level.
 PUBLISHED: dict[str, dict[str, Any]] = {
     "A": {
         "above 10 %": {"F0/N": (0.54, 0.58), "r": (0.50, 0.76)},
@@ -85,13 +86,13 @@ PUBLISHED: dict[str, dict[str, Any]] = {
     },
 }
 LEVELS = {"above 10 %": 0.10, "above 5 %": 0.05}
-# The ridge is looked for near the line through the corners that the paper gives, from F0/N = 0.54 on: nearer to the
-# threshold F0/N = mu, and far beyond resonance, nothing repeats from period to period in the methods without stick.
+# The ridge is searched near the line through the corners that the paper gives, from F0/N = 0.54 on. Nearer to
+# the threshold F0/N = mu, and far beyond resonance, the methods without stick do not give a periodic motion.
 _RIDGE_FROM, _RIDGE_WIDTH = 0.54, 0.12
 
 
 def read(found: Maps, quantity: str, without: str, with_: str) -> dict[str, Any]:
-    """The same readings off one of our maps: the ridge, its end at each level, its maximum, and the threshold's side.
+    """Read one of our maps in the same way: the ridge, its end at each level, its maximum, the side of the threshold.
 
     near the threshold: the median over r at the smallest F0/N. beyond resonance: the largest at r > 1.
     """
@@ -126,7 +127,7 @@ def _nearest(found: Maps, place: tuple[float, float]) -> tuple[int, int]:
 
 
 def distance(reading: dict[str, Any], quantity: str) -> float:
-    """From the paper's reading: steps of 0.01 in F0/N and 0.04 in r at the ends, factors of 1.2 at the top."""
+    """Return the distance from the paper's reading, in steps of the paper's accuracy."""
     published = PUBLISHED[quantity]
     total = abs(math.log(reading["maximum"] / published["maximum"])) / math.log(1.2)
     for name in LEVELS:
@@ -139,17 +140,17 @@ def distance(reading: dict[str, Any], quantity: str) -> float:
 
 
 def combinations() -> list[tuple[str, str]]:
-    """Every pair of a method without stick and one with it."""
+    """Return every pair of a method without stick and one with it."""
     return [(a.name, b) for a in SIGNS for b in (*(v.name for v in MATTERING), EXACT)]
 
 
 def pair_name(pair: tuple[str, str]) -> str:
-    """A pair in words."""
+    """Return the name of a pair."""
     return f"{pair[0]}; {pair[1]}"
 
 
 def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
-    """Figure 10 (A) or 11 (E)."""
+    """Judge the claim of figure 10 (A) or 11 (E)."""
     published = PUBLISHED[quantity]
     readings = {pair_name(pair): read(found, quantity, *pair) for pair in combinations()}
     ours = {name: row for name, row in readings.items() if not name.endswith(EXACT)}

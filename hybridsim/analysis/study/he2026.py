@@ -1,4 +1,4 @@
-"""The study of He et al. 2026: everything that is computed, in order, and the verdicts."""
+"""This module runs the study of He et al. 2026: all computations in order, and the verdicts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from hybridsim.analysis.study.settings import FULL, QUICK, SOURCE, Size
 from hybridsim.analysis.study.verdicts import Claim, plain
 from hybridsim.model import load
 
-# What each part takes of the whole, full and quick, in seconds on two processors: for the progress alone.
+# The time of each part, full and quick, in seconds on two processors; used for progress only.
 _SHARES = {
     "figures 6, 7: run times": (15.0, 15.0),
     "steady amplitude over a map, timed": (60.0, 12.0),
@@ -83,7 +83,7 @@ class Study:
         )
 
     def to_plain(self) -> dict[str, Any]:
-        """What the file of verdicts holds."""
+        """Return the content of the file of verdicts."""
         claims = self.claims
         return {
             "schema": 1,
@@ -102,18 +102,18 @@ class Study:
         }
 
     def to_json(self) -> str:
-        """The same as text."""
+        """Return the verdicts as JSON text."""
         return json.dumps(plain(self.to_plain()), indent=1, allow_nan=False) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Name, verdict and reason of each claim, for a table."""
+        """Return name, verdict and reason of each claim, for a table."""
         return [(claim.name, str(claim.verdict), claim.why) for claim in self.claims]
 
 
 def he2026(
     quick: bool = False, progress: Callable[[float, str], None] | None = None, workers: int | None = None
 ) -> Study:
-    """Run the whole study; quick: on coarser grids and shorter runs, the same claims."""
+    """Run the whole study; `quick` uses coarser grids and shorter runs for the same claims."""
     size = QUICK if quick else FULL
     pool = Pool({name: shares[quick] for name, shares in _SHARES.items()}, progress, workers)
     seconds: dict[str, float] = {}

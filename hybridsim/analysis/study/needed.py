@@ -1,4 +1,4 @@
-"""The step of `rk4-sign` and the zero-velocity interval of `rk4-dichotomy` that are within 1 % of the exact A."""
+"""This module finds the step of `rk4-sign` and the interval of `rk4-dichotomy` for an error of A below 1 %."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ TOLERANCE = 0.01
 STEPS = (150, 300, 600, 1200, 2400, 4800, 9600, 19200)
 EPS = tuple(1.28e-2 / 2.0**k for k in range(15))  # 8e-4 is the fifth, the last is 7.8e-7
 RATIO_SPAN, R_SPAN = (0.52, 1.5), (0.1, 2.0)
-# The runs begin on the exact orbit, so that nothing has to settle; the chatter takes some periods to spread.
+# The runs begin on the exact orbit and need not settle; the chatter takes some periods to spread.
 _PERIODS, _LAST = 60, 40
 
 
 @dataclass(frozen=True)
 class Needed:
-    """By method, over F0/N (rows) and r (columns): the coarsest setting from which on all periods are within 1 %.
+    """For each method, a map of the coarsest setting from which on all periods are within 1 %.
 
-    nan where the finest one is not enough.
+    nan if the finest one is not enough.
     """
 
     ratios: np.ndarray
@@ -34,7 +34,7 @@ class Needed:
     eps: dict[str, np.ndarray]
 
     def to_plain(self) -> dict[str, Any]:
-        """For the file of verdicts."""
+        """Return the entries for the file of verdicts."""
         result: dict[str, Any] = {"tolerance": TOLERANCE, "finest h0": STEPS[-1], "finest eps_v": EPS[-1]}
         for name, table in (*self.steps.items(), *self.eps.items()):
             published = STEPS_PER_PERIOD if name in self.steps else 8e-4
@@ -49,7 +49,7 @@ class Needed:
 
 
 def needed(size: Size, pool: Pool) -> Needed:
-    """Go through the settings at every point, from coarse to fine."""
+    """Try the settings at every point from coarse to fine."""
     ratios, r = np.linspace(*RATIO_SPAN, size.ladder_count), np.linspace(*R_SPAN, size.ladder_count)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     starts = pool.map(_start, points, 0.0, 0.05)
@@ -67,7 +67,7 @@ def needed(size: Size, pool: Pool) -> Needed:
 
 
 def _start(point: Point) -> tuple[float, tuple[float, float]]:
-    """The exact amplitude, and the state at the beginning of a period of the exact orbit."""
+    """Return the exact amplitude, and the state at the beginning of a period of the exact orbit."""
     solution = simulate(
         declared("dfcs"),
         (0.0, settling_periods(point) * point.period),

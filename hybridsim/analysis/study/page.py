@@ -1,4 +1,4 @@
-"""The page of the study: every claim with its verdict, figure and sentence, and what the paper could not show."""
+"""This module writes the page of the study: every claim with its verdict, figure and reason, and further results."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _PAIR = "Read as: method without stick; reading of the method with stick."
 
 
 def page(study: Study, image: Callable[[str], str]) -> str:
-    """The text; `image` gives the path of a picture by its name."""
+    """Return the text of the page; `image` returns the path of a picture by its name."""
     claims = study.claims
     parts = [_head(study, claims)]
     for claim in claims:
@@ -60,7 +60,7 @@ def page(study: Study, image: Callable[[str], str]) -> str:
 
 
 def _wrapped(block: str) -> str:
-    """A paragraph in lines of one length; headings, tables and pictures as they are."""
+    """Return a paragraph wrapped to equal lines; headings, tables and pictures are unchanged."""
     if block.startswith(("#", "|", "!")):
         return block
     return textwrap.fill(" ".join(block.split()), _WIDTH, break_long_words=False, break_on_hyphens=False)

@@ -1,4 +1,4 @@
-"""Work on many points at once: the kernels leave the interpreter's lock, so threads serve."""
+"""This module works on many points in parallel threads, which is effective because kernels release the GIL."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Result = TypeVar("Result")
 
 
 class Pool:
-    """Threads for whole batches, and how far all of the work has come.
+    """Threads for batches of work, with progress of the whole.
 
     Parameters
     ----------
-    shares : how much of the whole each part takes, by its name.
+    shares : the share of each part in the whole, by name.
     progress : called with the finished fraction and the name of the part.
-    workers : threads; as many as there are processors unless given.
+    workers : number of threads; by default the number of processors.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Pool:
         self.tell(0.0)
 
     def tell(self, fraction: float) -> None:
-        """Say how far the present part has come."""
+        """Report the progress within the present part."""
         if self._progress is not None and self._part:
             done = self._before + self._shares[self._part] * min(max(fraction, 0.0), 1.0)
             self._progress(done, self._part)
@@ -52,20 +52,21 @@ class Pool:
         begin: float = 0.0,
         end: float = 1.0,
     ) -> list[Result]:
-        """function(item) for every item, in their order; begin and end: which stretch of the part this is.
+        """Return function(item) for every item in order; begin and end give the interval of progress in the part.
 
-        An exception stops what has not begun. Progress is told from the calling thread, which may interrupt there.
+        An exception stops items that have not begun. Progress is reported from the calling thread, which may interrupt.
         """
         waiting: Sequence[Item] = list(items)
         with ThreadPoolExecutor(self.workers) as threads:
             futures: list[Future[Result]] = [threads.submit(function, item) for item in waiting]
             count = len(futures)
             try:
-                # to wait for the next of all that are open, again and again, goes as the square of their number
+                # waiting again and again for the next of all open futures would cost the square of their
+                # number
                 for done, future in enumerate(as_completed(futures), start=1):
                     future.result()
                     self.tell(begin + (end - begin) * done / count)
-            except BaseException:  # Ctrl-C above all: no more is begun, and it is raised again
+            except BaseException:  # on Ctrl-C too, no more items are begun and the exception is raised again
                 threads.shutdown(wait=True, cancel_futures=True)
                 raise
         return [future.result() for future in futures]

@@ -1,6 +1,6 @@
-"""Amplitude and energy over a whole map: time and error of `exact`, of the published method, and of shooting.
+"""This module times amplitude and energy over a whole map, for `exact`, the published method and shooting.
 
-`exact` takes the map as `hybridsim.sweep` takes it, the others point by point on the same threads.
+`exact` computes the map with `hybridsim.sweep`; the others compute point by point on the same threads.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Entry:
-    """One contestant: seconds a point on all threads together, points timed, relative errors of A and E at a sample."""
+    """One method: seconds per point on all threads, points timed, and relative errors of A and E at a sample."""
 
     seconds: float
     points: int
@@ -34,7 +34,7 @@ class Entry:
     E: np.ndarray
 
     def to_plain(self) -> dict[str, Any]:
-        """Figures for the file."""
+        """Return the entries for the file of verdicts."""
         return {
             "milliseconds a point": 1e3 * self.seconds,
             "points timed": self.points,
@@ -49,13 +49,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class Race:
-    """The contestants by name, over a map of side x side points."""
+    """The methods by name, over a map of side x side points."""
 
     side: int
     entries: dict[str, Entry]
 
     def to_plain(self) -> dict[str, Any]:
-        """For the file of verdicts."""
+        """Return the entries for the file of verdicts."""
         base = self.entries["exact"].seconds
         return {
             "map": {"F0/N": RATIO_SPAN, "r": R_SPAN, "points": [self.side, self.side]},
@@ -68,7 +68,7 @@ class Race:
 
 
 def race(size: Size, pool: Pool) -> Race:
-    """Time all on the same threads: `exact` on the whole map, the others on a random sample of its points."""
+    """Time all methods on the same threads: `exact` on the whole map, the others on a random sample of its points."""
     side = size.race_count
     grid = [
         [Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)]
@@ -77,7 +77,7 @@ def race(size: Size, pool: Pool) -> Race:
     points = [point for row in grid for point in row]
     chosen = np.random.default_rng(_SEED).choice(len(points), size.race_sample, replace=False)
     sample = [points[i] for i in chosen]
-    _map(grid[:2], pool, 0.0, 0.0)  # what is compiled or cached once is no part of either
+    _map(grid[:2], pool, 0.0, 0.0)  # one-time compiling and caching does not count
     for variant in (LITERAL, ZEROED):
         by_steps(points[-1], variant, 2, 1)
     entries: dict[str, Entry] = {}
@@ -93,7 +93,7 @@ def race(size: Size, pool: Pool) -> Race:
             len(sample),
             [(row.amplitude, row.energy) for row in rows],
         )
-    # which of them meets what is not compiled yet is not known before
+    # any thread may meet code that is not compiled yet
     pool.map(_by_shooting, sample, 0.8, 0.87)
     seconds, orbits = _timed(pool, _by_shooting, sample, 0.87, 0.95)
     found["shooting"] = (seconds, len(sample), orbits)
@@ -106,7 +106,7 @@ def race(size: Size, pool: Pool) -> Race:
 def _map(
     rows: list[list[Point]], pool: Pool, begin: float, end: float
 ) -> tuple[float, list[tuple[float, float]]]:
-    """Seconds a point, and A and E of each, of the last of so many periods from rest."""
+    """Return seconds per point, and A and E of each point in the last of many periods from rest."""
 
     def tell(done: int, total: int, _: str) -> None:
         pool.tell(begin + (end - begin) * done / total)

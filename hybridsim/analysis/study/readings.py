@@ -1,4 +1,4 @@
-"""Every reading of the published method at three points: which of the choices that the paper leaves open matter?"""
+"""This module runs every reading of the published method at three points, to find the choices that matter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Readings:
     table: dict[str, dict[str, tuple[float, float, float]]]
 
     def to_plain(self) -> dict[str, Any]:
-        """For the file of verdicts."""
+        """Return the entries for the file of verdicts."""
         return {
             name: {
                 place: dict(zip(("least", "mean", "greatest"), values, strict=True))
@@ -37,7 +37,7 @@ class Readings:
 
 
 def readings(size: Size, pool: Pool) -> Readings:
-    """Run them all."""
+    """Run all readings at all places."""
     variants = (*SIGNS, *DICHOTOMIES)
     truth = {place: exact(point).amplitude for place, point in PLACES.items()}
     tasks = list(itertools.product(variants, PLACES))

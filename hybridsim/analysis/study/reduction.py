@@ -1,4 +1,4 @@
-"""Figures 8 and 9: do (r, N, F0) reduce to (r, F0/N)? For which methods and models, and to how many digits."""
+"""This module reproduces figures 8 and 9: whether (r, N, F0) reduce to (r, F0/N), and how accurately."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from hybridsim.simulate import simulate
 
 R = 0.6
 RATIOS = (0.6, 0.8, 1.0, 1.2, 1.5)
-# N; no two in the ratio of a power of two, for then all roundings, and the chatter, would be the same
+# N; no two are in the ratio of a power of two, because then all roundings, and the chatter, would be equal
 FORCES = (3.0, 7.0, 15.0, 30.0, 50.0, 90.0, 170.0, 400.0)
-# The paper's own example has F0 = 30 N; it does not say how far it goes. These are the forces that it may have used.
+# The paper's own example has F0 = 30 N, and it does not state its range. These are plausible limits.
 _USUAL = (15.0, 170.0)
 METHODS: tuple[Variant, ...] = (*SIGNS, LITERAL, ZEROED)
 EXACT, STRIBECK = "exact", "Stribeck law"
@@ -37,9 +37,9 @@ STRIBECK_RATIOS, _STRIBECK_PERIODS = (
     (0.8, 1.2),
     60,
 )
-_CONSTANT = 0.01  # what a picture shows as a constant
-_ROUNDING = 1e-10  # a few hundred periods of roundings; friction's own tolerance of nothing else
-# Steady motions over the whole plane for the test to rounding: a lattice that repeats no value
+_CONSTANT = 0.01  # relative variation that looks constant in a picture
+_ROUNDING = 1e-10  # rounding over a few hundred periods
+# Steady motions over the whole plane for the test to rounding: a lattice that repeats no value.
 _SAMPLES = 40
 _SCALES = (40.0, 7.3, 1234.5)  # N
 
@@ -56,7 +56,7 @@ class Reduction:
     rounding: dict[str, float]
 
     def spread(self, method: str, quantity: str = "A", usual: bool = False) -> np.ndarray:
-        """(max - min)/mean over the forces, for each ratio."""
+        """Return (max - min)/mean over the forces, for each ratio."""
         table = (self.A if quantity == "A" else self.E)[method]
         if usual:
             table = table[:, [_USUAL[0] <= force <= _USUAL[1] for force in FORCES]]
@@ -64,17 +64,17 @@ class Reduction:
 
 
 def free_amplitude(point: Point) -> float:
-    """A0: the steady amplitude without friction, in metres."""
+    """Return A0, the steady amplitude without friction, in metres."""
     return point.force / STIFFNESS * linear_amplitude(point.r, DAMPING_RATIO)
 
 
 def free_energy(point: Point) -> float:
-    """E0: the integral of x^2 over a period without friction."""
+    """Return E0, the integral of x^2 over a period without friction."""
     return 0.5 * point.period * free_amplitude(point) ** 2
 
 
 def reduction(size: Size, pool: Pool) -> Reduction:
-    """Run everything over the forces at fixed F0/N."""
+    """Run all methods over the forces at fixed F0/N."""
     points = [Point(R, ratio, force / ratio) for ratio in RATIOS for force in FORCES]
     shape = (len(RATIOS), len(FORCES))
     tasks = list(itertools.product(METHODS, points))
@@ -115,7 +115,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
 
 
 def _stribeck(point: Point) -> ExactState:
-    """The same with a coefficient that falls with the velocity: that velocity is a scale of its own."""
+    """Return the exact state with a Stribeck law, whose velocity is an additional scale."""
     solution = simulate(
         declared("dfcs-stribeck"),
         (0.0, _STRIBECK_PERIODS * point.period),
@@ -127,7 +127,7 @@ def _stribeck(point: Point) -> ExactState:
 
 
 def claim(found: Reduction) -> Claim:
-    """Figures 8 and 9."""
+    """Judge the claim of figures 8 and 9."""
     ours = {
         name: {
             "spread of A/A0": float(found.spread(name).max()),

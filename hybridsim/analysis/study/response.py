@@ -1,4 +1,4 @@
-"""Figures 3, 12 and 13: the motion and the friction force over two periods, and the harmonics of the motion."""
+"""This module reproduces figures 3, 12 and 13: motion and friction force over two periods, and harmonics."""
 
 from __future__ import annotations
 
@@ -30,21 +30,23 @@ RUNS: tuple[Variant, ...] = (*SIGNS, LITERAL, ZEROED)
 EXACT = "exact"
 
 _SHOWN = 2  # periods drawn
-_HARMONIC_PERIODS = 16  # the spectrum tells fractions of w down to 1/16
-_SAMPLES = 4096  # a period; the 25th harmonic of a smooth-by-parts motion is good to 1e-6 of the first
+_HARMONIC_PERIODS = 16  # the spectrum resolves fractions of w down to 1/16
+_SAMPLES = 4096  # per period; the 25th harmonic of a piecewise smooth motion is accurate to 1e-6 of the first
 _HIGHEST = 15
-_SIGNIFICANT = 0.01  # a harmonic of x of that share of the first is called significant
-_NOTHING = 1e-3  # and of that share is called none: the paper's own criterion of convergence
+_SIGNIFICANT = 0.01  # relative to the first; a larger harmonic of x counts as significant
+_NOTHING = (
+    1e-3  # relative to the first; a smaller one counts as zero, by the paper's own criterion of convergence
+)
 
 
 @dataclass(frozen=True)
 class Response:
-    """Displacement and friction force over the shown periods, and what the last sixteen say of the spectrum.
+    """Displacement and friction force over the shown periods, and the spectrum of the last sixteen.
 
     harmonics : |c_k|/|c_1| of x for k = 0, 1, 2, ...
     between : the largest line between whole multiples of w, over |c_1|.
     repeats : the largest change of x from one period to the next, over its amplitude.
-    amplitude, stick : mean amplitude of these periods, and the share of time that they spend in stick.
+    amplitude, stick : mean amplitude of these periods, and the fraction of time in stick.
     jumps : direct reversals of the friction force between its limits, per period; two in a motion without stops.
     """
 
@@ -60,7 +62,7 @@ class Response:
 
 
 def responses(point: Point, size: Size, pool: Pool) -> dict[str, Response]:
-    """The motion at a point by every method."""
+    """Compute the motion at a point by every method."""
     names = [EXACT, *(v.name for v in RUNS)]
     runs = (None, *RUNS)
     return dict(zip(names, pool.map(lambda v: _response(point, v, size), runs), strict=True))
@@ -106,7 +108,7 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
 
 
 def claim_figure_3(runs: dict[str, Response]) -> Claim:
-    """Periodic with the forcing's period, odd harmonics only, high ones significant."""
+    """Judge the claim of a periodic motion with odd harmonics only and significant high ones."""
     ours = {name: _spectrum(run) for name, run in runs.items() if name != EXACT}
     exact = _spectrum(runs[EXACT])
     keeps = [name for name, row in ours.items() if row["holds"]]
@@ -146,7 +148,7 @@ def _spectrum(run: Response) -> dict[str, float | bool]:
 
 
 def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
-    """A_D = 15 %, and a friction force that jumps around zero velocity."""
+    """Judge the claim of A_D = 15 %, and of a friction force that jumps around zero velocity."""
     ours, exact, closest = _deviations(runs, 0.15)
     place = PLACES.index((FIGURE_12.ratio, FIGURE_12.r))
     falls = {v.name: study.by_step[v.name]["A"][place] for v in SIGNS}
@@ -179,7 +181,7 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
 
 
 def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -> Claim:
-    """A_D = 2 %; less stick, less deviation."""
+    """Judge the claim of A_D = 2 %, and of less deviation with less stick."""
     ours, exact, closest = _deviations(runs, 0.02)
     greatest = max(row["A_D"] for row in (*ours.values(), *exact["deviation without stick"].values()))
     near = abs(ours[closest]["A_D"] - 0.02) <= 0.01
@@ -208,7 +210,7 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
 def _deviations(
     runs: dict[str, Response], published: float
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Any], str]:
-    """Eq. 9 for every pair of readings, against the exact motion, and which pair is nearest to the paper."""
+    """Return Eq. 9 for every pair of readings and against the exact motion, and the pair nearest to the paper."""
     ours = {
         f"{sign.name}; {with_.name}": {
             "A_D": abs(runs[sign.name].amplitude / runs[with_.name].amplitude - 1.0),

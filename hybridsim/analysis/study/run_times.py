@@ -1,4 +1,4 @@
-"""Figures 6 and 7: what a smaller zero-velocity interval costs, and what stick costs, measured as the paper does."""
+"""This module reproduces figures 6 and 7: the costs of a smaller zero-velocity interval, and of stick."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WITH = (LITERAL, ZEROED)
 
 @dataclass(frozen=True)
 class Cost:
-    """Mean seconds of a run, and how often the right-hand side was evaluated."""
+    """Mean seconds of a run, and its number of right-hand sides."""
 
     seconds: float
     evaluations: int
@@ -46,17 +46,17 @@ class RunTimes:
     repeats: int
 
     def t_d(self, method: str, case: str) -> list[float]:
-        """(t' - t)/t over the intervals, Eq. 7."""
+        """Return (t' - t)/t over the intervals, Eq. 7."""
         costs = self.by_eps[method][case]
         return [cost.seconds / costs[0].seconds - 1.0 for cost in costs]
 
     def t_D(self, with_: str, without: str, case: str) -> float:
-        """(t2 - t1)/t1, Eq. 8."""
+        """Return (t2 - t1)/t1, Eq. 8."""
         return self.by_method[with_][case].seconds / self.by_method[without][case].seconds - 1.0
 
 
 def run_times(size: Size, pool: Pool) -> RunTimes:
-    """Time one run after the other, on one thread; what is compared is timed in turn, so a busy moment hits all."""
+    """Time the runs on one thread, alternating the compared ones, so that disturbances affect all alike."""
     total = 2 * len(CASES)
     by_eps: dict[str, dict[str, tuple[Cost, ...]]] = {v.name: {} for v in WITH}
     methods: tuple[Variant | None, ...] = (*SIGNS, *WITH, None)
@@ -80,7 +80,7 @@ def _name(variant: Variant | None) -> str:
 def _mean(point: Point, jobs: Sequence[tuple[Variant | None, float]], size: Size) -> list[Cost]:
     runs: list[list[Cost]] = [[] for _ in jobs]
     collecting = gc.isenabled()
-    gc.disable()  # a collection in one run and not in the next is no property of the method
+    gc.disable()  # a collection in some of the runs would distort the comparison
     try:
         for _ in range(size.repeats + 1):
             for k, (variant, eps) in enumerate(jobs):
@@ -88,7 +88,7 @@ def _mean(point: Point, jobs: Sequence[tuple[Variant | None, float]], size: Size
     finally:
         if collecting:
             gc.enable()
-    # the first run of each pays for caches
+    # the first run of each fills the caches
     return [Cost(fmean(c.seconds for c in row[1:]), row[-1].evaluations) for row in runs]
 
 
@@ -110,7 +110,7 @@ def _run(point: Point, variant: Variant | None, eps: float, periods: int) -> Cos
 
 
 def claim_figure_6(times: RunTimes) -> Claim:
-    """Run time grows fast as eps_v falls."""
+    """Judge the claim that run time grows fast as eps_v falls."""
     ours: dict[str, dict[str, Any]] = {}
     for v in WITH:
         last = [times.t_d(v.name, case)[-1] for case in CASES]
@@ -147,7 +147,7 @@ def claim_figure_6(times: RunTimes) -> Claim:
 
 
 def claim_figure_7(times: RunTimes) -> Claim:
-    """Stick costs more than 225 % run time."""
+    """Judge the claim that stick costs more than 225 % run time."""
     ours: dict[str, dict[str, Any]] = {}
     for with_ in WITH:
         for sign in SIGNS:

@@ -1,4 +1,4 @@
-"""The system and the settings of He et al. 2026, and how large the study of them is made."""
+"""This module holds the system and the settings of He et al. 2026, and the sizes of the study."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ MASS, DAMPING, STIFFNESS, MU = 0.2, 5.65, 1e5, 0.5
 NATURAL_FREQUENCY = math.sqrt(STIFFNESS / MASS)
 DAMPING_RATIO = DAMPING / (2.0 * math.sqrt(STIFFNESS * MASS))
 
-NORMAL = 40.0  # N: the normal load wherever the paper names F0/N alone; the scale of all runs
-STEPS_PER_PERIOD, EPS_V = 1200, 8e-4  # what the paper settles on
-EPS_V_SMALL = 1e-6  # what it takes while it varies the step
+NORMAL = 40.0  # N: the normal load if the paper gives F0/N alone; the scale of all runs
+STEPS_PER_PERIOD, EPS_V = 1200, 8e-4  # the paper's final choice
+EPS_V_SMALL = 1e-6  # the paper's choice while it varies the step
 
 
 @dataclass(frozen=True)
@@ -27,17 +27,17 @@ class Point:
 
     @property
     def omega(self) -> float:
-        """Circular frequency of the forcing in rad/s."""
+        """Angular frequency of the forcing in rad/s."""
         return self.r * NATURAL_FREQUENCY
 
     @property
     def period(self) -> float:
-        """Its period in seconds."""
+        """Period of the forcing in seconds."""
         return 2.0 * math.pi / self.omega
 
     @property
     def force(self) -> float:
-        """Its amplitude F0 in newtons."""
+        """Amplitude F0 of the forcing in newtons."""
         return self.ratio * self.normal
 
     @property
@@ -53,7 +53,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to read the published method where the paper leaves it open."""
+    """One reading of the published method, where the paper leaves choices open."""
 
     name: str
     integrator: str
@@ -69,7 +69,7 @@ def _dichotomy(velocity: str, release: str, friction: str, after: str) -> Varian
     return Variant(name, "rk4-dichotomy", tuple(options.items()))
 
 
-# every reading; the first is Eq. 4 to the letter
+# Every reading; the first is Eq. 4 to the letter.
 DICHOTOMIES = tuple(
     _dichotomy(velocity, release, friction, after)
     for velocity in ("kept", "zero")
@@ -77,7 +77,8 @@ DICHOTOMIES = tuple(
     for release in ("step", "located")
     for after in ("full-step", "rest-of-step")
 )
-# those that differ by more than their spread: in the velocity of a sticking body, and when the force is chosen
+# Readings that differ by more than their spread: in the velocity of a sticking body, and in the time of force
+# evaluation.
 MATTERING = tuple(v for v in DICHOTOMIES if "release step" in v.name and "full-step" in v.name)
 LITERAL = DICHOTOMIES[0]
 ZEROED = next(v for v in MATTERING if v.name.startswith("v zero"))
@@ -88,17 +89,16 @@ SIGNS = tuple(
 
 @dataclass(frozen=True)
 class Size:
-    """How much is computed.
+    """The amount of computation.
 
     Parameters
     ----------
-    periods, last : periods of a run of a fixed-step method, and over how many at its end A and E are taken.
+    periods, last : periods of a run of a fixed-step method, and number of periods at its end for A and E.
     ratios, r : grid of Figures 10 and 11.
-    map_count : points along each side of the maps of what is true.
-    race_count, race_sample : points along each side of the map that is timed, and how many of them the published
-        method is timed on.
-    ladder_count : points along each side of the maps of the setting that is needed.
-    timed_periods, repeats : length of a timed run, and the number of runs of which the mean is taken; five there.
+    map_count : points along each side of the maps of the exact motion.
+    race_count, race_sample : points along each side of the timed map, and size of the sample for the published method.
+    ladder_count : points along each side of the maps of the needed setting.
+    timed_periods, repeats : length of a timed run, and number of runs for the mean; the paper uses five.
     """
 
     name: str
@@ -121,7 +121,7 @@ def _range(first: float, last: float, step: float) -> tuple[float, ...]:
 
 
 def _intervals(first: float, step: float) -> tuple[float, ...]:
-    """Powers of ten down to 1e-6, and the paper's own choice among them."""
+    """Return powers of ten down to 1e-6, with the paper's own choice among them."""
     return tuple(sorted([*(10.0**k for k in _range(first, -6.0, -step)), EPS_V], reverse=True))
 
 

@@ -1,4 +1,4 @@
-"""Steady amplitude and vibration energy: of the exact motion, and period by period of a fixed-step run."""
+"""This module computes steady amplitude and energy, of the exact motion and per period of a fixed-step run."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 CONTACT = "f"
-# The free vibration decays by exp(-zeta wn t): exp(-30) of anything is below rounding. Friction only helps.
+# The free vibration decays by exp(-zeta wn t); exp(-30) is below rounding. Friction only adds decay.
 _DECAYS = 30.0
 _LEAST_PERIODS = 20
-# Between two events the motion is one sine and one decaying vibration over at most half of a period of the slower:
-# Gauss's rule with so many nodes is exact to rounding.
+# Between two events the motion is one sine and one decaying vibration over at most half a period of the
+# slower one. Gauss's rule with this many nodes is exact to rounding.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -39,18 +39,18 @@ class Periods:
 
     @property
     def amplitude(self) -> float:
-        """Mean over the periods."""
+        """Mean amplitude over the periods."""
         return float(self.A.mean())
 
     @property
     def energy(self) -> float:
-        """Mean over the periods."""
+        """Mean energy over the periods."""
         return float(self.E.mean())
 
 
 @dataclass(frozen=True)
 class ExactState:
-    """The exact steady motion: amplitude, energy, share of the period in stick, stops a period, how periodic."""
+    """The exact steady motion: amplitude, energy, stick fraction, stops per period, periodicity error."""
 
     amplitude: float
     energy: float
@@ -61,17 +61,17 @@ class ExactState:
 
 @cache
 def declared(name: str) -> Model:
-    """A packaged model, read once for all runs."""
+    """Return a packaged model, read once for all runs."""
     return load(name)
 
 
 def settling_periods(point: Point) -> int:
-    """Periods of the forcing after which the free vibration has decayed below rounding."""
+    """Return the number of periods after which the free vibration has decayed below rounding."""
     return max(_LEAST_PERIODS, math.ceil(_DECAYS * point.r / (2.0 * math.pi * DAMPING_RATIO)))
 
 
 def exact(point: Point, periods: int | None = None) -> ExactState:
-    """The steady motion by the integrator `exact`, settled to rounding unless the number of periods is given."""
+    """Compute the steady motion with `exact`, settled to rounding by default."""
     count = settling_periods(point) if periods is None else periods
     solution = simulate(
         declared("dfcs"),
@@ -84,7 +84,7 @@ def exact(point: Point, periods: int | None = None) -> ExactState:
 
 
 def measured(solution: Solution, point: Point) -> ExactState:
-    """What the last period of a run with located events says; x has its extremes at events, where v is zero."""
+    """Measure the last period of a run with located events; x has its extremes at events, where v is zero."""
     x = solution.y[0]
     amplitude = 0.5 * float(x.max() - x.min())
     intervals = solution.modes[CONTACT]
@@ -107,7 +107,7 @@ def by_steps(
     steps: int = STEPS_PER_PERIOD,
     eps_v: float | None = None,
 ) -> Periods:
-    """A and E of each of the last periods of a run by a fixed-step method."""
+    """Return A and E of each of the last periods of a run with a fixed-step method."""
     return periods_of(solve_by_steps(point, variant, periods, last, steps, eps_v), point, periods, last)
 
 
@@ -119,7 +119,7 @@ def solve_by_steps(
     steps: int = STEPS_PER_PERIOD,
     eps_v: float | None = None,
 ) -> Solution:
-    """A run of a fixed-step method from rest, of which the last periods are kept."""
+    """Run a fixed-step method from rest, and keep the last periods."""
     options: dict[str, Any] = dict(variant.options)
     if eps_v is not None:
         options["eps_v"] = eps_v
@@ -135,13 +135,13 @@ def solve_by_steps(
 
 
 def periods_of(solution: Solution, point: Point, periods: int, last: int) -> Periods:
-    """A and E period by period, from the steps as the paper has them: extremes of x at the steps."""
+    """Return A and E per period from the steps as in the paper: extremes of x at the steps."""
     t, (x, v) = solution.t, solution.y
     edges = point.period * np.arange(periods - last, periods + 1)
     first = np.searchsorted(t, edges[:-1] - 1e-9 * point.period)
     A = 0.5 * (np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first))
     h = np.diff(t)
-    # the trapezoidal rule with its end correction: fourth order, as the steps are
+    # The trapezoidal rule with end correction has order four, like the steps.
     parts = 0.5 * h * (x[1:] ** 2 + x[:-1] ** 2) - h**2 / 6.0 * (x[1:] * v[1:] - x[:-1] * v[:-1])
     E = np.diff(np.interp(edges, t, np.concatenate([[0.0], np.cumsum(parts)])))
     return Periods(A, E)

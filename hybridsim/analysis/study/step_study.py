@@ -1,4 +1,4 @@
-"""What the step does to the motion without stick, and the interval to the motion with it: artefact or physics?"""
+"""This module varies the step without stick, and the interval with stick, to separate artefacts from physics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.analysis.study.pool import Pool
 from hybridsim.analysis.study.settings import MATTERING, SIGNS, STEPS_PER_PERIOD, Point, Size
 from hybridsim.analysis.study.steady import ExactState, by_steps, exact
 
-# Along the published ridge, the paper's two maxima among them, and its two example points.
+# Places along the published ridge, including the paper's two maxima, and its two example points.
 PLACES = (
     (0.54, 0.55),
     (0.54, 0.58),
@@ -27,7 +27,7 @@ PLACES = (
 )
 STEPS = (300, 600, 1200, 2400, 4800, 9600)
 EPS = (8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5)
-# over three halvings of the step a first-order error falls to an eighth; noise and all, to less than half
+# Over three halvings of the step a first-order error falls to an eighth; with noise, to less than half.
 _SHRINKS = 0.5
 
 
@@ -46,22 +46,22 @@ class StepStudy:
     worst: dict[str, np.ndarray]
 
     def along(self, method: str, quantity: str) -> np.ndarray:
-        """Root mean square along the ridge at each step."""
+        """Return the root mean square along the ridge at each step."""
         return np.asarray(np.sqrt((self.by_step[method][quantity] ** 2).mean(axis=0)))
 
     def along_eps(self, method: str, quantity: str) -> np.ndarray:
-        """The same at each zero-velocity interval."""
+        """Return the root mean square along the ridge at each zero-velocity interval."""
         return np.asarray(np.sqrt((self.by_eps[method][quantity] ** 2).mean(axis=0)))
 
     def shrinks(self, quantity: str) -> bool:
-        """Whether the deviation along the ridge goes with the step, in every reading."""
+        """Return whether the deviation along the ridge falls with the step in every reading."""
         first = STEPS.index(STEPS_PER_PERIOD)
         return all(
             self.along(v.name, quantity)[-1] < _SHRINKS * self.along(v.name, quantity)[first] for v in SIGNS
         )
 
     def sentence(self, quantity: str) -> str:
-        """The step study in half a sentence."""
+        """Return the result of the step study as part of a sentence."""
         first = STEPS.index(STEPS_PER_PERIOD)
         values = [self.along(v.name, quantity) for v in SIGNS]
         parts = " and ".join(f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
@@ -72,7 +72,7 @@ class StepStudy:
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:
-        """For the file of verdicts."""
+        """Return the entries for the file of verdicts."""
         return {
             "places": [{"F0/N": a, "r": b} for a, b in PLACES],
             "h0": list(STEPS),

@@ -1,4 +1,4 @@
-"""The paper's conclusion: does the share of the period spent in stick decide how much it matters to leave stick out?"""
+"""This module judges the paper's conclusion that the fraction of time in stick decides the deviation."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from hybridsim.analysis.study.step_study import STEPS, StepStudy
 from hybridsim.analysis.study.truth import Truth
 from hybridsim.analysis.study.verdicts import Claim, Verdict
 
-_STRONG = 0.5  # a rank correlation above it is called one
+_STRONG = 0.5  # a larger rank correlation counts as a correlation
 
 
 def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
-    """The conclusion in the text."""
+    """Judge the conclusion in the text."""
     from scipy.stats import spearmanr
 
     def row(pair: tuple[str, str]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What is true, whatever the step: where the motion sticks and stops, and how far off the simpler models are."""
+"""This module computes exact results on a map: where the motion sticks and stops, and errors of simpler models."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Truth:
     """Exact steady states over F0/N (rows) and r (columns), and the amplitudes of the simpler models.
 
     boundary : (r, F0/N) above which there are no stops, from the closed form.
-    holds : where the closed form without stops says that it holds.
+    holds : the points at which the closed form without stops is valid.
     """
 
     ratios: np.ndarray
@@ -39,13 +39,13 @@ class Truth:
     boundary: tuple[np.ndarray, np.ndarray]
 
     def deviation(self, model: str) -> np.ndarray:
-        """|A of the model - A|/A; nan where nothing moves or the model has no answer."""
+        """Return |A of the model - A|/A; nan if nothing moves or the model has no answer."""
         with np.errstate(divide="ignore", invalid="ignore"):
             value = np.abs(self.models[model] - self.amplitude) / self.amplitude
         return np.asarray(np.where(self.amplitude > 0.0, value, np.nan))
 
     def to_plain(self) -> dict[str, Any]:
-        """For the file of verdicts: figures, not the maps."""
+        """Return the numbers for the file of verdicts, without the maps."""
         free = self.stick == 0.0
         moving = self.amplitude > 0.0
         off = self.deviation(NO_STOPS)
@@ -67,7 +67,7 @@ class Truth:
         }
 
     def harmless(self, tol: float) -> float:
-        """The least stick fraction at which the motion without stops is farther off than `tol`."""
+        """Return the least stick fraction at which the error of the motion without stops exceeds `tol`."""
         off = self.deviation(NO_STOPS)
         bad = (self.amplitude > 0.0) & ~(off <= tol)
         return float(self.stick[bad].min()) if bad.any() else 1.0

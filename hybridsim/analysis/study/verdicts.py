@@ -1,4 +1,4 @@
-"""A claim of a paper, what came of it here, and the verdict, ready for a machine to read."""
+"""This module defines a claim of a paper, our results for it, and the verdict, in machine-readable form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class Verdict(Enum):
-    """What became of a claim."""
+    """The verdict on a claim."""
 
     REPRODUCED = "reproduced"
     SHAPE = "reproduced in shape only"
@@ -29,13 +29,13 @@ class Claim:
     ----------
     name : short and unique, such as "figure 10".
     figure : the figures of the paper that it is read from.
-    claim : in words.
-    paper : the paper's own figures.
-    ours : ours for every variant that the paper leaves open.
-    closest : the variant that comes nearest to the paper.
+    claim : its text.
+    paper : the paper's own numbers.
+    ours : our numbers for every variant that the paper leaves open.
+    closest : the variant that is nearest to the paper.
     exact : the exact counterpart.
-    why : the verdict in one sentence.
-    step_study : where the verdict is an artefact of discretisation, what the step does to it.
+    why : the reason for the verdict in one sentence.
+    step_study : for an artefact of discretisation, the effect of the step on it.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Claim:
     step_study: Mapping[str, Any] = field(default_factory=dict)
 
     def to_plain(self) -> dict[str, Any]:
-        """What JSON can hold."""
+        """Return the claim as plain values for JSON."""
         plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
         plain["verdict"] = str(self.verdict)
         if not self.step_study:
@@ -59,7 +59,7 @@ class Claim:
 
 
 def plain(value: Any) -> Any:
-    """The same in lists, mappings, numbers of six digits and text; what is no number is None, as JSON has it."""
+    """Return a value as lists, mappings, text and numbers of six digits; NaN becomes None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):  # numpy arrays and numbers

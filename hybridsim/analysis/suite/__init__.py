@@ -1,4 +1,4 @@
-"""The comparison suite: scenes that see every kind of error, by all integrators, on one page."""
+"""This package compares all integrators on scenes that show every kind of error."""
 
 from hybridsim.analysis.suite.result import SuiteComparison
 from hybridsim.analysis.suite.running import compare_suite

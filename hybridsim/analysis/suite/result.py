@@ -1,4 +1,4 @@
-"""The result of the comparison suite: a comparison for each scene, and what follows from all of them."""
+"""This module defines the result of the comparison suite: a comparison per scene, and conclusions from all."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class SceneResult:
     comparison: Comparison
 
     def cheapest(self, accuracy: float) -> Row | None:
-        """The row of least wall time whose states are within an accuracy over the whole run, in the right modes."""
+        """Return the fastest row with the right modes whose states are within an accuracy over the whole run."""
         good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
-        # others carry the cost of warming up
+        # other rows include the time of warming up
         timed = [row for row in good if row.cost and row.cost.repetitions]
         good = timed or good
         return min(good, key=lambda row: row.cost.wall_time if row.cost else 0.0, default=None)
@@ -48,16 +48,16 @@ class SceneResult:
 
 @dataclass(frozen=True)
 class SuiteComparison(Readable):
-    """All integrators on all scenes.
+    """The comparison of all integrators on all scenes.
 
     Parameters
     ----------
     results : tuple of SceneResult
         One for each scene, in order.
     repeat : int
-        Timed repetitions that were asked for.
+        The requested number of timed repetitions.
     budget, seconds : float
-        What the suite was allowed to take, and what it took.
+        The time budget of the suite, and the time it took.
 
     Examples
     --------
@@ -76,11 +76,11 @@ class SuiteComparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the lines, in order."""
+        """The names of the lines, in order."""
         return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
 
     def verdicts(self) -> dict[str, dict[str, Verdict]]:
-        """Scene -> line -> verdict at a common tolerance."""
+        """Return scene -> line -> verdict at a common tolerance."""
         return {
             result.scene.name: {
                 label: verdict(result.scene, [row for row in result.comparison.rows if row.label == label])
@@ -90,7 +90,7 @@ class SuiteComparison(Readable):
         }
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
-        """Scene -> accuracy -> the cheapest row that reaches it; None where none does."""
+        """Return scene -> accuracy -> the cheapest row that reaches it, or None."""
         accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}
@@ -99,7 +99,7 @@ class SuiteComparison(Readable):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was not run, or not as often as was asked, and why; and what is doubtful about a reference."""
+        """Notes on runs that were left out or timed less often, and on doubtful references."""
         left_out: dict[str, dict[str, list[str]]] = {}
         for result in self.results:
             for row in result.comparison.rows:
@@ -125,18 +125,18 @@ class SuiteComparison(Readable):
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """Versions and machine; the models' hashes are in the comparisons."""
+        """Versions and machine; the hashes of the models are in the comparisons."""
         facts = self.results[0].comparison.provenance
         return {name: value for name, value in facts.items() if not name.startswith("model")}
 
     def table(self) -> str:
-        """Who is right, what is cheapest, how well the references are known, and what is missing, as text."""
+        """Return the results as text: correct runs, cheapest runs, uncertainty of the references, and notes."""
         from hybridsim.analysis.suite.table import table
 
         return table(self)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one line a run of any scene; times in the model's unit, wall times in seconds."""
+        """Write one line per run of any scene; times are in the model's unit, wall times in seconds."""
         records = [
             {"scene": result.scene.name, **record, "options": json.dumps(record["options"], default=str)}
             for result in self.results
@@ -148,7 +148,7 @@ class SuiteComparison(Readable):
             writer.writerows(records)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as plain values."""
+        """Return all results as plain values."""
         return {
             "repeat": self.repeat,
             "budget": self.budget,
@@ -179,7 +179,7 @@ class SuiteComparison(Readable):
         }
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Everything, with versions and machine, as text; written where a path is given."""
+        """Return all results as JSON text, with versions and machine; write it if a path is given."""
         text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")

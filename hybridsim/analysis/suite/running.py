@@ -1,4 +1,4 @@
-"""Runs the comparison suite within a budget of time."""
+"""This module runs the comparison suite within a time budget."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.model import load
 
 BUDGET = 600.0
-# Of the budget, what the reference of one scene may take: all of them together then leave most of it to the runs.
+# The share of the budget for the reference of one scene; most of the budget is then left for the runs.
 _REFERENCE_SHARE = 1 / 20
 
 
-_RUNNING = 0.95  # what is left is for writing and drawing
+_RUNNING = 0.95  # the rest of the budget is for writing and drawing
 
 
 class _TooSlow(Exception):
-    """A reference has used up its time."""
+    """A reference has passed its time limit."""
 
 
 @refusing
@@ -44,27 +44,27 @@ def compare_suite(
     budget: float = BUDGET,
     progress: Progress | None = None,
 ) -> SuiteComparison:
-    """Run the scenes of the suite with several integrators at several settings: who is right, and at what cost.
+    """Run the scenes of the suite with several integrators at several settings, and compare correctness and cost.
 
-    Every scene has a reference that owes nothing to the engine, a closed form or a motion in multiple precision,
-    and a second one by the most accurate integrator; the result says how far the two are apart.
+    Every scene has a reference that is independent of the engine, a closed form or a multiple-precision
+    motion, and a second one by the most accurate integrator. The result gives the distance between the two.
 
     Parameters
     ----------
     scenes : sequence of str, optional
-        Names of the scenes to run; all if not given.
+        Names of the scenes to run; by default all.
     integrators, rtols, steps, repeat : object, optional
         As in `compare`; repetitions take turns over all scenes.
     budget : float, optional
-        Seconds that all of it may take. Where they do not suffice, the repetitions go first, then the
-        settings that take longest; `SuiteComparison.notes` says what is missing.
+        Time limit in seconds. If it does not suffice, the repetitions are dropped first, then the settings
+        that take longest; `SuiteComparison.notes` lists the omissions.
     progress : callable, optional
-        Called as progress(done, total, what is next).
+        Called as progress(done, total, name of the next item).
 
     Returns
     -------
     SuiteComparison
-        A `Comparison` for each scene, verdicts and costs over all.
+        A `Comparison` for each scene, with verdicts and costs over all.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def _bench(scene: Scene) -> Bench:
 
 
 def _reference(bench: Bench, seconds: float, step: Callable[[str], None]) -> Reference:
-    """A reference that owes nothing to the engine; two runs, and a warning, where that takes too long."""
+    """Find a reference that is independent of the engine; if that takes too long, use two runs and add a warning."""
     limit = Budget(seconds)
 
     def watch(_: float) -> None:

@@ -1,4 +1,4 @@
-"""The scenes of the comparison suite, as data: what each one is, and which kind of error it sees."""
+"""This module lists the scenes of the comparison suite, with the kind of error that each one shows."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Scene:
     ----------
     name, title : for the table and the chart.
     model : name of a packaged model.
-    why : what this scene shows that the others do not.
-    params : parameter values in place of the declared ones.
+    why : the property of this scene that the others lack.
+    params : parameter values that replace the declared ones.
     periods, t_end : length of the run, in periods of the forcing or in the model's unit of time.
-    needs : capabilities (keys of `CAPABILITIES`) without which a wrong sequence of modes is no surprise.
+    needs : capabilities (keys of `CAPABILITIES`) without which a wrong sequence of modes is expected.
     """
 
     name: str
@@ -111,5 +111,5 @@ SCENES: tuple[Scene, ...] = (
 
 
 def scene_names() -> tuple[str, ...]:
-    """Names of the scenes, in order."""
+    """Return the names of the scenes, in order."""
     return tuple(scene.name for scene in SCENES)

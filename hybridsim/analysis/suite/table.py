@@ -1,4 +1,4 @@
-"""The comparison suite as a text for people: who is right, what is cheapest, how well the references are known."""
+"""This module writes the comparison suite as text: correct runs, cheapest runs, and uncertainty of the references."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 
 
 def table(suite: SuiteComparison) -> str:
-    """All blocks."""
+    """Return the whole text."""
     blocks = [_who_is_right(suite), _cheapest(suite), _references(suite), _notes(suite)]
     return printable("\n\n".join("\n".join(block) for block in blocks))
 
 
 def _who_is_right(suite: SuiteComparison) -> list[str]:
     verdicts = suite.verdicts()
-    # A long name goes over two lines, so that nine scenes fit beside each other.
+    # A long name is split over two lines, so that nine columns fit.
     heads = [name.rpartition("-") if len(name) > 8 else ("", "", name) for name in verdicts]
     rows = [["", *(first + dash for first, dash, _ in heads)], ["", *(last for *_, last in heads)]]
     rows += [
         [f"  {label}", *(str(found.get(label, "-")) for found in verdicts.values())] for label in suite.labels
     ]
     title = (
-        f"Who is right, at rtol {COMMON['rtol']:.0e}, or with {COMMON['steps_per_period']:g} steps a period "
-        "where the step is fixed"
+        f"Correct runs, at rtol {COMMON['rtol']:.0e}, or with {COMMON['steps_per_period']:g} steps per period "
+        "if the step is fixed"
     )
     return [
         title,
         *aligned(rows),
-        f"off: the modes are right, a state is not to {USELESS:.0%} of its amplitude",
+        f"off: the modes are right, but a state is wrong by more than {USELESS:.0%} of its amplitude",
     ]
 
 
@@ -52,7 +52,7 @@ def _cheapest(suite: SuiteComparison) -> list[str]:
 
 
 def _references(suite: SuiteComparison) -> list[str]:
-    rows = [["", "reference", "held against", "differs by"]]
+    rows = [["", "reference", "compared with", "differs by"]]
     for result in suite.results:
         found = result.comparison
         second = found.second_reference or "nothing"

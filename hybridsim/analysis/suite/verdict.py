@@ -1,4 +1,4 @@
-"""Whether an integrator is right on a scene, in two words."""
+"""This module classifies the result of an integrator on a scene."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from enum import Enum
 from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
 
-# The setting at which all are judged: tight enough that an error of the method does not hide in the tolerance,
-# loose enough for each of them to keep; of a fixed step, the one that its authors took.
+# The common setting of all verdicts: tight enough to show errors of the method, loose enough for every
+# integrator; for a fixed step, the choice of its authors.
 COMMON = {"rtol": 1e-8, "steps_per_period": 1200.0}
-# Of an amplitude: states farther off are of no use to anybody, however right the modes.
+# relative to the amplitude; a run with a larger error is useless even with the right modes
 USELESS = 0.1
 
 
 class Verdict(Enum):
-    """What became of a run."""
+    """The verdict on a run."""
 
     RIGHT = "right"
     OFF = "off"
@@ -32,10 +32,10 @@ class Verdict(Enum):
 
 
 def verdict(scene: Scene, rows: Sequence[Row]) -> Verdict:
-    """The verdict over a line, at the setting that is nearest to the common one.
+    """Return the verdict on a line, at the setting nearest to the common one.
 
-    "off": the modes are right, and a state is wrong by more than a tenth of its amplitude. "lacks": the modes are
-    wrong, and the integrator says itself that it lacks what the scene needs.
+    "off": the modes are right, but a state is wrong by more than a tenth of its amplitude. "lacks": the modes
+    are wrong, and the integrator declares that it lacks a capability that the scene needs.
     """
     row = min(
         rows, key=lambda row: abs(math.log(row.setting[1] / COMMON.get(row.setting[0], row.setting[1])))

@@ -1,4 +1,4 @@
-"""What a sweep runs over: values of parameters and initial values, as a grid or as a list of points."""
+"""This module defines the points of a sweep: values of parameters and initial values, as a grid or a list."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from hybridsim.model import Model
 
 MODES = ("grid", "list")
 POINT = "point"  # the dimension of a list
-MOST_POINTS = 1 << 25  # each takes some hundred bytes
+MOST_POINTS = 1 << 25  # each needs about a hundred bytes
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter or an initial value, and what it is set to.
+    """A parameter or an initial value, and its values in the sweep.
 
     Parameters
     ----------
     name, unit : as declared.
-    settings : what the model is given, numbers or expressions.
-    values : their numbers (k,), NaN for an expression that has none; the texts where an expression depends on
-        another axis, so that its number is not the same everywhere.
+    settings : the values for the model, numbers or expressions.
+    values : their numbers (k,), NaN for an expression without a value; texts if an expression depends on another
+        axis, so that its number is not the same everywhere.
     is_start : whether it is the initial value of a state.
     """
 
@@ -43,7 +43,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Points:
-    """All points of a sweep, numbered in C order of the axes: the last one runs fastest.
+    """All points of a sweep, numbered in C order of the axes, so that the last one varies fastest.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Points:
         return tuple(axis.name for axis in self.axes) if self.mode == "grid" else (POINT,)
 
     def settings(self, numbers: range) -> list[tuple[float | Expression, ...]]:
-        """What the axes are set to at some points."""
+        """Return the settings of the axes at some points."""
         if self.mode == "list":
             return [tuple(axis.settings[k] for axis in self.axes) for k in numbers]
         places = np.unravel_index(np.asarray(numbers), self.shape)
@@ -77,17 +77,17 @@ class Points:
 
     @cached_property
     def _parsed(self) -> list[list[Expression]]:
-        """The settings of a grid as expressions: each is used many times, and parsed once."""
+        """The settings of a grid as expressions, parsed only once because each is used many times."""
         return [[parse(setting) for setting in axis.settings] for axis in self.axes]
 
 
 def points_of(model: Model, values: Any, mode: Any) -> Points:
-    """The points that are asked for.
+    """Return the points of a request.
 
     Raises
     ------
     UsageError
-        For names that the model does not have, values that are none, and lists of different lengths.
+        For unknown names, invalid values, or lists of different lengths.
     """
     if not isinstance(mode, str) or mode not in MODES:
         raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
@@ -128,17 +128,17 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
 
 
 def _length(row: Any) -> int:
-    """How many values a row has, as far as it says so itself."""
+    """Return the number of values in a row, or 1 if it has no length."""
     try:
         return len(row)
-    except TypeError:  # no row, or one that is taken item by item
+    except TypeError:  # not a row, or an iterator
         return 1
-    except OverflowError:  # a range beyond all words of the machine
+    except OverflowError:  # a range beyond the largest integer
         return MOST_POINTS + 1
 
 
 def _refuse_too_many(lengths: Mapping[str, int], mode: str) -> None:
-    """Refuse a sweep of more points than fit into memory, before any of them is laid out."""
+    """Refuse a sweep with more points than fit into memory, before any of them is built."""
     total = math.prod(lengths.values()) if mode == "grid" else max(lengths.values())
     if total > MOST_POINTS:
         counted = ", ".join(
@@ -172,7 +172,7 @@ def _setting(name: str, value: Any) -> float | Expression:
 
 
 def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
-    """The numbers of the settings, or their texts where a number would depend on another axis."""
+    """Return the numbers of the settings, or their texts if a number would depend on another axis."""
     declared = {p.name: p.value for p in model.parameters}
     needed = {}
     for setting in row:
@@ -185,7 +185,7 @@ def _values(model: Model, name: str, row: Sequence[float | Expression], swept: f
 
 
 def _needed(declared: Mapping[str, Expression], name: str) -> dict[str, Expression]:
-    """A parameter and all that its value depends on, directly or through others."""
+    """Return a parameter and all parameters that its value depends on."""
     found: dict[str, Expression] = {}
     waiting = {name}
     while waiting:
@@ -196,7 +196,7 @@ def _needed(declared: Mapping[str, Expression], name: str) -> dict[str, Expressi
 
 
 def _number(name: str, needed: Mapping[str, Expression]) -> float:
-    """Its value; NaN where it has none, which is then the fault of that point alone."""
+    """Return the value of a parameter; NaN if it has none, which is an error of that point only."""
     try:
         return resolve(needed)[name]
     except ExpressionError:

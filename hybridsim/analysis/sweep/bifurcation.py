@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by brute force: settled samples over a parameter, followed upward and downward."""
+"""This module makes bifurcation diagrams by brute force: settled samples over a parameter, upward and downward."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DIRECTION = "direction"
 
 
 class _Branches:
-    """The values of one parameter in rising and in falling order, side by side: two chains."""
+    """The values of one parameter in rising and in falling order, as two chains."""
 
     def __init__(self, points: Points, count: int) -> None:
         rows = points.settings(range(count))
@@ -39,11 +39,11 @@ class _Branches:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Steps along a branch, branches."""
+        """Steps along a branch, number of branches."""
         return len(self._rising), 2
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Even numbers go up, odd ones down."""
+        """Return the settings; even numbers belong to the rising chain, odd ones to the falling one."""
         return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
 
 
@@ -65,28 +65,28 @@ def bifurcation(
     progress: Progress | None = None,
     **options: Any,
 ) -> Sweep:
-    """Sample the settled motion at a section, over a parameter, followed upward and downward.
+    """Sample the settled motion at a section over a parameter, followed upward and downward.
 
-    Each value starts from where its neighbour ended, so that of two motions that attract the one is found from below
-    and the other from above: where the branches differ there is hysteresis. Motions that repel are not found.
+    Each value starts at the end of its neighbour's run, so that coexisting stable motions can be found from
+    below and from above. Branches that differ show hysteresis. Unstable motions are not found.
 
     Parameters
     ----------
     model : str, path or Model
         As in `simulate`.
     parameter, values : str, sequence of str or float
-        What is varied; any order.
+        The parameter and its values, in any order.
     section : str, optional
-        None samples once a period of the forcing; an expression where it passes zero upward, or the name of a
-        monitor of the model, each time that happens.
+        None samples once per period of the forcing. An expression samples at its upward zero crossings. The
+        name of a monitor samples at each of its events.
     settle, samples : int, optional
-        Passings of the section that are waited for, and that are kept.
+        Number of passages of the section before the first sample, and number of samples.
     tol : float, optional
-        Samples are the same within this share of the largest size of each state.
+        Samples are equal within this fraction of the largest size of each state.
     params, x0, z0 : mapping, optional
         As in `simulate`; x0 and z0 start both branches.
     executor, workers, progress : object, optional
-        As in `sweep`; there are two chains to share.
+        As in `sweep`; there are two chains to share among workers.
     **options : Any
         Options of `simulate`.
 
@@ -94,7 +94,7 @@ def bifurcation(
     -------
     Sweep
         Over the direction ("up", "down") and the parameter: the samples of each state in order of time, and
-        ``repeats_after``, the n of a motion that repeats after n passings, 0 where it does not within the
+        ``repeats_after``, the n of a motion that repeats after n passages, or 0 if it does not within the
         samples.
 
     Examples
@@ -145,5 +145,5 @@ def bifurcation(
 
 
 def _turned(array: np.ndarray) -> np.ndarray:
-    """From (step, branch, ...) to (branch, value, ...), both branches in rising order."""
+    """Rearrange (step, branch, ...) to (branch, value, ...), with both branches in rising order."""
     return np.stack([array[:, 0], array[::-1, 1]])

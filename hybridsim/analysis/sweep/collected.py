@@ -1,4 +1,4 @@
-"""The results of a sweep as they come in, in any order, in arrays that have their place from the start."""
+"""This module collects the results of a sweep, in any order, in arrays."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from hybridsim.analysis.sweep.readings import Reading
 
 
 class Collected:
-    """Arrays of readings and statuses; the same ones whatever the order in which the points came.
+    """Arrays of readings and statuses, independent of the order in which the points arrive.
 
-    A name that a point does not have is NaN there, or an empty text; so is what is missing at the end of an array
-    that is shorter than another point's.
+    A reading that a point does not have is NaN, or an empty text. The end of an array that is shorter than
+    another point's is filled in the same way.
     """
 
     def __init__(self, total: int) -> None:
         self.status = np.full(total, NOT_RUN, dtype=object)
         self.done = 0
         self._arrays: dict[str, np.ndarray] = {}
-        self._places: dict[str, tuple[int, int]] = {}  # of each name: the first point that has it, and where
+        self._places: dict[
+            str, tuple[int, int]
+        ] = {}  # for each name: the first point that has it, and the position there
 
     def put(self, numbers: Sequence[int], outcomes: Sequence[Outcome]) -> None:
-        """Take in some points; where there are fewer outcomes than numbers, the rest was not run."""
+        """Store the outcomes of some points; if there are fewer outcomes than numbers, the rest was not run."""
         for number, (status, found) in zip(numbers, outcomes):
             self.status[number] = status
             for place, (name, value) in enumerate((found or {}).items()):
@@ -42,7 +44,7 @@ class Collected:
     def values(
         self, shape: tuple[int, ...], nothing: Mapping[str, float | str] | None = None
     ) -> dict[str, np.ndarray]:
-        """The arrays by name, in the order in which the first points have them; of what no point has, `nothing`."""
+        """Return the arrays by name in the order of the first points; missing ones are filled from `nothing`."""
         for name, value in (nothing or {}).items():
             if name not in self._arrays:
                 self._arrays[name] = np.full(len(self.status), value, dtype=_kind(value))
@@ -50,7 +52,7 @@ class Collected:
         return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
 
     def _room(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
-        """An array for such values and all that the old one holds."""
+        """Return an array for such values with the content of the old one."""
         total, kind = len(self.status), _kind(value)
         long = np.ndim(value) == 1
         length = np.size(value) if long else None

@@ -1,4 +1,4 @@
-"""Frequency response: amplitude, share of stick and stops over the frequency of the forcing."""
+"""This module computes frequency responses: amplitude, stick fraction and stops over the forcing frequency."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def frequency_response(
     params: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> Sweep:
-    """Measure the steady amplitude, and of each contact its share of stick and its stops, over the forcing's frequency.
+    """Measure the steady amplitude, and the stick fraction and stops of each contact, over the forcing frequency.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ def frequency_response(
     frequencies : sequence of str or float
         Values of the parameter ``frequency``, numbers or expressions.
     levels : mapping of str to sequence, optional
-        One other parameter and its values, such as ``{"N": [20, 30, 40]}``: a line each.
+        One other parameter and its values, such as ``{"N": [20, 30, 40]}``; each value is a line.
     frequency : str, optional
         The parameter that is the angular frequency of the forcing.
     quantity : str, optional
-        State or output whose amplitude is taken; the first state if not given.
+        State or output whose amplitude is measured; by default the first state.
     params : mapping of str to str or float, optional
         Parameter values that are the same at every point.
     **options : Any
@@ -62,11 +62,13 @@ def frequency_response(
     if len(others) > 1 or frequency in others:
         raise UsageError(f"levels is {levels!r}", remedy="give one parameter other than the frequency")
     if not model.states:
-        raise UsageError(f"model {model.name} has no states", remedy="there is nothing that responds")
+        raise UsageError(
+            f"model {model.name} has no states", remedy="give a model with a state that responds"
+        )
     words = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
     for contact in model.contacts:
         words += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
-    # with warm starts the frequency is the chain, which is the first axis
+    # with warm starts the chain runs along the frequency, which is the first axis
     if options.get("warm_start"):
         return sweep(model, {frequency: frequencies, **others}, words, **options)
     return sweep(model, {**others, frequency: frequencies}, words, **options)

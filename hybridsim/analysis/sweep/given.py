@@ -1,4 +1,4 @@
-"""Options of a sweep, refused before the first point where they would fail at every one."""
+"""This module refuses invalid options of a sweep before the first point."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 from hybridsim.arguments import integrator_name
 from hybridsim.errors import UsageError, nearest
 
-# What "auto" may take; an option of any of them may be meant.
+# the choices of "auto"; an option of any of them is accepted
 _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853", "scipy-radau")
 
 
 def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
-    """Check options for calls of which the last passes what it does not know on to an integrator.
+    """Check options for calls, the last of which passes unknown options to an integrator.
 
     Raises
     ------
     UsageError
-        For a name that none of them has, and for an integrator that there is not.
+        For a name that none of them has, or an unknown integrator.
     """
     from hybridsim.integrators.registry import integrator_class, option_names
 
@@ -27,15 +27,15 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
     known = own | {option for one in classes for option in option_names(one)}
-    whose = "simulate and of the integrators that auto takes" if name == "auto" else f"simulate and of {name}"
+    whose = "simulate or of the integrators that auto takes" if name == "auto" else f"simulate or of {name}"
     _refuse(options, known, whose)
 
 
 def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
-    """Check options for a measure that is anybody's function, as far as it says what it takes."""
+    """Check options for a user's measure against its signature."""
     try:
         parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # of a builtin: nothing is said
+    except (TypeError, ValueError):  # a builtin has no signature
         return
     if not any(p.kind is p.VAR_KEYWORD for p in parameters):
         _refuse(options, set(_names(function)), getattr(function, "__name__", "the measure"))
@@ -50,5 +50,5 @@ def _refuse(options: Mapping[str, Any], known: set[str], whose: str) -> None:
     for option in options:
         if option not in known:
             raise UsageError(
-                f"{option!r} is no option of {whose}", remedy=nearest(option, known, kind="options")
+                f"{option!r} is not an option of {whose}", remedy=nearest(option, known, kind="options")
             )

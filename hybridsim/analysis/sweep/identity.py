@@ -1,9 +1,9 @@
-"""What tells one value from another, in a text: of a function its code and all that it reads, of an array its bytes.
+"""This module computes a text that identifies a value: for a function its code and data, for an array its bytes.
 
-A file of a sweep that was interrupted serves the sweep that it was begun for. A function's name does not tell it: an
-edited measure, another lambda or another closure may have the same. An object is its class and its state as pickle
-takes it, and a class is all that it and its bases define. What comes with Python or is installed is known by its name
-and version.
+The journal of an interrupted sweep may only serve the same sweep. The name of a function does not identify
+it, because an edited measure, another lambda or another closure may have the same name. An object is
+identified by its class and its pickled state, a class by all definitions of it and its bases. Python and
+installed packages are identified by name and version.
 """
 
 from __future__ import annotations
@@ -42,21 +42,21 @@ _NOT_READ = {"__module__", "__doc__", "__dict__", "__weakref__", "_abc_impl", "_
 
 
 def identity(value: Any) -> str:
-    """A text that is equal for equal values, also in another process.
+    """Return a text that is equal for equal values, also in another process.
 
     Raises
     ------
     UsageError
-        For what has no state that can be told.
+        For an object whose state cannot be read.
     """
     return _Teller().of(value)
 
 
 class _Teller:
-    """Tells values that may be parts of one another."""
+    """Identifies values that may contain one another."""
 
     def __init__(self) -> None:
-        self._around: list[int] = []  # what is being told: a value may be a part of itself
+        self._around: list[int] = []  # the values in progress: a value may contain itself
         self._known: dict[int, str] = {}  # functions and classes that many others may read
 
     def of(self, value: Any) -> str:
@@ -114,7 +114,7 @@ class _Teller:
         return f"{self.of(type(value))}({self._state(value)})"
 
     def _class(self, value: type) -> str:
-        """All that a class and its bases define."""
+        """Return the identity of a class: all definitions of it and its bases."""
         defined = {name: part for name, part in vars(value).items() if name not in _NOT_READ}
         parts = (value.__qualname__, type(value), value.__bases__, defined)
         return f"class({', '.join(map(self.of, parts))})"
@@ -137,11 +137,11 @@ class _Teller:
         try:
             reduce = copyreg.dispatch_table.get(type(value))
             state = value.__reduce_ex__(4) if reduce is None else reduce(value)
-        except Exception as error:  # a class may be anybody's: whatever it raises, it cannot be told
+        except Exception as error:  # a user's class may raise anything, and then it cannot be identified
             raise UsageError(
-                f"the measure reads an object of {type(value).__qualname__}, and a journal cannot tell it from "
-                f"another one: {error}",
-                remedy="sweep without a journal, or give its class a method __getstate__ that returns what it holds",
+                f"the measure uses an object of {type(value).__qualname__}, which a journal cannot identify: "
+                f"{error}",
+                remedy="sweep without a journal, or give its class a method __getstate__ that returns its content",
             ) from error
         if isinstance(state, str):
             return f"{_of_module(_module(value))}.{state}"
@@ -151,13 +151,13 @@ class _Teller:
 
 
 def _module(value: Any) -> str:
-    """Where a class or function is from; some that are not written in Python have something else for it."""
+    """Return the module of a class or function; some objects not written in Python have none."""
     name = getattr(value, "__module__", None)
     return name if isinstance(name, str) else "builtins"
 
 
 def _is_library(name: str) -> bool:
-    """Whether a module comes with Python, is installed, or is of this package."""
+    """Return whether a module belongs to Python, an installed package, or this package."""
     top = name.partition(".")[0]
     if top in sys.stdlib_module_names or top == __name__.partition(".")[0]:
         return True
@@ -166,7 +166,7 @@ def _is_library(name: str) -> bool:
 
 
 def _of_module(name: str) -> str:
-    """A module of a library by its version, any other by its file."""
+    """Return the identity of a module: its version for a library, a hash of its file otherwise."""
     module = sys.modules.get(name)
     if _is_library(name) or not (file := getattr(module, "__file__", None)) or not Path(file).is_file():
         return f"{name} {getattr(sys.modules.get(name.partition('.')[0]), '__version__', '')}"
@@ -174,7 +174,7 @@ def _of_module(name: str) -> str:
 
 
 def _read_by(function: FunctionType) -> list[Any]:
-    """What the result of a function depends on beside its arguments."""
+    """Return the values that a function depends on in addition to its arguments."""
     code = function.__code__
     cells = [cell.cell_contents for cell in function.__closure__ or () if cell != _EMPTY]
     found = {n: function.__globals__[n] for n in sorted(_names(code)) if n in function.__globals__}
@@ -182,6 +182,6 @@ def _read_by(function: FunctionType) -> list[Any]:
 
 
 def _names(code: CodeType) -> set[str]:
-    """Names that a code and those within it look up."""
+    """Return the names that a code object and the code within it look up."""
     inner = (part for part in code.co_consts if isinstance(part, CodeType))
     return set(code.co_names).union(*map(_names, inner))

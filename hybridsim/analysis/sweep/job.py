@@ -1,4 +1,4 @@
-"""What a worker does: sets the model to each of some points and measures it; nothing that fails there stops it."""
+"""This module defines the work at the points of a sweep: set the model, measure it, and catch errors."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hybridsim.expr import Expression
 from hybridsim.model import Model
 
 DONE, NOT_RUN = "ok", "not run"
-_MOST = 4  # sweeps whose model a worker of another process keeps
+_MOST = 4  # number of sweeps whose model a worker process keeps
 
 
 class Incomplete(SimulationError):
-    """A measurement that could not be made, and what there is of it all the same."""
+    """A measurement failed; `found` holds its partial results."""
 
     def __init__(self, message: str, found: dict[str, Reading]) -> None:
         super().__init__(message)
@@ -29,27 +29,27 @@ Settings = tuple[float | Expression, ...]
 
 
 class Measure(Protocol):
-    """Measures a model, and says what of the result is kept."""
+    """The protocol of a measure: it measures a model and selects the readings to keep."""
 
     def run(self, model: Model, previous: Any) -> Any:
-        """The result at a point; ``previous`` is that of the neighbour in a chain, or None."""
+        """Return the result at a point; ``previous`` is that of the neighbour in a chain, or None."""
 
     def read(self, result: Any) -> Any:
-        """What is kept of it: a number, an array, or a mapping of such and texts."""
+        """Return the readings to keep: a number, an array, or a mapping of numbers, arrays and texts."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep as its workers know it.
+    """A sweep as its workers need it.
 
     Parameters
     ----------
-    token : tells sweeps apart.
-    model : with all that is the same at every point.
-    names : what is set at a point: parameters, and states with their initial values.
-    starts : which of these are states.
-    measure : what is measured.
-    chained : whether a point is given the result of the one before it.
+    token : identifies the sweep.
+    model : the model with all settings that are the same at every point.
+    names : the names set at a point: parameters, and states with their initial values.
+    starts : the states among them.
+    measure : the measure.
+    chained : whether a point receives the result of the previous one.
     """
 
     token: str
@@ -60,7 +60,7 @@ class Job:
     chained: bool
 
     def at(self, settings: Settings) -> Model:
-        """The model at a point."""
+        """Return the model at a point."""
         if not self.starts:
             return self.model.with_(**dict(zip(self.names, settings, strict=True)))
         pairs = list(zip(self.names, settings, strict=True))
@@ -69,21 +69,21 @@ class Job:
 
 
 class Outcome(NamedTuple):
-    """A point: "ok", or what went wrong; and the readings, where there are any."""
+    """The result of a point: "ok" or the error, and the readings if there are any."""
 
     status: str
     found: dict[str, Reading] | None
 
 
 class Batch(NamedTuple):
-    """Some points in their order, as far as they were run, and the seconds that they took."""
+    """The outcomes of the points that were run, in order, and the seconds that they took."""
 
     outcomes: list[Outcome]
     seconds: float
 
 
 class Watch(NamedTuple):
-    """How a worker that shares memory with the sweep is asked to stop, and tells how many more points are done."""
+    """The link to a worker that shares memory: it asks whether to go on, and reports finished points."""
 
     goes_on: Callable[[], bool]
     tell: Callable[[int], None]
@@ -93,7 +93,7 @@ _NOBODY = Watch(lambda: True, lambda points: None)
 
 
 def new_token() -> str:
-    """What no other sweep has."""
+    """Return a token that no other sweep has."""
     return uuid.uuid4().hex
 
 
@@ -121,7 +121,7 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
 
 
 def _together(job: Job, points: Sequence[Settings], watch: Watch) -> list[Outcome] | None:
-    """By a measure that takes many points at once, where it takes these."""
+    """Measure many points at once, if the measure supports it for these points."""
     together = getattr(job.measure, "together", None)
     if together is None:
         return None
@@ -133,10 +133,12 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
     try:
         result = job.measure.run(job.at(settings), previous)
         found = readings(job.measure.read(result))
-        blank = getattr(job.measure, "blank", lambda _: ())(result)  # what is none at such a result
+        blank = getattr(job.measure, "blank", lambda _: ())(
+            result
+        )  # readings that do not exist for such a result
     except Incomplete as error:
         return Outcome(error.message, error.found), None
-    except Exception as error:  # a measure may be anybody's: whatever it raises costs its own point only
+    except Exception as error:  # a user's measure may raise anything; it costs its own point only
         return Outcome(_said(error), None), None
     missing = [name for name in not_numbers(found) if name not in blank]
     if missing:
@@ -145,13 +147,13 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
 
 
 def _said(error: Exception) -> str:
-    """An error in one line, its kind before it."""
+    """Return an error in one line, with its type first."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _kept(job: Job) -> Job:
-    """The job as it came the first time: what the engine knows of a model hangs on the object."""
+    """Return the job as it arrived first, because the engine's data of a model belongs to that object."""
     known = _jobs.get(job.token)
     if known is not None:
         return known

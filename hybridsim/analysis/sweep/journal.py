@@ -1,7 +1,7 @@
-"""A sweep's results on disk as they come in: what was killed and is started again goes on where it was.
+"""This module writes the results of a sweep to a file as they arrive, so that an interrupted sweep can continue.
 
-A line of text for each piece of work, in JSON, whole or not there at all: a line that a kill has cut off is not read.
-Numbers are written with all their digits, so that a sweep in parts is to the last bit a sweep in one.
+Each piece of work is one line of JSON; an incomplete last line, cut off by a kill, is ignored. Numbers are
+written with all digits, so that a sweep in parts equals a sweep in one bit for bit.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from hybridsim.errors import UsageError
 from hybridsim.files import cannot_write, hold, path_text
 
 _FORMAT = "hybridsim sweep"
-_MOST_BYTES = 1 << 28  # of a line: some 10 million numbers
+_MOST_BYTES = 1 << 28  # per line: about 10 million numbers
 
 
 def fingerprint(*parts: object) -> str:
-    """What tells one sweep from another: model, values, measure, options."""
+    """Return a hash that identifies a sweep: model, values, measure, options."""
     return hashlib.sha256("\n".join(map(identity, parts)).encode()).hexdigest()
 
 
 class Journal:
-    """The file of one sweep, open for what is to come.
+    """The file of one sweep, open for further results.
 
     Parameters
     ----------
-    path : where it is, or is to be.
+    path : its path.
     sweep : the `fingerprint` of the sweep.
 
     Attributes
     ----------
-    known : the numbers of points and their outcomes that it held already.
+    known : the numbers of points and their outcomes that it already contained.
 
     Raises
     ------
     UsageError
-        Where the file is no journal, or of another sweep, or in use by one, or cannot be written.
+        If the file is not a journal, belongs to another sweep, is in use, or cannot be written.
     """
 
     def __init__(self, path: str | PathLike[str], sweep: str) -> None:
@@ -59,18 +59,18 @@ class Journal:
         self._file = self._opened()
         try:
             self._read(sweep)
-        except BaseException:  # whatever it is, the file is not left open; it is raised again
+        except BaseException:  # the file is closed on any error, which is raised again
             self._close()
             raise
 
     def _opened(self) -> IO[bytes]:
-        """The file, which no other sweep has open."""
+        """Open the file and lock it against other sweeps."""
         while True:
             try:
                 is_other = os.path.exists(self.path) and not stat.S_ISREG(os.stat(self.path).st_mode)
                 if is_other:
-                    raise OSError(errno.EINVAL, "it is no regular file")
-                file = open(self.path, "a+b")  # noqa: SIM115  # it is open as long as the journal is
+                    raise OSError(errno.EINVAL, "it is not a regular file")
+                file = open(self.path, "a+b")  # noqa: SIM115  # it stays open as long as the journal
             except OSError as error:
                 raise cannot_write(self.path, error) from error
             try:
@@ -78,17 +78,19 @@ class Journal:
             except UsageError:
                 file.close()
                 raise
-            # the sweep that had it may have deleted it in the meantime
+            # the previous sweep may have deleted the file in the meantime
             if os.path.exists(self.path) and os.path.samestat(os.stat(self.path), os.fstat(file.fileno())):
                 return file
             file.close()
 
     def _read(self, sweep: str) -> None:
-        """Take in what is there; a last line that is not whole is cut off."""
+        """Read the existing content; an incomplete last line is cut off."""
         head = {"format": _FORMAT, "sweep": sweep}
         self._file.seek(0)
         end, line = 0, self._file.readline(_MOST_BYTES)
-        if not line.endswith(b"\n") and _as_line(head).startswith(line):  # nothing, or a beginning of ours
+        if not line.endswith(b"\n") and _as_line(head).startswith(
+            line
+        ):  # nothing, or an incomplete first line of ours
             self._file.truncate(0)
             self._write(head)
             return
@@ -102,8 +104,8 @@ class Journal:
                 self.known.append(_piece(json.loads(line)))
             except (ValueError, OverflowError, RecursionError) as error:
                 raise UsageError(
-                    f"{self.path}, line {number} is no result of a sweep: {error}",
-                    remedy="take the line out, or delete the file",
+                    f"{self.path}, line {number} is not a result of a sweep: {error}",
+                    remedy="remove the line, or delete the file",
                 ) from error
         self._file.truncate(end)
 
@@ -114,16 +116,16 @@ class Journal:
             found = None
         if not isinstance(found, dict) or found.get("format") != _FORMAT:
             raise UsageError(
-                f"{self.path} is no journal of a sweep", remedy="give another path, or delete it"
+                f"{self.path} is not a journal of a sweep", remedy="give another path, or delete it"
             )
         if found.get("sweep") != head["sweep"]:
             raise UsageError(
-                f"{self.path} is of another sweep: model, values, options or measure differ",
+                f"{self.path} belongs to another sweep: model, values, options or measure differ",
                 remedy="finish that one, delete the file, or give another path",
             )
 
     def note(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
-        """Add the outcomes of some points; a kill from now on does not lose them."""
+        """Add the outcomes of some points; a later kill does not lose them."""
         rows = [[o.status, {n: _written(v) for n, v in (o.found or {}).items()}] for o in outcomes]
         if rows:
             self._write([list(numbers[: len(rows)]), rows])
@@ -136,7 +138,7 @@ class Journal:
             raise cannot_write(self.path, error) from error
 
     def _close(self) -> None:
-        with suppress(OSError):  # of what could not be written before, which has been said
+        with suppress(OSError):  # an earlier error of writing, which was reported
             self._file.close()
 
     def __enter__(self) -> Journal:
@@ -153,30 +155,30 @@ def _as_line(content: Any) -> bytes:
 
 
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
-    """Numbers of points and their outcomes.
+    """Return numbers of points and their outcomes.
 
     Raises
     ------
     ValueError
-        For anything else.
+        For any other content.
     """
     if not (isinstance(line, list) and len(line) == 2 and all(isinstance(part, list) for part in line)):
-        raise ValueError("it is no pair of points and results")
+        raise ValueError("it is not a pair of points and results")
     numbers, rows = line
     if not all(type(number) is int for number in numbers):
-        raise ValueError("its points are no numbers")
+        raise ValueError("its points are not numbers")
     return numbers, [_outcome(row) for row in rows]
 
 
 def _outcome(row: Any) -> Outcome:
     is_pair = isinstance(row, list) and len(row) == 2
     if not (is_pair and isinstance(row[0], str) and isinstance(row[1], dict)):
-        raise ValueError("a result is no status with readings")
+        raise ValueError("a result is not a status with readings")
     return Outcome(row[0], {name: _read_back(value) for name, value in row[1].items()} or None)
 
 
 def _written(value: Reading) -> Any:
-    """A reading as JSON has it: numbers and texts as they are, others with their kind."""
+    """Return a reading for JSON: numbers and texts unchanged, others with their kind."""
     if isinstance(value, np.ndarray):
         parts = [value.real.tolist(), value.imag.tolist()] if value.dtype.kind == "c" else [value.tolist()]
         return {"array": parts}
@@ -200,10 +202,10 @@ def _read_back(value: Any) -> Reading:
             both.real = [_number(number) for number in real]
             both.imag = [_number(number) for number in imaginary]
             return both
-    raise ValueError("a reading is no number, array or text")
+    raise ValueError("a reading is not a number, array or text")
 
 
 def _number(value: Any) -> float:
     if type(value) not in (int, float):
-        raise ValueError(f"{value!r} is no number")
+        raise ValueError(f"{value!r} is not a number")
     return float(value)

@@ -1,4 +1,4 @@
-"""Readings of the last of so many periods of the forcing, whether or not the motion repeats by then: for whole maps."""
+"""This module measures the last of many periods of the forcing, whether or not the motion repeats by then."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 OF_MOTION = ("period", "residual", "word")
 _OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "energy")
 _OF_CONTACTS = ("stick_fraction", "stops_per_period")
-_SMALLEST = 1e-3  # of a state's size: the least range that its change is measured by
+_SMALLEST = 1e-3  # relative to a state's size; the least range used to scale its change
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class MeasuredPeriod(Measures):
 
 @dataclass(frozen=True)
 class LastPeriod:
-    """Readings as of a steady state, of the period that ends `after` periods of the forcing from the start."""
+    """Readings of the period that ends `after` forcing periods from the start."""
 
     words: tuple[str, ...]
     after: int
@@ -51,11 +51,11 @@ class LastPeriod:
     read_one: Callable[[Any, str], Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """What stands where there is no result."""
+        """Return the readings of a point without a result."""
         return {word: "" if word == "word" else math.nan for word in self.words}
 
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
-        """One run by itself."""
+        """Make one run."""
         from hybridsim.simulate import simulate
 
         period = period_of(model)
@@ -65,7 +65,7 @@ class LastPeriod:
         return MeasuredPeriod(solution, period)
 
     def read(self, result: MeasuredPeriod) -> dict[str, Any]:
-        """The readings in the order of the words."""
+        """Return the readings in the order of the words."""
         return {word: self.read_one(result, word) for word in self.words}
 
     def together(
@@ -75,9 +75,9 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """All points in compiled code, but for those that it leaves to `alone`; None where it takes none of them.
+        """Run all points in compiled code, except those left to `alone`; return None if none of them can be.
 
-        Where the watch says to stop, the outcomes are those of the first points, as far as they were run.
+        If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
         from hybridsim.engine.fleet import Fleet, sails
         from hybridsim.engine.recent import system_of
@@ -110,11 +110,11 @@ class LastPeriod:
 
 
 def period_of(model: Model) -> float:
-    """The period of everything that drives a model.
+    """Return the common period of all forcing of a model.
 
     Raises
     ------
-    UsageError
+    If it has none.
         Where it has none.
     """
     from hybridsim.engine.period import common_period
@@ -123,8 +123,8 @@ def period_of(model: Model) -> float:
     period = common_period(system_of(model))
     if period is None:
         raise UsageError(
-            f"model {model.name} has no forcing that repeats: there is no last period",
-            remedy="leave out after: a steady state without forcing is found by itself",
+            f"model {model.name} has no periodic forcing: there is no last period",
+            remedy="leave out after: the steady state of an unforced model is found without it",
         )
     return period
 
@@ -135,7 +135,7 @@ def _outcome(found: dict[str, Any]) -> Outcome:
 
 
 def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | None:
-    """What reads a word off the sums over the last periods (m,); None where they do not hold it."""
+    """Return a function that reads a word from the sums over the last periods (m,), or None."""
     head, _, rest = word.partition(".")
     if head == "period":
         return lambda last: last.periods
@@ -148,7 +148,7 @@ def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | Non
         c = contacts.index(rest)
         if head == "stick_fraction":
             return lambda last: last.stretch.held[:, 0, c] / last.periods
-        # a stretch that goes on over the end of the period counts once, one without end not at all
+        # an interval across the end of the period counts once, permanent stick counts zero
         return lambda last: last.stretch.held[:, 1, c] - last.stretch.holding[:, :, c].all(axis=1)
     return None
 
@@ -174,7 +174,7 @@ def _residuals(last: LastPeriods) -> np.ndarray:
 
 
 def _residual(low: np.ndarray, high: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """The largest change relative to half of the range, over the last axis: of the states."""
+    """Return the largest change of a state relative to half of its range, over the last axis."""
     scale = np.maximum(0.5 * (high - low), _SMALLEST * np.maximum(abs(low), abs(high)))
     change = np.abs(after - before)
     return np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0).max(axis=-1, initial=0.0)

@@ -1,4 +1,4 @@
-"""Measures: a function of the user's, or what is named by a word."""
+"""This module provides the measures of a sweep: a function of the user's, or a built-in measure."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from hybridsim.model import Model
 
 @dataclass(frozen=True)
 class Given:
-    """A function of the user's: of the model, and of the neighbour's result where the sweep is a chain."""
+    """A function of the user's, of the model and, in a chain, of the neighbour's result."""
 
     function: Callable[..., Any]
     options: Mapping[str, Any]
     chained: bool
 
     def run(self, model: Model, previous: Any) -> Any:
-        """What the function returns."""
+        """Return the result of the function."""
         if self.chained:
             return self.function(model, previous, **self.options)
         return self.function(model, **self.options)
 
     def read(self, result: Any) -> Any:
-        """All of it."""
+        """Return the whole result."""
         return result
 
 
 def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, Any]) -> Measure:
-    """A measure by what `sweep` was given for it."""
+    """Return the measure for the argument of `sweep`."""
     if callable(measure):
         refuse_what_it_does_not_take(measure, options)
         return Given(measure, options, chained)
@@ -44,5 +44,5 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
     if words and all(isinstance(word, str) for word in words):
         return ready_measure(words, model, options)
     raise UsageError(
-        f"measure is {measure!r}", remedy="give a function of the model, or the name of a ready measure"
+        f"measure is {measure!r}", remedy="give a function of the model, or the name of a built-in measure"
     )

@@ -1,4 +1,4 @@
-"""Values of all parameters and initial states at many points of a sweep, as arrays, without a model for each."""
+"""This module computes parameters and initial states at many points of a sweep as arrays, without models."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Setter:
 
     Parameters
     ----------
-    model : valid as it is.
-    names : what is set at each point.
-    at : the model at a point, for where more follows from what is set than its own value.
+    model : a valid model.
+    names : the names that are set at each point.
+    at : returns the model at a point; used if other values depend on the names that are set.
     """
 
     def __init__(self, model: Model, names: Sequence[str], at: Callable[[Settings], Model]) -> None:
@@ -37,7 +37,7 @@ class Setter:
         self._known: dict[Expression, float] = {}
 
     def values(self, points: Sequence[Settings]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Parameters (N, P) and initial states (N, n), and the numbers (m,) of the points that have some."""
+        """Return parameters (N, P), initial states (N, n), and the numbers (m,) of the valid points."""
         parameters = np.tile(self._base, (len(points), 1))
         starts = np.tile(self._start, (len(points), 1))
         if not self._is_plain:
@@ -59,13 +59,13 @@ class Setter:
                 model = self._at(point).validate()
                 values, start = model.parameter_values(), model.start_values()
             except HybridsimError:
-                continue  # a run of its own tells what is the matter
+                continue  # an individual run gives the error
             parameters[i], starts[i] = list(values.values()), list(start.values())
             sound.append(i)
         return np.array(sound, dtype=np.int64)
 
     def _number(self, setting: float | Expression) -> float:
-        """The value of a setting; NaN where it depends on others."""
+        """Return the value of a setting; NaN if it depends on others."""
         if not isinstance(setting, Expression):
             return setting
         if setting not in self._known:

@@ -1,4 +1,4 @@
-"""Cuts the points of a sweep into pieces of work: long enough to be worth sending, short enough to share."""
+"""This module divides the points of a sweep into pieces of work of a suitable length."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-# Seconds of a piece: a thousand times what it costs to send one, and still ten a second for whoever watches.
+# Seconds per piece: a thousand times the cost of sending one, and short enough for ten reports of progress a
+# second.
 _LENGTH = 0.1
 
 
@@ -16,10 +17,10 @@ class Pieces:
     Parameters
     ----------
     total : number of points.
-    chains : number of chains, each of which is one piece; None where no point needs its neighbour. The points of
-        chain c are c, c + chains, c + 2 chains, ...: the first axis of a grid, at the same place on all others.
-    workers : among whom they are shared.
-    done : which points (total,) are done already; a chain is begun anew unless all of it is.
+    chains : number of chains, each of which is one piece; None if no point needs its neighbour. The points of
+        chain c are c, c + chains, c + 2 chains, ...: along the first axis of a grid, at fixed places on all others.
+    workers : number of workers that share the pieces.
+    done : mask of the points (total,) that are finished; a chain is restarted unless all of it is finished.
     """
 
     def __init__(self, total: int, chains: int | None, workers: int, done: np.ndarray | None = None) -> None:
@@ -28,7 +29,7 @@ class Pieces:
         self._open = np.arange(total + 1) if done is None else np.append(np.flatnonzero(~done), total)
 
     def next(self) -> range | None:
-        """The next piece; None when all are handed out."""
+        """Return the next piece, or None after the last one."""
         start = self._next
         if self._chains is not None:
             while start < self._chains and not (self._open[:-1] % self._chains == start).any():
@@ -38,15 +39,15 @@ class Pieces:
         left = len(self._open) - 1 - start
         if left <= 0:
             return None
-        # the last pieces are small, so that nobody waits long for another
+        # the last pieces are small, so that the workers finish together
         size = min(self._size, math.ceil(left / (2 * self._workers)))
         first = int(self._open[start])
-        while self._open[start + size - 1] != first + size - 1:  # points in a row
+        while self._open[start + size - 1] != first + size - 1:  # consecutive points
             size -= 1
         self._next += size
         return range(first, first + size)
 
     def learn(self, points: int, seconds: float) -> None:
-        """Take notice of how long some points took."""
+        """Adjust the size of the pieces to the time that some points took."""
         fitting = int(_LENGTH * points / seconds) if seconds > 0 else 2 * points
         self._size = max(1, min(fitting, 2 * points if points >= self._size else self._size))

@@ -1,4 +1,4 @@
-"""What a measure returned, as readings: numbers, texts and arrays by name."""
+"""This module converts the result of a measure to readings: numbers, texts and arrays by name."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from hybridsim.arguments import is_row
 from hybridsim.errors import UsageError
 
 Reading = float | complex | str | np.ndarray
-VALUE = "value"  # the name of what has none
+VALUE = "value"  # the name of a reading without one
 
 
 def readings(found: Any) -> dict[str, Reading]:
-    """Readings by name out of a number, an array (k,), or a mapping of these and texts.
+    """Return readings by name from a number, an array (k,), or a mapping of numbers, arrays and texts.
 
     Raises
     ------
     UsageError
-        For anything else.
+        For any other type.
     """
     if type(found) is float:
         return {VALUE: found}
@@ -31,7 +31,7 @@ def readings(found: Any) -> dict[str, Reading]:
 
 
 def not_numbers(found: Mapping[str, Reading]) -> list[str]:
-    """Names of the readings that are no numbers, or hold such."""
+    """Return the names of the readings that are NaN or contain NaN."""
     return [name for name, value in found.items() if _is_nan(value)]
 
 
@@ -57,6 +57,6 @@ def _reading(name: str, value: Any) -> Reading:
         except (TypeError, ValueError, OverflowError):
             pass
     raise UsageError(
-        f"the measure gave {type(value).__name__} as {name}",
-        remedy="return a number, an array in one dimension, or a dict of such by name",
+        f"the measure returned {type(value).__name__} as {name}",
+        remedy="return a number, a one-dimensional array, or a dict of these by name",
     )

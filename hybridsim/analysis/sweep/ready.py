@@ -1,4 +1,4 @@
-"""Measures with a name: what the steady state of a model is like, and where a run of it ends."""
+"""This module defines the built-in measures: properties of the steady state, and states at the end of a run."""
 
 from __future__ import annotations
 
@@ -19,45 +19,45 @@ if TYPE_CHECKING:
     from hybridsim.analysis.steady import SteadyState
 
 STEADY, FINAL, AFTER = "steady", "final", "after"
-# Measures of a steady state by what they are of: a state or an output, a contact, the motion as a whole.
+# measures of a steady state: of a quantity, of a contact, of the motion
 _OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
 _OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
 _OF_MOTION = ("period", "multiple", "residual", "newton_steps", "periods", "kind", "word", "stable")
 _TEXTS = ("kind", "word")
 _SQUARED = "energy"
-_PLAIN = ("amplitude", "energy")  # of each quantity, where nothing in particular is asked for
+_PLAIN = ("amplitude", "energy")  # the default measures of each quantity
 
 
 @dataclass(frozen=True)
 class Steady:
     """Readings of `steady_state`: ``amplitude.x``, ``harmonic.x.3``, ``stick_fraction.f``, ``period``, ``kind``, ...
 
-    A motion that does not repeat has no such measures: its status names its kind.
+    A motion that does not repeat has no such measures; its status names its kind.
     """
 
     words: tuple[str, ...]
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """What stands where there is no result."""
+        """Return the readings of a point without a result."""
         return {word: "" if word in _TEXTS else math.nan for word in self.words}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
-        """The steady state, looked for from that of the neighbour where there is one."""
+        """Return the steady state, searched from that of the neighbour if there is one."""
         from hybridsim.analysis.steady import steady_state
 
         start = {} if previous is None else _start_of(previous)
         return steady_state(model, **{**self.options, **start})
 
     def read(self, result: SteadyState) -> dict[str, Any]:
-        """The readings in the order of the words."""
+        """Return the readings in the order of the words."""
         if not result.success:
             known = {name: getattr(result, name) for name in self.words if name in ("kind", "residual")}
             raise Incomplete(f"{result.kind}: {result.message}", known)
         return {word: _reading(result, word) for word in self.words}
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
-        """Readings that are none there: an equilibrium has no period."""
+        """Return the readings that do not exist for a result: an equilibrium has no period."""
         return ("period",) if result.kind == "equilibrium" else ()
 
 
@@ -69,11 +69,11 @@ class Final:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """What stands where there is no result."""
+        """Return the readings of a point without a result."""
         return {f"{FINAL}.{name}": math.nan for name in self.names}
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
-        """The states by name, from the neighbour's where there is one."""
+        """Return the states by name, from a run that starts at the neighbour's end if there is one."""
         from hybridsim.simulate import simulate
 
         given = {"save": "nothing", **self.options}
@@ -85,19 +85,19 @@ class Final:
         return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
 
     def read(self, result: dict[str, float]) -> dict[str, float]:
-        """Those that are asked for."""
+        """Return the requested states."""
         return {f"{FINAL}.{name}": result[name] for name in self.names}
 
 
 def ready_measure(
     words: str | Sequence[str], model: Model, options: Mapping[str, Any]
 ) -> Steady | Final | LastPeriod:
-    """A measure by its name, "steady" or "final", or by the names of its readings.
+    """Return a measure given by its name, "steady" or "final", or by the names of its readings.
 
     Raises
     ------
     UsageError
-        For names that do not exist, and readings of both together.
+        For unknown names, or readings of both kinds together.
     """
     asked = (words,) if isinstance(words, str) else tuple(words)
     states = [state.name for state in model.states]
@@ -114,7 +114,7 @@ def ready_measure(
     if FINAL in heads:
         raise UsageError(
             f"measure is {words!r}",
-            remedy="steady states and ends of runs are two sweeps; ask for one of them",
+            remedy="steady states and ends of runs need two sweeps; ask for one of them",
         )
     if AFTER in options:
         refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})
@@ -133,8 +133,8 @@ def ready_measure(
         is_harmonic = word.startswith("harmonic.") and last.isdecimal()
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
-                f"{word} is of a steady state, and after reads a period of a plain run",
-                remedy="leave one of them out; residual says how far a run is from repeating",
+                f"{word} belongs to a steady state, but after= reads one period of an ordinary run",
+                remedy="leave one of them out; residual measures how far a run is from repeating",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
@@ -150,13 +150,15 @@ def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) 
     after = whole(options.pop(AFTER), AFTER)
     for name in ("t_span", "save", "t_eval"):
         if name in options:
-            raise UsageError(f"{name} is given beside after", remedy="leave it out: the last period is kept")
-    period_of(model)  # where it has none, that is told once
+            raise UsageError(
+                f"{name} and after cannot be combined", remedy="leave it out: the last period is kept"
+            )
+    period_of(model)  # an unforced model is refused here, once for all points
     return LastPeriod(words, after, options, _reading)
 
 
 def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
-    """Units of readings with a name, as far as the model declares them."""
+    """Return the units of named readings, as far as the model declares them."""
     known, time = units_of(model), time_unit(model)
     units = {}
     for word in words:
@@ -171,7 +173,7 @@ def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
 
 
 def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
-    """Every reading of a steady state; of the harmonics the first."""
+    """Return every reading of a steady state, with the first harmonic of each quantity."""
     discrete = {d.name for d in model.discrete}
     quantities = [name for name in units_of(model) if name not in discrete]
     contacts = [contact.name for contact in model.contacts]
@@ -199,7 +201,7 @@ def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:
 
 
 def _start_of(steady: SteadyState) -> dict[str, Any]:
-    """State and modes from which a steady motion starts."""
+    """Return the state and the modes at the start of a steady motion."""
     run = steady.solution
     x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
     x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}

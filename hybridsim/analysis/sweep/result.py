@@ -1,4 +1,4 @@
-"""The result of a sweep: labelled arrays, and a status for every point."""
+"""This module defines the result of a sweep: labelled arrays, and a status for every point."""
 
 from __future__ import annotations
 
@@ -29,29 +29,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sweep(Readable):
-    """What was measured, over the values of parameters.
+    """The readings of a measure over values of parameters.
 
     Parameters
     ----------
     model : Model
-        With all that is the same at every point.
+        The model with all settings that are the same at every point.
     mode : str
         "grid" or "list".
     axes : mapping of str to array
-        Values (k,) of each parameter in order; texts where an expression depends on another axis.
+        Values (k,) of each parameter in order; texts if an expression depends on another axis.
     values : mapping of str to array
-        Readings by name; their shape is that of the grid, or (k,) for a list, and one more dimension where
-        the measure is an array. NaN where there is none.
+        Readings by name. Their shape is that of the grid, or (k,) for a list, with one more dimension if the
+        measure is an array. NaN marks missing values.
     status : array
-        Of the same shape, "ok" or what went wrong.
+        Of the same shape: "ok", or the error.
     units : mapping of str to str, optional
         Units of axes and readings, as far as they are known.
     measure : str, optional
-        What was measured, in words.
+        The name of the measure.
     interrupted : bool, optional
-        Whether Ctrl-C ended it; the points that were not run say so.
+        Whether Ctrl-C ended it; the points that were not run have the status "not run".
     wall_time, executor : float, str, optional
-        Seconds of all of it, and who did the work.
+        The total time in seconds, and the executor that did the work.
 
     Examples
     --------
@@ -79,11 +79,11 @@ class Sweep(Readable):
 
     @property
     def failed(self) -> np.ndarray:
-        """Where there is no result, of the shape of `status`."""
+        """A mask of the points without a result, in the shape of `status`."""
         return self.status != DONE
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A reading by its name."""
+        """Return a reading by its name."""
         if name not in self.values:
             raise UsageError(
                 f"the sweep has no {name!r}", remedy=nearest(str(name), self.values, kind="readings")
@@ -94,11 +94,11 @@ class Sweep(Readable):
         return "\n".join([heading(self), *statuses(self)])
 
     def table(self) -> str:
-        """Least and greatest value of each reading, and where they are; how many points have which status."""
+        """Return the least and greatest value of each reading, and the counts of statuses, as text."""
         return table(self)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Axes, readings and status as columns, a row for each point; an array is ``name[0]``, ``name[1]``, ..."""
+        """Return axes, readings and status as columns, one row per point; arrays become ``name[0]``, ..."""
         if self.mode == "grid":
             grids = np.meshgrid(*self.axes.values(), indexing="ij")
             found = {name: grid.ravel() for name, grid in zip(self.axes, grids, strict=True)}
@@ -113,7 +113,7 @@ class Sweep(Readable):
         return found | {"status": self.status.ravel()}
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one line a point, with all digits."""
+        """Write one line per point, with all digits."""
         columns = self.columns()
         with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
@@ -122,7 +122,7 @@ class Sweep(Readable):
                 writer.writerow([_plain(column[k]) for column in columns.values()])
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as plain values; None for what is no number."""
+        """Return all results as plain values; None replaces NaN and infinity."""
         return {
             "model": self.model.name,
             "measure": self.measure,
@@ -139,14 +139,14 @@ class Sweep(Readable):
         }
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Everything, with versions, machine and the model's hash, as text; written where a path is given."""
+        """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
         text = json_text(self.to_dict())
         if path is not None:
             write_text(path, text + "\n")
         return text
 
     def to_xarray(self) -> xr.Dataset:
-        """A data set over the axes: a variable for each reading with its unit, and the status."""
+        """Return a data set over the axes, with a variable and unit for each reading, and the status."""
         xarray = library("xarray")
         where = self.dimensions
         variables = {
@@ -164,9 +164,9 @@ class Sweep(Readable):
     def plot(self, *names: str, over: str | None = None) -> Any:
         """Draw readings: lines over one parameter, maps over two; see `hybridsim.plot.sweep`.
 
-        Returns the axes that were drawn in; ``hybridsim.plot.save`` writes them to a file.
+        Returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """
-        # pictures are a floor above: looked up when they are asked for, so that nothing down here depends on them
+        # The plot package is a layer above this one, so it is imported only on demand.
         return import_module("hybridsim.plot").sweep(self, *names, over=over)
 
     def _dimensions_of(self, name: str) -> tuple[str, ...]:
@@ -177,18 +177,18 @@ class Sweep(Readable):
         return {"units": self.units[name]} if self.units.get(name) else {}
 
     def problems(self) -> Iterator[tuple[str, int]]:
-        """What went wrong and at how many points, most frequent first."""
+        """Yield the errors with the number of points of each, most frequent first."""
         counted = Counter(text for text in self.status.ravel().tolist() if text not in (DONE, NOT_RUN))
         yield from counted.most_common()
 
 
 def _plain(value: Any) -> Any:
-    """A number with all its digits, a text as it is."""
+    """Return a number with all its digits, or a text unchanged."""
     return value if isinstance(value, str) else repr(value.item() if hasattr(value, "item") else value)
 
 
 def _nested(values: np.ndarray) -> Any:
-    """Lists that JSON can hold: null for what is no number, real and imaginary part of what is complex."""
+    """Return lists for JSON: null for NaN and infinity, real and imaginary parts for complex numbers."""
     if np.iscomplexobj(values):
         return {"real": _nested(values.real), "imaginary": _nested(values.imag)}
     if values.dtype.kind != "f":

@@ -1,4 +1,4 @@
-"""Poincare sections: the states of a settled motion each time a period of the forcing is over, or a level is passed."""
+"""This module samples a settled motion at a Poincare section: per forcing period, or at a level."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ if TYPE_CHECKING:
 
 LEVEL = "section"  # the monitor of a level
 REPEATS = "repeats_after"
-_DURATION = 10.0  # the first stretch of a model without a duration: a few swings of a mechanism of about 1 Hz
-_STRETCHES = 12  # each twice as long as the one before: the last two thousand times the first
-_FEWEST = 32  # periods of a first stretch under forcing: a section that is not passed in them is not reached
-_EMPTY_FREE = 5  # stretches without a single passing after which there is none, without forcing
+_DURATION = (
+    10.0  # the first interval of a model without a duration: a few swings of a mechanism of about 1 Hz
+)
+_STRETCHES = 12  # each twice as long as the previous one, the last two thousand times the first
+_FEWEST = 32  # periods of a first interval with forcing: a section that is not passed in them is not reached
+_EMPTY_FREE = 5  # intervals without any passage after which the search ends, without forcing
 
 
 class Passings(NamedTuple):
-    """States (k, n) at the section, the largest size (n,) of each along the motion, and where the run ended."""
+    """States (k, n) at the section, the largest size (n,) of each along the motion, and the end of the run."""
 
     states: np.ndarray
     sizes: np.ndarray
@@ -42,10 +44,10 @@ class Section:
     Parameters
     ----------
     level : the name of a monitor of the model, or "" for the period of the forcing.
-    settle, samples : passings before the first sample, and samples.
-    tol : how closely a sample repeats another, relative to the largest size of a state along the motion.
-    first : x0 and z0 of the first run; a chain goes on from where its neighbour ended.
-    options : of `simulate`.
+    settle, samples : passages before the first sample, and number of samples.
+    tol : tolerance for equal samples, relative to the largest size of a state along the motion.
+    first : x0 and z0 of the first run; a chain continues from the end of its neighbour.
+    options : options of `simulate`.
     """
 
     level: str
@@ -56,13 +58,13 @@ class Section:
     options: Mapping[str, Any]
 
     def run(self, model: Model, previous: Passings | None) -> Passings:
-        """The samples at a point, from where the neighbour ended."""
+        """Return the samples at a point, starting at the end of the neighbour's run."""
         motion = Motion(model, dict(self.options), dict(self.first))
         start = None if previous is None else previous.end
         return self._passed(motion, start) if self.level else self._strobed(motion, start)
 
     def read(self, result: Passings) -> dict[str, Any]:
-        """Each state's samples in order of time, and after how many they repeat (0: not within the samples)."""
+        """Return each state's samples in order of time, and the number after which they repeat (0: never)."""
         columns = {f"state {k}": column for k, column in enumerate(result.states.T)}
         return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
 
@@ -82,29 +84,31 @@ class Section:
         period = common_period(system_of(motion.model))
         length = motion.model.duration_value() or (period * max(wanted, _FEWEST) if period else _DURATION)
         for stretch in range(1, _STRETCHES + 1):
-            # from the beginning each time: what is driven, or has a clock, cannot be cut anywhere
+            # from the start each time, because a motion with forcing or a clock cannot be cut anywhere
             run = motion.run(start, length)
             found = [e.x_minus for e in run.events if e.component == self.level and e.kind == "monitor"]
             if len(found) >= wanted:
                 return Passings(np.array(found[self.settle : wanted]), _sizes(run), point_at_end(run))
             if not found and (period or stretch == _EMPTY_FREE):
                 raise SimulationError(
-                    f"the section was not passed upward once in a run of {length:.6g}: the motion does not reach it, "
-                    "or a contact sticks there"
+                    f"the section was not crossed upward in a run of length {length:.6g}: the motion does not reach "
+                    "it, or a contact sticks there"
                 )
             length *= 2.0
-        raise SimulationError(f"the section was passed {len(found)} times, and {wanted} were wanted")
+        raise SimulationError(
+            f"the section was crossed {len(found)} times, but {wanted} crossings are needed"
+        )
 
 
 def with_section(model: Model, section: str | None) -> tuple[Model, str]:
-    """The model with a monitor at a section, and the monitor's name; "" for the period of the forcing.
+    """Return the model with a monitor at a section, and the monitor's name; "" for the period of the forcing.
 
     Raises
     ------
     UsageError
-        For what is no text.
+        If the section is not a string.
     ExpressionError
-        For one that is no expression of the model.
+        If it is not an expression of the model.
     """
     if section is None:
         return model, ""
@@ -118,7 +122,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
 
 
 def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
-    """The least number of samples (k, n) after which all repeat, each state within its own tol; 0 where none does."""
+    """Return the least number of samples (k, n) after which all repeat within the tolerances; 0 if none."""
     for n in range(1, len(states) // 2 + 1):
         if (np.abs(states[n:] - states[:-n]) <= tols).all():
             return n
@@ -126,5 +130,5 @@ def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
 
 
 def _sizes(run: Solution) -> np.ndarray:
-    """Largest size of each state, from the steps of a run: a section may be where one of them is nought."""
+    """Return the largest size of each state from the steps of a run, since a state may be zero at the section."""
     return np.abs(run.y).max(axis=1)

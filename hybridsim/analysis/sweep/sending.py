@@ -1,4 +1,4 @@
-"""Sends pieces of a sweep to an executor, few at a time, and takes in what comes back."""
+"""This module sends pieces of a sweep to an executor, a few at a time, and stores the results."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from hybridsim.analysis.sweep.journal import Journal
 from hybridsim.analysis.sweep.pieces import Pieces
 from hybridsim.errors import UsageError
 
-# Pieces that are under way for each worker: one that it works at and one that waits for it. More would only take
-# memory.
+# Pieces in progress per worker: one being computed and one waiting. More would only need memory.
 _AHEAD = 2
-_LOOK = 0.1  # seconds between looks at what threads have done, for whoever watches, and for Ctrl-C
+_LOOK = 0.1  # seconds between checks of the threads, for progress and Ctrl-C
 
 
 class Points(Protocol):
-    """The points of a sweep, numbered in C order of a shape."""
+    """The protocol of the points of a sweep, numbered in C order of a shape."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the arrays of results; chains run along the first axis."""
 
     def settings(self, numbers: range) -> list[Settings]:
-        """What is set at some points."""
+        """Return the settings at some points."""
 
 
 def worker_count(executor: Any, workers: int | None) -> int:
-    """How many work at once: as asked for, else as the executor says, else one for each processor."""
+    """Return the number of workers: as requested, else that of the executor, else one per processor."""
     if workers is not None:
         return workers
-    # the pools of the standard library have no public name for it; others are taken to be as wide as the machine
+    # The pools of the standard library have no public attribute for it; others count as one worker per
+    # processor.
     known = getattr(executor, "_max_workers", None)
     return known if isinstance(known, int) and known > 0 else os.cpu_count() or 1
 
 
 class Sending:
-    """One sweep under way.
+    """One sweep in progress.
 
     Parameters
     ----------
-    job : what the workers do.
-    points, pieces : what is to be done, and how it is cut.
-    collected : where the results go.
-    tell : called with the number of points that are done; may raise KeyboardInterrupt.
-    journal : where results are written as they come.
+    job : the work at a point.
+    points, pieces : the points, and their division into pieces.
+    collected : stores the results.
+    tell : called with the number of finished points; may raise KeyboardInterrupt.
+    journal : receives the results as they arrive.
     """
 
     def __init__(
@@ -70,19 +70,19 @@ class Sending:
         self._under_way: dict[Future[Batch], range] = {}
 
     def run(self, executor: Executor, workers: int) -> bool:
-        """Do all of it; False where it was interrupted, with what was done until then.
+        """Run all pieces; return False if interrupted, with the results so far in `collected`.
 
         Raises
         ------
         UsageError
-            Where the executor cannot take the work.
+            If the executor cannot take the work.
         """
         shares = isinstance(executor, ThreadPoolExecutor)
         watch = Watch(lambda: not self._stop.is_set(), self._count) if shares else None
         waiting = self._pieces.next()
         try:
             while waiting is not None or self._under_way:
-                # threads share what the first point compiles, so that it goes alone
+                # threads share the code that the first point compiles, so it runs alone
                 width = 1 if shares and self._done == 0 else _AHEAD * workers
                 while waiting is not None and len(self._under_way) < width:
                     settings = self._points.settings(waiting)
@@ -100,7 +100,7 @@ class Sending:
             self._stop.set()
             for future in self._under_way:
                 future.cancel()
-            # a thread stops after its point; what other processes have begun is lost
+            # a thread stops after its point; pieces begun in other processes are lost
             if shares:
                 wait(self._under_way)
             self._take({f for f in self._under_way if f.done() and not f.cancelled() and not f.exception()})
@@ -135,19 +135,19 @@ class Sending:
                 self._refused(numbers, error)
 
     def _refused(self, numbers: range, error: BaseException) -> None:
-        """A worker catches what its points raise; what comes from an executor is about the sending."""
+        """Record a failure of sending; errors of the points themselves are caught by the workers."""
         require_sendable(self._job, error)
         lost = Outcome(f"lost by the executor: {type(error).__name__}: {error}", None)
         self._collected.put(numbers, [lost] * len(numbers))
 
 
 def require_sendable(job: Job, cause: BaseException | None = None) -> None:
-    """Refuse a sweep that cannot be sent to another process, naming what cannot."""
+    """Refuse a sweep that cannot be sent to another process, and name the part that cannot."""
     for what, thing in (("measure", job.measure), ("model", job.model)):
         try:
             pickle.dumps(thing)
-        except Exception as error:  # pickle raises what the thing's own methods raise
+        except Exception as error:  # pickle raises any error of the object's own methods
             raise UsageError(
                 f"the {what} of the sweep cannot be sent to another process ({error})",
-                remedy="define its functions with def at the top of a module, or leave executor out: threads take any",
+                remedy="define its functions with def at the top of a module, or leave executor out",
             ) from (cause or error)

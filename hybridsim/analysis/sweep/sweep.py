@@ -1,4 +1,4 @@
-"""Runs a measure over grids and lists of parameter values, on threads or any executor."""
+"""This module runs a measure over grids and lists of parameter values, on threads or any executor."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def sweep(
 ) -> Sweep:
     """Measure a model at many values of its parameters.
 
-    A point that fails, or gives NaN, has a status that says so, and never ends the sweep. The result is the same bit
-    for bit whatever the executor, the number of workers and the order in which they finish.
+    A point that fails, or gives NaN, has a status with the reason, and never ends the sweep. The result is
+    bit for bit the same for every executor, number of workers and order of completion.
 
     Parameters
     ----------
@@ -56,53 +56,54 @@ def sweep(
         For each parameter, or state (its initial value), a row of numbers or expressions: ``{"F0": [20, 30],
         "omega": ["0.5*sqrt(k/m)", 400]}``.
     measure : str, sequence of str or callable
-        A function of the model that returns a number, an array in one dimension, or a dict of these by name;
-        or "steady", what `steady_state` gives, "final", the states at the end of a run over ``t_span``; or
-        names of readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3", "kind"]``,
-        ``"final.x"``.
+        A function of the model that returns a number, a one-dimensional array, or a dict of these by name; or
+        "steady" for the results of `steady_state`; or "final" for the states at the end of a run over
+        ``t_span``; or names of readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3",
+        "kind"]``, ``"final.x"``.
     mode : str, optional
         "grid", all combinations; "list", the k-th values of all together.
     params : mapping of str to str or float, optional
         Parameter values that are the same at every point.
     executor : Executor, optional
-        Any `concurrent.futures.Executor`; if not given threads, on which the compiled engine runs in
-        parallel. For dask, ``client.get_executor()``.
+        Any `concurrent.futures.Executor`; by default threads, which run the compiled engine in parallel. For
+        dask, use ``client.get_executor()``.
     workers : int, optional
-        How many points are worked at at the same time; one for each processor, or as many as the executor
-        has, if not given.
+        Number of points that run at the same time; by default one per processor, or the number of the
+        executor's workers.
     warm_start : bool, optional
-        Each point along the first axis (of a list: all of it) gets the result of the one before: a function
-        is called ``measure(model, previous)``, with None at the first point and after one that failed; a
-        ready measure starts from the state of the neighbour. The first axis is then worked through in order;
+        Each point along the first axis (for a list: along all of it) receives the result of the previous one.
+        A function is called as ``measure(model, previous)``, with None at the first point and after a failed
+        one; a built-in measure starts from the neighbour's state. The first axis is then processed in order;
         the others are independent.
     after : int, optional
-        Periods of the forcing, from the start: readings of a steady state (of it ``residual``, how far it is from
-        repeating, but not ``kind`` and what else follows from it) are taken of the period that ends there, whether
-        or not the motion repeats by then. Where contacts and modes that are linear in the states make the model,
-        its runs then go through compiled code together: tens of times as many points a second as with
-        `steady_state`. Of the states and contacts alone; with outputs and harmonics each point runs by itself.
+        A number of forcing periods from the start. Readings of a steady state are then taken from the period
+        that ends there, whether or not the motion repeats by then (``residual`` measures how far it is from
+        repeating; ``kind`` and related readings are not available). For a model of contacts and linear modes,
+        all runs go through compiled code together, which is tens of times as fast as `steady_state`. This
+        applies to readings of states and contacts; with outputs or harmonics each point runs separately.
     units : mapping of str to str, optional
         Units of readings, for labels.
     journal : str or path, optional
-        A file to which results are written as they come. The same sweep with the same file takes from it what
-        there is: what was killed loses at most the points that were being worked at (with ``warm_start`` the
-        rows), and the result is to the last bit that of a sweep in one. A function is known by its code and all that
-        it reads, an object by its class and its state; what cannot be told from another one is refused.
+        A file to which results are written as they arrive. The same sweep with the same file continues from
+        it. After a kill only the points in progress are lost (with ``warm_start`` the rows in progress), and
+        the result is bit for bit that of an uninterrupted sweep. A function is identified by its code and all
+        data that it reads, an object by its class and its state; a value that cannot be identified is
+        refused.
     progress : callable, optional
-        Called as progress(done, total, what is next).
+        Called as progress(done, total, name of the next item).
     **options : Any
         Passed on to the measure: to the function, to `steady_state`, or to `simulate`.
 
     Returns
     -------
     Sweep
-        What was measured. After Ctrl-C what there is by then: its ``interrupted`` is true, and points that
-        were not run say so.
+        The readings. After Ctrl-C it contains the points that were finished: ``interrupted`` is true, and the
+        other points have the status "not run".
 
     Raises
     ------
     UsageError
-        For what cannot be swept over, a measure that does not exist, and work that an executor cannot take.
+        For an invalid parameter or measure, or work that an executor cannot take.
     ModelError
         For a faulty model.
 
@@ -123,7 +124,7 @@ def sweep(
     if after is not None:
         if warm_start:
             raise UsageError(
-                "warm_start is given beside after: the periods are counted from the start of each point",
+                "warm_start and after cannot be combined: the periods are counted from the start of each point",
                 remedy="leave one of them out",
             )
         options["after"] = after

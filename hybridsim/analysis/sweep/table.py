@@ -1,4 +1,4 @@
-"""A sweep in a few lines of text: its readings from least to greatest, and what became of its points."""
+"""This module writes a sweep as text: extremes of its readings, and counts of statuses."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from hybridsim.readable import aligned
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep.result import Sweep
 
-_SHOWN = 5  # kinds of status that are shown
+_SHOWN = 5  # number of statuses that are shown
 
 
 def heading(sweep: Sweep) -> str:
-    """Model, axes and readings in one line."""
+    """Return model, axes and readings in one line."""
     shape = " x ".join(f"{len(values)} {name}" for name, values in sweep.axes.items())
     return f"Sweep of {sweep.model.name} over {shape}: {', '.join(sweep.values) or 'nothing'}"
 
 
 def statuses(sweep: Sweep) -> list[str]:
-    """How many points have which status, a line each."""
+    """Return the number of points per status, one line each."""
     counted = Counter(sweep.status.ravel().tolist()).most_common()
     lines = [f"  {count} of {sweep.status.size} points: {text}" for text, count in counted[:_SHOWN]]
     return lines + ([f"  ... and {len(counted) - _SHOWN} other statuses"] if len(counted) > _SHOWN else [])
 
 
 def table(sweep: Sweep) -> str:
-    """Least and greatest value of each reading with the point that has it; of texts how often each occurs."""
+    """Return the least and greatest value of each reading with their points; for texts, the count of each."""
     rows: list[tuple[str, ...]] = []
     for name, values in sweep.values.items():
         unit = sweep.units.get(name, "")
@@ -51,7 +51,7 @@ def table(sweep: Sweep) -> str:
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
-    """The parameters of the point that holds the k-th number of a reading."""
+    """Return the parameters of the point that holds the k-th number of a reading."""
     place = np.unravel_index(k, shape)
     if sweep.mode == "list":
         return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())

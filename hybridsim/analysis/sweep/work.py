@@ -1,4 +1,4 @@
-"""Has the points of a sweep measured by an executor, threads if none is given, and says how far it has come."""
+"""This module runs the points of a sweep on an executor, by default threads, and reports progress."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def work(
     progress: Progress | None,
     journal: Journal | None = None,
 ) -> tuple[Collected, bool, str]:
-    """All results, whether they are whole, and who worked.
+    """Return all results, whether they are complete, and the name of the executor.
 
     Raises
     ------
     UsageError
-        For what is no executor, and where it cannot take the work.
+        If the executor is invalid, or cannot take the work.
     """
     if executor is not None and not isinstance(executor, Executor):
         raise UsageError(
@@ -54,19 +54,19 @@ def work(
 
 
 def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> np.ndarray:
-    """Which points (total,) are known from a journal; of a chain all or none."""
+    """Return a mask of the points (total,) known from a journal; a chain is known completely or not at all."""
     total = len(collected.status)
     known = np.zeros(total, dtype=np.bool_)
     for line, (numbers, outcomes) in enumerate(journal.known, start=2):
         in_range = all(0 <= k < total for k in numbers)
         if in_range and chains is not None:
             in_range = numbers == list(range(numbers[0], total, chains))[: len(numbers)] if numbers else False
-        elif in_range:  # each point has its result once
+        elif in_range:  # each point has its own result
             in_range = len(set(numbers)) == len(numbers) and not known[numbers].any()
         if not (numbers and in_range and len(numbers) == len(outcomes)):
             raise UsageError(
-                f"{journal.path}, line {line}: the points {numbers!r} are none of this sweep of {total}",
-                remedy="take the line out, or delete the file",
+                f"{journal.path}, line {line}: {numbers!r} are not points of this sweep of {total}",
+                remedy="remove the line, or delete the file",
             )
         known[numbers] = True
         if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
@@ -78,7 +78,7 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
 
 
 class _Told:
-    """Passes on how many points are done, with the time that the rest will take."""
+    """Reports the number of finished points and the remaining time."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress
@@ -89,7 +89,9 @@ class _Told:
         if self._progress is None:
             return
         now = time.monotonic()
-        if done and self._began is None:  # the first point compiles, and says nothing about the others
+        if (
+            done and self._began is None
+        ):  # the first point includes compiling, so that its time is not representative
             self._began, self._first = now, done
         words = f"{done} of {self._total} points"
         if self._began is not None and self._first < done < self._total:

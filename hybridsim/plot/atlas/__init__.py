@@ -1,4 +1,4 @@
-"""Pictures of the atlas."""
+"""This package draws the pictures of the atlas."""
 
 from hybridsim.plot.atlas.matrix import matrix
 from hybridsim.plot.atlas.scene import scene

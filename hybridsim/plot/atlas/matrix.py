@@ -1,4 +1,4 @@
-"""The matrix of the atlas: scenes by class of trouble against integrators, a symbol and a colour for each verdict."""
+"""This module draws the matrix of the atlas: scenes against integrators, with verdict symbols."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
     from hybridsim.testing.atlas import Atlas
 
-# Verdict -> fill, symbol, colour of the symbol. Light is harmless and dark is not, so that it reads in grey as well.
+# Verdict -> fill, symbol, colour of the symbol. Harmless verdicts are light and others dark, so that grey
+# prints work.
 LOOKS = {
     RIGHT: ("#cfe8dd", "✓", "#00664b"),
     WRONG_ANSWER: ("#D55E00", "✗", "white"),
@@ -33,14 +34,14 @@ LOOKS = {
     ERROR: ("#F0E442", "!", "#222222"),
     NOT_RUN: ("white", "", "#999999"),
 }
-_CELL = 0.19  # inches; so are the margins, of which the top one holds the names of integrators
+_CELL = 0.19  # inches, like the margins; the top margin holds the names of integrators
 _LEFT, _RIGHT, _TOP, _BOTTOM = 2.0, 0.1, 1.7, 0.7
-_TALL = 40  # rows from which on the names stand below as well
-_NARROWEST = 3.0  # what the legend needs
+_TALL = 40  # from this number of rows on, the names are repeated below
+_NARROWEST = 3.0  # inches that the legend needs
 
 
 def matrix(result: Atlas) -> Axes:
-    """Draw the matrix; a row a scene, grouped by class, a column an integrator."""
+    """Draw the matrix, with one row per scene, grouped by class, and one column per integrator."""
     groups = result.by_class()
     rows = sum(len(scenes) for scenes in groups.values()) + len(groups)
     columns = len(result.configurations)

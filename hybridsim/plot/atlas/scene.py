@@ -1,4 +1,4 @@
-"""The small picture of a scene: the true motion and its events, and how a typical method fails."""
+"""This module draws the small picture of a scene: the true motion with its events, and a typical failure."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas.example import Example, Line
 
 _RIGHT, _WRONG = style.INK, style.PALETTE[1]
-_MOST = 400  # ticks of events; more than these are a band
-_SMALL = 0.04  # of the motion: an error below this is drawn on a scale of its own
-_BEYOND = 1.5  # what explodes is cut at so many heights of the true motion
+_MOST = 400  # ticks of events; more are drawn as a band
+_SMALL = 0.04  # of the motion: a smaller error gets its own scale
+_BEYOND = 1.5  # a diverging run is cut at this multiple of the true motion's height
 
 
 def scene(example: Example) -> Axes:
@@ -83,7 +83,7 @@ def scene(example: Example) -> Axes:
 
 
 def _error(right: Line, failing: Line) -> np.ndarray | None:
-    """The difference on the grid of the right run where it is too small to be seen beside it, but above rounding."""
+    """Return the difference of the runs if it is too small to be visible but above rounding, else None."""
     if failing.t.size < 2:
         return None
     off = np.interp(right.t, failing.t, failing.x, left=np.nan, right=np.nan) - right.x

@@ -1,4 +1,4 @@
-"""A picture as a small file: few colours are enough for lines and symbols."""
+"""This module saves pictures as small files with few colours."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _COLOURS = 48
 
 
 def save_small(picture: Any, path: Path, dpi: float = 100.0) -> Path:
-    """Write a .png with a palette of its own, a third as large as one without."""
+    """Write a .png with its own palette, which is a third of the normal size."""
     with whole_file(path) as partly:
         save(picture, partly, dpi)
         with Image.open(partly) as image:

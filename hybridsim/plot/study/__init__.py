@@ -1,4 +1,4 @@
-"""The pictures of published studies that were done again."""
+"""This package draws the figures of reproduced studies."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ __all__ = ["pictures"]
 
 
 def pictures(study: Study) -> dict[str, Callable[[], Figure]]:
-    """What to draw of a study, by the end of the file's name; in the order of the paper, then beyond it."""
-    step, interval = "steps a period, h0", "zero-velocity interval eps_v [m/s]"
+    """Return the figures of a study by the end of their file names, in the order of the paper, then further ones."""
+    step, interval = "steps per period, h0", "zero-velocity interval eps_v [m/s]"
     return {
         "figure-3": lambda: motions(study.figure_3, "Figure 3: F0/N = 0.75, r = 0.6", spectrum=True),
         "figure-4": lambda: convergence(

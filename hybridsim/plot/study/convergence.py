@@ -1,4 +1,4 @@
-"""Figures 4 and 5: how A and E come to rest as the step, or the zero-velocity interval, shrinks."""
+"""This module draws figures 4 and 5: convergence of A and E with the step or the zero-velocity interval."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hybridsim.plot.study.motions import column_title
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LINEAR = 0.01  # per cent: below it the scale is linear, so that zero and both signs have a place
+_LINEAR = 0.01  # per cent: below it the scale is linear, to show zero and both signs
 _LINES = {"r": "-", "N": "--", "F": ":"}
 
 
 def convergence(curves: Curves, title: str, label: str, published: float) -> Figure:
-    """(A - exact)/exact and the same of E over the settings, a column for each method, a line for each case."""
+    """Draw (A - exact)/exact and the same of E over the settings, with a column per method and a line per case."""
     methods = list(curves.values)
     figure = style.figure(2.6 * len(methods) + 0.6, 5.4)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")

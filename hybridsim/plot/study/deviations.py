@@ -1,4 +1,4 @@
-"""Maps of what leaving out stick changes, with the paper's regions, and what the step does to it."""
+"""This module draws maps of the deviation without stick, with the paper's regions, and the effect of the step."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLOURS = "cividis"  # the same order of lightness for every kind of sight
+_COLOURS = "cividis"  # lightness is ordered in the same way for all types of colour vision
 _LOW, _HIGH = 0.3, 100.0  # per cent
 
 
 def edges(centres: np.ndarray) -> np.ndarray:
-    """Borders of cells whose centres are given."""
+    """Return the borders of cells from their centres."""
     middle = 0.5 * (centres[1:] + centres[:-1])
     return np.concatenate(
         [[centres[0] - (middle[0] - centres[0])], middle, [centres[-1] + (centres[-1] - middle[-1])]]
@@ -29,7 +29,7 @@ def edges(centres: np.ndarray) -> np.ndarray:
 
 
 def deviation_maps(maps: Maps, quantity: str) -> Figure:
-    """Eq. 9 over r and F0/N: against the published A2 in two readings, and against the exact one."""
+    """Draw Eq. 9 over r and F0/N: against the published A2 in two readings, and against the exact one."""
     from matplotlib.colors import LogNorm
     from matplotlib.lines import Line2D
 
@@ -89,7 +89,7 @@ def _regions(axes: Axes, quantity: str) -> None:
 
 
 def step_lines(study: StepStudy) -> Figure:
-    """Deviation from the exact motion along the published ridge, against the step and the zero-velocity interval."""
+    """Draw the deviation along the published ridge, against the step and the zero-velocity interval."""
     figure = style.figure(9.6, 4.0)
     figure.suptitle(
         "Deviation of A from the exact motion, root mean square over ten places along the published ridge",
@@ -105,7 +105,7 @@ def step_lines(study: StepStudy) -> Figure:
     left.loglog(
         STEPS, base * STEPS[0] / np.array(STEPS), color=style.FAINT, linestyle="--", label="first order"
     )
-    left.set_xlabel("steps a period, h0", fontsize=9)
+    left.set_xlabel("steps per period, h0", fontsize=9)
     left.set_xticks(STEPS, labels=[str(s) for s in STEPS])
     left.set_title("without stick", fontsize=10, loc="left")
     for k, variant in enumerate(MATTERING):

@@ -1,4 +1,4 @@
-"""Maps over F0/N and r of what is true: stick, stops, the simpler models, the settings that are needed."""
+"""This module draws maps over F0/N and r: stick, stops, errors of simpler models, and needed settings."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOURS = "cividis"
-_MOST_STOPS = 8  # more are drawn as that many
+_MOST_STOPS = 8  # larger numbers are drawn as this one
 
 
 def stick_and_stops(truth: Truth) -> Figure:
-    """Stick fraction, stops per period and amplitude of the exact motion, with the boundary of no stops on top."""
+    """Draw stick fraction, stops per period and amplitude of the exact motion, with the no-stop boundary."""
     from matplotlib.colors import BoundaryNorm, LogNorm
 
     figure = style.figure(11.0, 4.0)
@@ -60,7 +60,7 @@ def stick_and_stops(truth: Truth) -> Figure:
 
 
 def simpler_models(truth: Truth) -> Figure:
-    """How far off the exact amplitude each simpler model is."""
+    """Draw the error of the amplitude of each simpler model."""
     figure = style.figure(11.0, 4.0)
     figure.suptitle(
         "Deviation of the amplitude of simpler models from the exact one; white: no stops above it",
@@ -78,14 +78,14 @@ def simpler_models(truth: Truth) -> Figure:
 
 
 def needed_settings(needed: Needed) -> Figure:
-    """The coarsest step and the largest interval that are within 1 % of the exact amplitude."""
+    """Draw the coarsest step and the largest interval for an error of the amplitude below 1 %."""
     figure = style.figure(9.6, 7.4)
     figure.suptitle(
         "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not",
         fontsize=11, x=0.01, ha="left",
     )  # fmt: skip
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    rows = ((needed.steps, STEPS, "steps a period, h0"), (needed.eps, EPS, "eps_v [m/s]"))
+    rows = ((needed.steps, STEPS, "steps per period, h0"), (needed.eps, EPS, "eps_v [m/s]"))
     for line, (tables, ladder, label) in zip(panels, rows, strict=True):
         mesh: Any = None
         for axes, (name, table) in zip(line, tables.items(), strict=True):
@@ -102,7 +102,7 @@ def needed_settings(needed: Needed) -> Figure:
 
 
 def timed_map(race: Race) -> Figure:
-    """Error of the amplitude against the time of a point: median and largest over the sample."""
+    """Draw the error of the amplitude against the time per point, as median and largest over the sample."""
     figure = style.figure(7.6, 4.2)
     figure.suptitle(
         f"Steady amplitude over a map: {race.side} x {race.side} points, error against time of a point",
@@ -141,7 +141,7 @@ def _frame(axes: Axes, truth: Truth, title: str) -> None:
 def _deviation(axes: Axes, r: np.ndarray, ratios: np.ndarray, values: np.ndarray) -> Any:
     from matplotlib.colors import LogNorm
 
-    axes.set_facecolor(style.MARK)  # where nothing moves, or the model has no answer
+    axes.set_facecolor(style.MARK)  # nothing moves, or the model has no answer
     shown = np.clip(100.0 * values, 0.01, 1000.0)
     return axes.pcolormesh(
         edges(r), edges(ratios), shown, norm=LogNorm(0.01, 1000.0), cmap=_COLOURS, rasterized=True

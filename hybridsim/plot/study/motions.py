@@ -1,4 +1,4 @@
-"""Displacement, friction force and harmonics by each method, a column each, the exact motion last."""
+"""This module draws displacement, friction force and harmonics, with a column per method."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from hybridsim.analysis.study.response import Response
 
 _MICRO = 1e6
-_LEAST = 1e-6  # harmonics below this share of the first are drawn at it: rounding and the sampling lie there
-# under each column the reading of the method, in short
+_LEAST = 1e-6  # relative to the first; smaller harmonics are rounding and are drawn at this value
+# short column titles for the readings of the method
 _TITLES = {"sign by step": "without stick, sign by step", "sign by stage": "without stick, sign by stage"}
 
 
 def column_title(name: str) -> str:
-    """A method in a few words."""
+    """Return a short title for a method."""
     if name.startswith("v "):
         return f"with stick, {name.split(',')[0]}"
     return _TITLES.get(name, name)
 
 
 def plain_log(axis: Axis) -> None:
-    """A logarithmic axis with ticks at 1, 2, 5, 10, 20, ..., in plain numbers."""
+    """Set a logarithmic axis with ticks at 1, 2, 5, 10, 20, ..., in plain numbers."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     axis.axes.set_xscale("log")
@@ -39,7 +39,7 @@ def plain_log(axis: Axis) -> None:
 
 
 def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Figure:
-    """x and f over two periods; with `spectrum`, the harmonics of x below."""
+    """Draw x and f over two periods; with `spectrum`, the harmonics of x below."""
     names = [*(name for name in runs if name != "exact"), "exact"]
     rows = 3 if spectrum else 2
     figure = style.figure(2.45 * len(names) + 0.6, 1.9 * rows + 0.6)

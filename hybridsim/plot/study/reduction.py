@@ -1,4 +1,4 @@
-"""Figures 8 and 9: A and E over those without friction as F0 grows at fixed F0/N."""
+"""This module draws figures 8 and 9: A and E relative to those without friction as F0 grows at fixed F0/N."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def reduction(found: Reduction) -> Figure:
-    """A line for each F0/N: flat where (r, F0/N) is all that matters."""
+    """Draw a line for each F0/N, which is flat if only (r, F0/N) matters."""
     names = [*(v.name for v in METHODS), EXACT, STRIBECK]
     figure = style.figure(2.3 * len(names) + 0.4, 4.8)
     figure.suptitle(

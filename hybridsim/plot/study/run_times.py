@@ -1,4 +1,4 @@
-"""Figures 6 and 7: what a small interval, and what stick, costs in run time and in right-hand sides."""
+"""This module draws figures 6 and 7: run time and right-hand sides for a small interval, and for stick."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def interval_cost(times: RunTimes) -> Figure:
-    """t_d over eps_v for every case, and the right-hand sides beside it."""
+    """Draw t_d over eps_v for every case, and the right-hand sides next to it."""
     figure = style.figure(9.2, 3.8)
     figure.suptitle(
         f"Figure 6: cost of a smaller zero-velocity interval, mean of {times.repeats} runs of {times.periods} periods",
@@ -45,7 +45,7 @@ def interval_cost(times: RunTimes) -> Figure:
 
 
 def stick_cost(times: RunTimes) -> Figure:
-    """Milliseconds of 100 periods by every method and case."""
+    """Draw the milliseconds per run for every method and case."""
     figure = style.figure(8.6, 4.2)
     figure.suptitle(
         f"Figure 7: time of {times.periods} periods, mean of {times.repeats} runs",
