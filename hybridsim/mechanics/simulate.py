@@ -90,7 +90,8 @@ def simulate_mechanical(
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(
-            f"t_span is {t_span!r}", remedy="give t1 >= t0, or simulate system.to_model() backward"
+            f"t_span is {t_span!r}",
+            remedy="give t1 >= t0, as it runs forward only, or simulate system.to_model()",
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(

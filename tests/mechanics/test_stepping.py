@@ -198,7 +198,7 @@ def test_a_forcing_gives_the_step_and_the_start_may_be_changed() -> None:
     a = 1 / (4 - w * w)
     exact = 0.1 * math.cos(6) - a * w / 2 * math.sin(6) + a * math.sin(3 * w)
     assert sol(3.0)[0] == pytest.approx(exact, abs=2e-5)
-    with pytest.raises(hs.UsageError, match="no single one"):
+    with pytest.raises(hs.UsageError, match="no single forcing period"):
         hs.simulate(ball(0.5), (0, 1), integrator="moreau")
 
 
