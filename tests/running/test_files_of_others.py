@@ -162,7 +162,7 @@ def test_files_that_are_no_solutions(kind: str, tmp_path: Path) -> None:
     path.write_bytes(BAD_FILES[kind]())
     tracemalloc.start()
     try:
-        with pytest.raises(hs.UsageError, match=r"r\.hsol holds no solution"):
+        with pytest.raises(hs.UsageError, match=r"r\.hsol is not a saved solution"):
             hs.load_solution(path)
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:
