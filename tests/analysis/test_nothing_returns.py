@@ -10,7 +10,7 @@ import hybridsim as hs
 def test_a_state_that_only_adds_up_is_no_steady_state(rate):
     found = hs.steady_state(hs.Model("drift", states=[hs.State("x", 0.0, rate)]))
     assert not found.success
-    assert "x does not come back" in found.message
+    assert "x does not return" in found.message
 
 
 @pytest.mark.parametrize("rate", ["1", "0.3 + x"])

@@ -77,7 +77,7 @@ direction = "up"
 action = "reset"
 reset.x = "x + 1\""""
     declared = model('x = { start = 0, der = "1" }\ny = { start = 0, der = "x" }', "a = 1\nc = 3", rest)
-    with pytest.raises(UsageError, match="move apart"):
+    with pytest.raises(UsageError, match="separate"):
         hs.sensitivities(hs.simulate(declared, (0.0, 1.5)), ["a"])
 
 
@@ -89,7 +89,7 @@ reset.x = "x + 1\""""
         (
             'x = { start = 0, der = "-x + sin(t)" }',
             '[schedules.s]\ntimes = [1.0]\nreset.x = "x + 1"',
-            "comes to an end",
+            "ends: there is no steady state",
         ),
     ],
 )

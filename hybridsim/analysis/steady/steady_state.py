@@ -1,4 +1,4 @@
-"""`steady_state`: the motion that a model settles on, found and measured."""
+"""This module finds and measures the motion that a model settles on."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.model import Model
 
-_SETTLE = 32  # periods at first
+_SETTLE = 32  # periods of the first run
 _MOST_AT_ONCE = 512
 _MAX_PERIODS = 4096
-_MOST_PERIODS = 10**6  # more of them would take days
-_ALLOWANCE = 60.0  # seconds, roughly, for these periods
-_DURATION = 100.0  # of a first run without forcing, where the model has none of its own
+_MOST_PERIODS = 10**6  # more would take days
+_ALLOWANCE = 60.0  # approximate seconds for these periods
+_DURATION = 100.0  # of a first run without forcing, if the model has no duration
 _FIRST_RUN = {
     "events": 1000,
     "steps": 20000,
-}  # what that may cost: else its own scale of time is a shorter one
-_FEWEST = 4  # passings that say something
-_WAIT = 256  # periods that are run in the time of a few Newton steps
-_MARGIN = 1.1  # on how many are expected to be needed
-_GROWS = 1.2  # times what it was: a state that has no end of growing
+}  # the limits of that run; if they are reached, the model's own time scale is shorter
+_FEWEST = 4  # passages that are needed for a decision
+_WAIT = 256  # periods that take as long as a few Newton steps
+_MARGIN = 1.1  # on the expected number of periods
+_GROWS = 1.2  # a larger growth means a state that grows without end
 _COMMENSURATE = 1e-9
-_TIGHTER = 1e-2  # the runs' tolerance, in units of that of the steady state
+_TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
-_NEUTRAL = 1e-3  # an exponent below that, per period, is nought
+_NEUTRAL = 1e-3  # a smaller exponent per period is zero
 PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
     "periodic",
     "equilibrium",
@@ -83,12 +83,12 @@ def steady_state(
 ) -> SteadyState:
     """Find the motion that a model settles on from its start, over one period, with its measures.
 
-    A run is followed until it repeats; Newton's method on the period map (single shooting) then takes the place of
-    waiting, its matrix from the variational flow carried through the events (`hs.sensitivities`). Where an orbit's
-    sequence of events differs from that of the step before, or Newton's method does not close in, the run goes on
-    instead. Only what attracts is returned: a motion that repels is not what a model settles on. Where the periods of
-    forcing and clocks have no common multiple nothing repeats: the motion is quasi-periodic if every small change of
-    its start dies out, else not settled.
+    A run is followed until it repeats; then Newton's method on the period map (single shooting) replaces
+    waiting, with a matrix from the variational flow through the events (`hs.sensitivities`). If the sequence
+    of events changes between Newton steps, or Newton's method does not converge, the run continues instead.
+    Only stable motions are returned, because a model does not settle on an unstable one. If the periods of
+    forcing and clocks have no common multiple, the motion is quasi-periodic if every small change of its
+    start decays, and not settled otherwise.
 
     Parameters
     ----------
@@ -97,20 +97,20 @@ def steady_state(
     params, x0, z0 : mapping, optional
         As in `simulate`.
     period : float, optional
-        Of the forcing; found from the model where it has one. Without forcing the period is an unknown of the
-        motion, found as well.
+        Period of the forcing; by default that of the model. Without forcing the period is unknown and is
+        found with the motion.
     integrator, rtol : str, float, optional
-        As in `simulate`; rtol is tol/100 unless given.
+        As in `simulate`; by default rtol is tol/100.
     tol : float, optional
-        How closely the states repeat, relative to the largest size of each along the motion; so good is the
-        motion as well, since what the repetition leaves over is divided by how fast it contracts.
+        Tolerance for the repetition of the states, relative to the largest size of each along the motion. The
+        motion has a similar accuracy.
     settle : int, optional
-        Periods (passings of a section, without forcing) before the first look.
+        Periods (without forcing, passages of a section) before the first test.
     max_periods : int, optional
-        Periods after which the motion is judged as it is: chaotic where its largest Lyapunov exponent is
-        positive, quasi-periodic where it is nought, else not settled.
+        Number of periods after which the motion is classified as it is: chaotic if its largest Lyapunov
+        exponent is positive, quasi-periodic if the exponent is zero, else not settled.
     progress : callable, optional
-        Called with the share of these periods that is over, from time to time; what it raises ends the
+        Called from time to time with the finished fraction of these periods; an exception from it ends the
         search.
     **options : Any
         As in `simulate`.
@@ -118,15 +118,15 @@ def steady_state(
     Returns
     -------
     SteadyState
-        Its ``kind`` says what the motion is; period, amplitude, energy, stick fraction, multipliers and so on
-        are those of a periodic one, and are refused for others.
+        The result. Its ``kind`` classifies the motion; period, amplitude, energy, stick fraction, multipliers and so on
+        exist for a motion that repeats or rests, and raise an error otherwise.
 
     Raises
     ------
     UsageError
-        For arguments that do not fit, and a forcing that never repeats (a table, a chirp).
+        For invalid arguments, or a forcing that never repeats (a table, a chirp).
     SimulationError
-        Where a run ends early.
+        If a run ends early.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def steady_state(
 
 
 class _Search:
-    """Follows a motion until it is known what it settles on."""
+    """Follows a motion until its kind is known."""
 
     def __init__(
         self,
@@ -191,12 +191,14 @@ class _Search:
         self.newton_steps, self.periods = 0, 0
         declared = motion.model.duration_value()
         self.duration = declared or _DURATION
-        self.least = 0.0 if declared else _DURATION  # of a stretch that may tell rest from what is slow
-        self.scale = self.earlier = np.zeros(0)  # of the states, over the last stretches that were followed
+        self.least = (
+            0.0 if declared else _DURATION
+        )  # of an interval that can distinguish rest from slow motion
+        self.scale = self.earlier = np.zeros(0)  # of the states, over the last intervals that were followed
         self.seen = np.zeros(0)  # largest scale of each state so far
         self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
-        self.without = 0  # stretches in a row on which nothing came back
-        self.expected = 0  # periods that the motion is expected to need until it has settled
+        self.without = 0  # consecutive intervals on which nothing returned
+        self.expected = 0  # expected number of periods until the motion has settled
 
     def run(self) -> SteadyState:
         passings = self._follow(None)
@@ -216,10 +218,11 @@ class _Search:
             passings = self._follow(passings)
 
     def _not_below_rounding(self, passings: Passings) -> Passings:
-        """The passings, with scales below which a change of a state is rounding.
+        """Return the passages with lower bounds of the scales, below which a change is rounding.
 
-        A state that dies out beside what it was has none of its own. A discrete state that settles on zero is set by
-        what the others are: a change of them by their own size, carried over a period, makes its size.
+        A state that has decayed relative to its former size has no scale of its own. A discrete state that
+        settles on zero gets its size from the other states: from the effect over one period of a change of
+        them by their own size.
         """
         self.seen = passings.scale if not len(self.seen) else np.maximum(self.seen, passings.scale)
         scale = np.maximum(passings.scale, _NOTHING_LEFT * self.seen)
@@ -232,7 +235,7 @@ class _Search:
         return replace(passings, scale=scale)
 
     def _over_a_period(self, start: Point) -> np.ndarray:
-        """What a period of the forcing makes of changes of the start (n + d, n + d); zeros where that is unknown."""
+        """Return the effect of changes of the start over one forcing period (n + d, n + d); zeros if unknown."""
         try:
             return derivatives(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
@@ -240,11 +243,11 @@ class _Search:
 
     @property
     def share(self) -> float:
-        """Of the periods after which the motion is judged as it is."""
+        """The finished fraction of the periods after which the motion is classified as it is."""
         return min(self.periods / self.max_periods, 1.0)
 
     def _follow(self, last: Passings | None) -> Passings:
-        """The motion from where it is on, for as long again as it has been followed."""
+        """Follow the motion from its present point for as long again as so far."""
         start = None if last is None else last.last
         if self.period is not None:
             count = self.expected or min(max(self.settle, self.periods), _MOST_AT_ONCE)
@@ -255,7 +258,7 @@ class _Search:
         for _ in range(_LONGER):
             passings = self._passed(start)
             if passings.rests:
-                # a stretch that was cut short tells nothing of what is slow
+                # an interval that was cut short shows nothing about slow motion
                 if self.duration >= self.least or self.motion.stands_still(passings.last):
                     break
             elif len(passings.times) >= _FEWEST or (passings.adds_up and last is not None):
@@ -268,7 +271,7 @@ class _Search:
         return passings
 
     def _passed(self, start: Point | None) -> Passings:
-        """The motion over the duration; at first, where the model has none, over what a run of some cost reaches."""
+        """Return the motion over the duration, or at first over the length of a run of limited cost."""
         is_free_to_choose = start is None and self.least > 0.0 and "limits" not in self.motion.options
         if is_free_to_choose and self.duration == self.least:
             try:
@@ -278,12 +281,12 @@ class _Search:
         return free_passings(self.motion, start, self.duration, self.largest)
 
     def _closed(self, passings: Passings) -> Orbit | None:
-        """The periodic orbit that the motion is on, or comes to by Newton's method."""
+        """Return the periodic orbit of the motion, or the one found by Newton's method, or None."""
         orbit = self._repeated(passings)
         return None if orbit is None or self._has_died_out(orbit) else orbit
 
     def _has_died_out(self, orbit: Orbit) -> bool:
-        """Whether a closed orbit without forcing is a point of rest, about which rounding goes round."""
+        """Return whether a closed orbit without forcing is an equilibrium with rounding around it."""
         if self.period is not None:
             return False
         low, high = ranges(self.motion.run(orbit.start, orbit.period), 0.0)
@@ -300,7 +303,7 @@ class _Search:
             math.ceil(min(_MARGIN * passings.more(multiple, self.tol), _MOST_AT_ONCE)) + 2 * multiple
         )
         if self.period is not None and self.expected <= _WAIT:
-            return None  # it settles while Newton's method would be made ready
+            return None  # it settles before Newton's method would be ready
         self.expected = 0
         return self._shot(passings, multiple)
 
@@ -323,7 +326,7 @@ class _Search:
     def _periodic(self, orbit: Orbit) -> SteadyState:
         orbit = self._shortest(orbit)
         if self._rests(orbit):
-            message = f"equilibrium: nothing moves but by rounding; residual {orbit.residual:.1e}"
+            message = f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
             return _found(
                 self.motion, EQUILIBRIUM, orbit, self.period is None, self.newton_steps, self.periods, message
             )
@@ -335,7 +338,7 @@ class _Search:
         )
 
     def _rests(self, orbit: Orbit) -> bool:
-        """Whether all that moves along an orbit is rounding."""
+        """Return whether all motion along an orbit is rounding."""
         solution = self.motion.run(orbit.start, orbit.period)
         held = [segment.p[solution._system.layout.discrete_slice] for segment in solution._segments]
         if any((values != held[0]).any() for values in held):
@@ -345,7 +348,7 @@ class _Search:
         return bool((high - low <= rounding).all())
 
     def _shortest(self, orbit: Orbit) -> Orbit:
-        """The orbit with the least period: one that closes after a divisor of its multiple is taken for what it is."""
+        """Return the orbit with its least period, which may be a divisor of the one found."""
         for divisor in range(1, orbit.multiple):
             if orbit.multiple % divisor:
                 continue
@@ -357,9 +360,9 @@ class _Search:
         return orbit
 
     def _other(self, passings: Passings) -> SteadyState:
-        """A motion that does not repeat: told apart by its largest Lyapunov exponent."""
+        """Classify a motion that does not repeat by its largest Lyapunov exponent."""
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
-        # exponents take derivatives, which Python functions do not have
+        # exponents need derivatives, which Python functions do not have
         has_slopes = system_of(self.motion.model).has_tape
         first, second = math.nan, math.nan
         if has_slopes:
@@ -377,10 +380,10 @@ class _Search:
             + (
                 f"largest Lyapunov exponent {exponent:.3g} per unit of time"
                 if has_slopes
-                else "the exponents of Python functions, whose derivatives are not known, do not tell what it is"
+                else "its kind is unknown, because derivatives of Python functions are unknown"
             )
             + (
-                f", and {leaving} goes on moving away: nothing holds it back, or it only adds up"
+                f", but {leaving} never returns: nothing restores it, or it only accumulates"
                 if leaving
                 else ""
             )
@@ -390,17 +393,17 @@ class _Search:
         return found
 
     def _without_return(self, passings: Passings) -> SteadyState:
-        """A motion that does not come back to where it was, however long it is followed."""
+        """Return the result for a motion that does not return to where it was."""
         name = self.motion.names[passings.state]
         orbit = Orbit(passings.last, self.duration, 1, math.inf)
         message = (
-            f"{UNSETTLED} within {self.duration:.3g} units of time: {name} does not come back; if it only "
-            f"adds up, leave it out, and if it is slow, give the model a longer duration"
+            f"{UNSETTLED} within {self.duration:.3g} units of time: {name} does not return; if it only grows, remove "
+            "it from the model, and if it is slow, give the model a longer duration"
         )
         return _found(self.motion, UNSETTLED, orbit, periods=self.periods, message=message)
 
     def _leaving(self, passings: Passings) -> str:
-        """The name of a state that never comes back; empty if all do."""
+        """Return the name of a state that never returns, or an empty string."""
         names = [*self.motion.names, *self.motion.discrete]
         drifting = passings.drifting()
         if drifting is not None:
@@ -412,7 +415,7 @@ class _Search:
 _LONGER, _ROUNDS = (
     8,
     3,
-)  # times that a stretch is made longer at once, and stretches on which nothing comes back
+)  # factor by which an interval is lengthened, and number of intervals without a return
 
 
 def _found(
@@ -432,13 +435,13 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
         raise UsageError(f"period is {period!r}", remedy="give a time above zero")
     if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
         raise UsageError(
-            f"period is {period!r}, and model {model.name} is driven with the period {own!r}",
+            f"period is {period!r}, but model {model.name} is forced with the period {own!r}",
             remedy="leave it out, or give a whole multiple",
         )
 
 
 def _refuse_what_ends(system: System, is_period_given: bool) -> None:
-    """Refuse impacts, and what happens once or changes for ever: from then on there is another model."""
+    """Refuse impacts, and events or inputs that change the model permanently."""
     model = system.model
     if system.is_unilateral.any():
         raise UsageError(
@@ -454,8 +457,8 @@ def _refuse_what_ends(system: System, is_period_given: bool) -> None:
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:
             raise UsageError(
-                f"{clock.name} of model {model.name} comes to an end: there is no steady state before",
-                remedy="leave it out, or let it tick for ever",
+                f"{clock.name} of model {model.name} ends: there is no steady state before",
+                remedy="leave it out, or let it tick without end",
             )
         start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
         if start >= evaluate(clock.period, system.values):
@@ -467,6 +470,6 @@ def _refuse_what_ends(system: System, is_period_given: bool) -> None:
     plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])
     if plain and not is_period_given:
         raise UsageError(
-            f"model {model.name} depends on t itself, not on the sine of an angle: it need not repeat",
-            remedy="give its period=, if it does",
+            f"model {model.name} contains t outside of sines and cosines: its period is unknown",
+            remedy="if the motion is periodic, pass period=",
         )

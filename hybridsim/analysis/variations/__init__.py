@@ -1,4 +1,4 @@
-"""How a run changes when its start or its parameters do: the variational flow, carried through events."""
+"""This package computes derivatives of a run by its start and its parameters, through all events."""
 
 from hybridsim.analysis.variations.sensitivities import Sensitivities, sensitivities
 

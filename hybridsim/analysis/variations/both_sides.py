@@ -1,4 +1,4 @@
-"""Whether the derivatives on both sides of a run agree where it lies exactly on a guard, a surface or the end."""
+"""This module compares the derivatives on both sides of a run that lies exactly on a guard, a surface or the end."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from hybridsim.analysis.variations.carried import Carrier
     from hybridsim.analysis.variations.directions import Carried, Directions
 
-_AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less agree
-_ROUNDING = 1e-11  # of the states' sizes, by a change of everything by its own size
+_AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less are equal
+_ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own size
 
 
 def agreed(
     carrier: Carrier, directions: Directions, carried: Carried
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
-    """Derivatives (n + d, M) of the end and (E, M) of the times, NaN where two sides differ; and what parts them.
+    """Return derivatives (n + d, M) of the end and (E, M) of the times, NaN if the sides differ, and the causes.
 
-    carried : on the side of the run, with what is at its zero. Each direction that moves that off is carried forward
-    and backward, each on its own side. The result's last part names what is at its zero, with a mask (M,) of the
-    directions along which something differs.
+    carried: the derivatives on the side of the run, with the functions that are exactly at zero. Each
+    direction that moves one of these off zero is carried forward and backward, on its own side. The last part
+    of the result names these functions, with a mask (M,) of the directions along which the sides differ.
     """
     end = np.concatenate([carried.x, carried.discrete])
     width = end.shape[1]
@@ -35,7 +35,7 @@ def agreed(
     count = len(chosen)
     try:
         both = carrier.carry(directions.both_ways(chosen), sided=True)
-    except UsageError:  # what is one event on the side of the run falls apart on the other
+    except UsageError:  # one event on the side of the run is several events on the other side
         end[:, chosen], times[:, chosen] = np.nan, np.nan
     else:
         lost = np.minimum(both.lost[:count], both.lost[count:])
@@ -55,6 +55,6 @@ def agreed(
 
 
 def _meeting(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
-    """What both sides agree on; NaN elsewhere, and of the directions that are lost."""
+    """Return the derivatives if both sides agree; NaN elsewhere, and for lost directions."""
     apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
     return np.where(apart | lost, np.nan, 0.5 * (one + other))

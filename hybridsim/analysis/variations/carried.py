@@ -1,12 +1,13 @@
-"""Derivatives carried along a run: over its segments by the variational flow, through its events by saltation.
+"""This module carries derivatives along a run: the variational flow on segments, saltation matrices at events.
 
-At an event the time of which moves by dt, a change dx of the state before it becomes
+At an event whose time changes by dt, a change dx of the state before it becomes
 
     dx+ = R_x (dx- + f- dt) + R_t dt + R_p - f+ dt,    dt = -(g_x dx- + g_p)/(g_t + g_x f-),
 
 with the reset R, the guard g and the rates f-, f+ on both sides (M. A. Aizerman and F. R. Gantmacher, Quart. J. Mech.
-Appl. Math. 11 (1958) 52; M. di Bernardo et al., Piecewise-smooth Dynamical Systems, Springer 2008, section 2.5). Where
-a mode holds a state on a constraint, its derivative is that of the constraint: what stick takes away is exactly zero.
+Appl. Math. 11 (1958) 52; M. di Bernardo et al., Piecewise-smooth Dynamical Systems, Springer 2008, section
+2.5). If a mode holds a state on a constraint, its derivative is that of the constraint, so that stick removes
+a change exactly.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.system import System
     from hybridsim.solution import Solution
 
-_ROUNDING = 1e-11  # of a run's length, by a change of its own size: a time that moves by less does not move
+_ROUNDING = 1e-11  # of a run's length, for a change of its own size: a time that moves by less does not move
 _SAME = 1e-9  # of its size: a state that changes by less at an event does not jump
 
 
@@ -64,13 +65,13 @@ class Carrier:
         self.system: System = solution._system
         if not self.system.has_tape:
             raise UsageError(
-                f"model {solution.model.name} is made of Python functions, of which derivatives are not known",
+                f"model {solution.model.name} consists of Python functions, whose derivatives are unknown",
                 remedy="write it in expressions",
             )
         if self.system.is_unilateral.any():
             raise UsageError(
                 f"model {solution.model.name} has impacts, through which derivatives are not carried",
-                remedy="write it with a guard and a reset, or compare runs with parameters that differ",
+                remedy="write it with a guard and a reset, or compare runs with different parameters",
             )
         module: Any = self.system.code.module
         self._project = differentiated(module.project)
@@ -79,9 +80,9 @@ class Carrier:
         self._scale = np.where(largest > 0.0, largest, 1.0)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
-        """From the first segment to the end of the last.
+        """Carry directions from the first segment to the end of the last.
 
-        sided : whether what a direction moves off its zero is followed on that side, and not on the side of the run.
+        sided : whether a direction that moves a function off zero is followed on its side, not on that of the run.
         """
         G = directions.parameters
         self._sided, self._lost = sided, np.full(G.shape[1], np.inf)
@@ -117,19 +118,19 @@ class Carrier:
         return Carried(Y, Yd, times, self._off, self._lost)
 
     def _is_end(self, segment: Segment) -> bool:
-        """Whether a segment begins at the end of the run, to rounding."""
+        """Return whether a segment begins at the end of the run, to rounding."""
         end = self.solution._segments[-1].end
         return bool(segment.start.minus(end) >= -4.0 * math.ulp(float(end)))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
-        """Mask (M,) of the directions that move a time, given its derivatives."""
+        """Return a mask (M,) of the directions that move a time, given its derivatives."""
         length = self.solution.t_end - self.solution.t_start
         return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
 
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Where something happens exactly at the end: a change may move it beyond the end, where it is not seen."""
+        """Handle an event exactly at the end, which a change may move beyond the end."""
         before, system = last.segment, self.system
         moves = self._moves(last.shift)
         jumps = bool(
@@ -147,7 +148,7 @@ class Carrier:
         return np.where(is_later, last.Y, Y), np.where(is_later, last.Yd, Yd)
 
     def _note(self, off: list[OffZero]) -> np.ndarray | float:
-        """Keep what is at its zero; what is to be added to the derivatives of the states, if sides are followed."""
+        """Store the functions at zero; return the addition to the states' derivatives."""
         self._off += off
         if not self._sided:
             return 0.0
@@ -156,12 +157,12 @@ class Carrier:
         return more
 
     def sizes(self) -> np.ndarray:
-        """Of the states and discrete states (n + d, 1): all above zero."""
+        """Return the sizes of the states and discrete states (n + d, 1), all positive."""
         discrete = np.abs(self.system.discrete_start)
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """The change along each direction (M,) that is as large as the first of what it changes."""
+        """Return the change along each direction (M,) that is as large as the first quantity that it changes."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])
@@ -172,12 +173,12 @@ class Carrier:
     def _started(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, event_times: EventTimes
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives behind what happened at the first instant itself."""
+        """Return the derivatives after the events of the first instant."""
         happened = at_start(self.solution)
         for one in happened:
             if one.kind == "scheduled" and any(shift.any() for shift in event_times.scheduled(one)):
                 raise UsageError(
-                    f"{one.component} happens at the start of the run, and its time depends on what is changed",
+                    f"{one.component} happens at the start of the run, at a time that depends on the varied quantities",
                     remedy="begin the run a little earlier or later",
                 )
         z = segment.z.copy()
@@ -187,7 +188,7 @@ class Carrier:
                 z[c] = automaton.modes.index(one.source)
         x = happened[0].x_minus if happened else segment.x[0]
         d = self.system.discrete_start if happened else self.system.discrete(segment.p)
-        begun = self.solution._run.task.z0  # what was in no mode yet held nothing either
+        begun = self.solution._run.task.z0  # a component without a mode held nothing yet
         loose = [
             (c, a.above)
             for c, a in enumerate(self.system.automata)
@@ -220,7 +221,7 @@ class Carrier:
     def _over(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, end: float
     ) -> np.ndarray:
-        """Over a segment from one local time to another."""
+        """Carry derivatives over a segment from one local time to another."""
         if end <= begin or not self.system.n:
             return Y
         tape, directions = (
@@ -277,7 +278,7 @@ class Carrier:
         Yd, at_once = rounds.Yd, rounds.Y
         if self._is_end(
             following
-        ):  # what a jump moves off its surface has no time to come back, nor guards to fire
+        ):  # a state that a jump moves off its surface has no time to return, and no guard fires
             later = self._moves(rounds.shift - shift)
             self._note([one._replace(lost=one.lost | later) for one in rounds.off])
             rounds.off.clear()
@@ -301,7 +302,7 @@ class Carrier:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)
 
     def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Derivatives of the states behind an instant, where those that hold do so again; notes what is at its zero.
+        """Return the derivatives of the states after an instant, and note the functions at zero.
 
         x, before : states and rates (n,) before the instant.
         """
@@ -315,7 +316,7 @@ class Carrier:
     def _projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
     ) -> np.ndarray:
-        """Derivatives of the states with the held ones on their constraints: at a local time, or at the start."""
+        """Return the derivatives with held states on their constraints, at a local time or at the start."""
         system = self.system
         if not system.holds(segment.z):
             return Y
@@ -329,7 +330,7 @@ class Carrier:
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:
-    """Behind an instant."""
+    """Return the place just after an instant."""
     return Place(
         float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
         rounds.Y, rounds.Yd, rounds.shift, rounds.large,

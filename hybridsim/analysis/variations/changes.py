@@ -1,4 +1,4 @@
-"""What a change along each direction makes of guards, monitors and surfaces."""
+"""This module computes the derivatives of guards, monitors and surfaces along each direction."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from hybridsim.engine.tangents import TangentTape
 if TYPE_CHECKING:
     from hybridsim.engine.system import System
 
-_ALIKE = 1e-7  # of its terms: a change that is less is none
-_ROUNDING = 1e-11  # of what a change of everything by its own size does: below it is rounding
-_EXACT = 2.0**-46  # of its terms: a value that is less is zero
-_AT_ZERO = 1e-9  # of what a guard's terms are along the run: it is at its zero, and so has fired by itself
+_ALIKE = 1e-7  # of its terms: a smaller change is zero
+_ROUNDING = 1e-11  # of the effect of a change of everything by its own size: a smaller one is rounding
+_EXACT = 2.0**-46  # of its terms: a smaller value is zero
+_AT_ZERO = 1e-9  # of a guard's terms along the run: it is at zero, and so has fired by itself
 _TANGENTIAL = (
     1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
 )
@@ -24,10 +24,10 @@ _TANGENTIAL = (
 
 @dataclass(frozen=True)
 class Place:
-    """Where derivatives are at: local time, its origin, states, run-time vector and modes, and derivatives there.
+    """A place on the run with derivatives: local time, its origin, states, run-time vector, modes.
 
-    Y, Yd : of the states (n, M) and discrete states (d, M); shift : of the time (M,).
-    large : sizes (n, M) of the terms whose sums Y are.
+    Y, Yd : derivatives of the states (n, M) and discrete states (d, M); shift : of the time (M,).
+    large : sizes (n, M) of the terms of the sums Y.
     """
 
     s: float
@@ -43,7 +43,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Changed:
-    """One guard, monitor or surface: its value, and its derivatives (M,) with the sizes of their terms (M,).
+    """One guard, monitor or surface: its value, its derivatives (M,), and the sizes of their terms (M,).
 
     row (n,), by_time : its derivatives by the states and by time.
     """
@@ -58,11 +58,11 @@ class Changed:
 
     @property
     def moves(self) -> np.ndarray:
-        """Mask (M,) of the directions along which it changes."""
+        """A mask (M,) of the directions along which it changes."""
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Its rate where the states have these rates (n,); 0 where that is nothing beside its terms."""
+        """Return its rate if the states have these rates (n,); 0 if it is negligible relative to its terms."""
         terms = np.append(self.row * rates, self.by_time)
         return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
 
@@ -73,7 +73,7 @@ class Changes:
     Parameters
     ----------
     scale : (n,) sizes of the states.
-    own : (M,) the change along each direction that is as large as what it changes.
+    own : (M,) the change along each direction that is as large as the quantity that it changes.
     G : derivatives of the parameters (P, M).
     rates : derivatives of the forcing's angular rates by the parameters.
     """
@@ -85,7 +85,7 @@ class Changes:
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
-        """The rates (n,) of the states, and their derivatives by all that formulas read."""
+        """Return the rates (n,) of the states, and their derivatives by all inputs of the formulas."""
         found = TangentTape(self.system, at.z)(
             np.array([at.s]), at.x[None, :], at.p, seeds(self.system, at.origin, self.rates)
         )
@@ -98,7 +98,7 @@ class Changes:
         monitors: tuple[int, ...] = (),
         surfaces: tuple[int, ...] = (),
     ) -> list[Changed]:
-        """Of the guards, then the monitors, then the surfaces with these numbers."""
+        """Return the changes of the guards, then monitors, then surfaces with these numbers."""
         system, n = self.system, self.system.n
         tape = TangentTape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, seeds(system, at.origin, self.rates))

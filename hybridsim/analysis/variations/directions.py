@@ -1,4 +1,4 @@
-"""What is changed at the start of a run, and what becomes of that by its end."""
+"""This module defines the directions of change at the start of a run, and their derivatives at its end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Directions:
-    """What is changed: M directions in the states, the discrete states and the parameters.
+    """M directions of change in the states, the discrete states and the parameters.
 
     x (n, M), discrete (d, M), parameters (P, M): the derivatives at the start of the run.
     """
@@ -23,17 +23,17 @@ class Directions:
     parameters: np.ndarray
 
     def both_ways(self, chosen: np.ndarray) -> Directions:
-        """Some of them, and then the same backward."""
+        """Return some of the directions, followed by their negatives."""
         rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
         return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
 
 
 @dataclass(frozen=True)
 class Carried:
-    """Derivatives at the end of a run, and of the time of each event on the way.
+    """Derivatives at the end of a run, and of the time of each event before it.
 
-    x (n, M), discrete (d, M); times: of each instant at which something happened, with its derivatives (M,);
-    off: what is exactly at its zero and is moved off it by some directions;
+    x (n, M), discrete (d, M); times: each instant with an event, and its derivatives (M,);
+    off: functions exactly at zero that some directions move off zero;
     lost: times (M,) from which on directions lead to another run, or infinity.
     """
 

@@ -1,4 +1,4 @@
-"""Derivatives of the times of events: of zeros of guards and monitors, and of schedules."""
+"""This module computes derivatives of event times: zeros of guards and monitors, and schedules."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from hybridsim.expr import evaluate
 if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
 
-_ALIKE = 1e-7  # events at one instant are one event if their times change alike to that part
+_ALIKE = 1e-7  # relative; events at one instant are one event if the derivatives of their times agree
 
 
 @dataclass(frozen=True)
 class Shift:
-    """Derivatives (M,) of a time, and for each of them the size (M,) of the terms whose sum it is."""
+    """Derivatives (M,) of a time, and the size (M,) of the terms of each sum."""
 
     values: np.ndarray
     sizes: np.ndarray
@@ -45,7 +45,7 @@ class EventTimes:
         Y: np.ndarray,
         Yd: np.ndarray,
     ) -> np.ndarray:
-        """Of what happened at local time s of a segment (M,): of everything that came about by itself, the same."""
+        """Return the derivatives (M,) of the time of the events at local time s, which all located events share."""
         width = self._changes.G.shape[1]
         if not happened:
             return np.zeros(width)
@@ -64,8 +64,8 @@ class EventTimes:
                 shifts += [] if shift is None else [shift]
         if not shifts:
             raise UsageError(
-                f"what set off the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is not "
-                "known, and so the derivatives of its time are not",
+                f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is unknown, "
+                "and so are the derivatives of its time",
                 remedy="take other parameters, or a run that ends before",
             )
         first = shifts[0]
@@ -74,8 +74,8 @@ class EventTimes:
             for shift in shifts
         ):
             raise UsageError(
-                f"several events at t = {float(happened[0].instant):.9g} move apart when the run is changed: "
-                f"{', '.join(sorted({o.component for o in happened}))}; there is no derivative",
+                f"several events at t = {float(happened[0].instant):.9g} separate when the run is changed "
+                f"({', '.join(sorted({o.component for o in happened}))}): there is no derivative",
                 remedy="take other parameters, or a run that ends before",
             )
         return first.values
@@ -83,7 +83,7 @@ class EventTimes:
     def recorded(
         self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
     ) -> np.ndarray:
-        """Of a monitor that changes nothing (M,); NaN where it only touches its zero."""
+        """Return the derivatives of a recording monitor's time (M,); NaN if it only touches zero."""
         shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
         return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
 
@@ -97,7 +97,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Of an event at a zero of a guard or monitor; None for one that followed from another."""
+        """Return the shift of an event at a zero of a guard or monitor; None for one that followed from another."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:
@@ -124,7 +124,7 @@ class EventTimes:
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Of a scheduled event (M,): of each time of its schedule that it may be."""
+        """Return the derivatives (M,) of a scheduled event, for each time of its schedule that it may be."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

@@ -1,8 +1,9 @@
-"""States exactly on a guard or surface: what a change that moves them off makes of the run on the other side.
+"""This module handles states exactly on a guard or surface, where a change leads to the other side.
 
-A change to the side of the run leaves it as it is. One to the other side is followed for the time tau that it takes to
-come back, which is of first order: there the rates are others, and the states change by (f_there - f_here) tau.
-Where it does not come back, or a reset waits, the run on the other side is another one, and there is no derivative.
+A change to the side of the run leaves the run as it is. A change to the other side is followed for the time
+tau until it returns, which is of first order. The rates differ there, so that the states change by (f_there -
+f_here) tau. If it does not return, or a reset acts there, the run on the other side is another one, and there
+is no derivative.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from hybridsim.engine.reset_keys import added
 from hybridsim.engine.system import System
 from hybridsim.engine.tangents import TangentTape
 
-_SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less are the same
+_SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less are equal
 
 
 class OffZero(NamedTuple):
-    """What is at its zero at time t, and what becomes of the directions (M,) that move it off.
+    """A function exactly at zero at time t, and the effect on the directions (M,) that move it off zero.
 
-    moves : mask (M,) of these directions. lost : mask (M,) of those whose side the run does not come back from.
-    more : what is added to the derivatives (n, M) of the states on the side that the run is not on; elsewhere zero.
+    moves : mask (M,) of these directions. lost : mask (M,) of those from whose side the run does not return.
+    more : addition to the derivatives (n, M) of the states on the other side; zero elsewhere.
     """
 
     t: float
@@ -37,7 +38,7 @@ class OffZero(NamedTuple):
 
 
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """dx/dt (n,) as the states move: those that a mode holds go with their constraint, which no flow says."""
+    """Return dx/dt (n,) of the states; held states follow their constraints."""
     rates = system.flow(s, x, p, z)
     if not system.holds(z):
         return rates
@@ -48,27 +49,27 @@ def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarr
 
 
 def differ(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether rates (n,) are not the same."""
+    """Return whether rates (n,) differ."""
     return bool((np.abs(one - other) > _SAME * (np.abs(one) + np.abs(other))).any())
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Derivatives (n, M) of the states when all that hold do so again, and what is left at its zero."""
+    """Return derivatives (n, M) of the states after holding is restored, and the functions left at zero."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards()
 
 
 def limits_at_zero(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
-    """Limits of what has just come to hold, or to pass its surface, that are exactly reached."""
+    """Return the limits that are exactly reached by components that have just begun to hold, or pass a surface."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 
 
 def monitors_at_zero(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Monitors at their zero at the start of a run, which from one side would fire a little later.
+    """Return monitors at zero at the start of a run, which from one side would fire a little later.
 
-    later : where the run is then; it tells the side that it goes to where the rate at the start is zero.
+    later : a later place; it gives the side if the rate at the start is zero.
     """
     monitors = changes.system.model.monitors
     numbers = tuple(range(len(monitors)))
@@ -86,15 +87,17 @@ def monitors_at_zero(changes: Changes, at: Place, later: Place) -> list[OffZero]
 
 
 class _Sides:
-    """Both sides of what is at its zero at one place."""
+    """Both sides of the functions at zero at one place."""
 
     def __init__(self, changes: Changes, at: Place) -> None:
         self.changes, self.system, self.at, self.before = changes, changes.system, at, at
-        self.pushed = np.zeros(at.Y.shape[1], dtype=bool)  # directions with impulses of what holds again
+        self.pushed = np.zeros(
+            at.Y.shape[1], dtype=bool
+        )  # directions with impulses of components that hold again
         self.here = self._rates(at.z)
 
     def guards(self) -> list[OffZero]:
-        """Guards that are at their zero without firing, and would on one side only, with an effect."""
+        """Return the guards at zero that do not fire, and would fire with an effect on one side only."""
         places = [
             (c, i, g)
             for c, automaton in enumerate(self.system.automata)
@@ -109,18 +112,16 @@ class _Sides:
         for (c, i, _), one, earlier in zip(places, found, before, strict=True):
             if one.is_zero and one.moves.any():
                 off += self._guard(c, i, one)
-            if (
-                one.is_zero and (earlier.moves & self.pushed).any()
-            ):  # it may fire before what holds does so again
+            if one.is_zero and (earlier.moves & self.pushed).any():  # it may fire before holding is restored
                 for other in self._guard(c, i, earlier):
                     lost = (other.lost | other.more.any(axis=0)) & self.pushed
                     off.append(other._replace(lost=lost, more=np.zeros_like(other.more)))
         return off
 
     def surfaces(self) -> list[OffZero]:
-        """Surfaces from which the sides differ.
+        """Return the surfaces whose sides differ.
 
-        What moves off a surface that holds it comes back at once, by an impulse of the force that drives it there.
+        A change off a held surface returns at once, by an impulse of the force that holds it.
         """
         chosen = [
             (k, c)
@@ -129,7 +130,7 @@ class _Sides:
         ]
         if not chosen:
             return []
-        free = self.at.z.copy()  # what holds a state replaces it in formulas
+        free = self.at.z.copy()  # held states are replaced in formulas
         for _, c in chosen:
             free[c] = self.system.automata[c].above
         found = self.changes.of(replace(self.at, z=free), surfaces=tuple(k for k, _ in chosen))
@@ -184,9 +185,9 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """A surface that the run leaves to one side, before and behind the impulses of what holds again.
+        """Return a surface that the run leaves to one side, before and after the impulses of holding components.
 
-        On the other side, directions with impulses do not come back by themselves.
+        On the other side, directions with impulses do not return by themselves.
         """
         pushed = self.pushed
         name, is_above = self.system.automata[c].name, bool(self.at.z[c] == self.system.automata[c].above)
@@ -206,7 +207,7 @@ class _Sides:
         return off
 
     def _freed(self, c: int, one: Changed, other: int) -> list[OffZero]:
-        """What holds and would not do so again, where the impulse of another one is more than it takes."""
+        """Return a component that would no longer hold, because the impulse of another one exceeds its limit."""
         automaton, off = self.system.automata[c], []
         numbers = self.system.automata[other].guards[self.system.automata[other].hold]
         for mode, mask in ((automaton.above, one.by > 0.0), (automaton.below, one.by < 0.0)):
@@ -240,7 +241,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
-        """Limits of what a surface holds, or would hold, that are exactly reached."""
+        """Return the exactly reached limits of a component that holds, or would hold."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)
         numbers = automaton.guards[automaton.hold]
@@ -260,7 +261,7 @@ class _Sides:
         return off
 
     def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
-        """At its zero; on the other side of it a function that changes at a speed, or does not come back (0)."""
+        """Return a function at zero that changes on its other side at a speed, or does not return (speed 0)."""
         other = other & one.moves
         t = self.at.origin + self.at.s
         if speed == 0.0:
@@ -281,7 +282,7 @@ class _Sides:
         return z
 
     def _is_smooth(self, z: np.ndarray) -> bool:
-        """Whether rates and their derivatives are the same in modes z: a corner as of x abs(x), of higher order."""
+        """Return whether rates and their derivatives are equal in modes z, as at the smooth corner of x abs(x)."""
         one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
         return not any(differ(a, b) for a, b in zip(one, other, strict=True))
 
@@ -292,9 +293,9 @@ def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def beyond(off: Sequence[OffZero], width: int) -> tuple[np.ndarray, np.ndarray | float]:
-    """Of what is at its zero at one place: the mask (M,) of directions that are lost, and what is added to the states.
+    """Return the mask (M,) of lost directions at one place, and the addition to the derivatives of the states.
 
-    A direction to the other side of several at once is lost: which comes back first changes what the others do.
+    A direction to the other side of several functions at once is lost, because the order of return matters.
     """
     lost, more, count = np.zeros(width, dtype=bool), np.zeros(1), np.zeros(width)
     for one in off:

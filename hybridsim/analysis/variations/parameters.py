@@ -1,4 +1,4 @@
-"""Derivatives of all parameter values and initial values by some parameters, expressions of others included."""
+"""This module computes derivatives of parameter values and initial values by some parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
-    """d(value of each parameter)/d(each chosen one), (P, C): what `model.with_` would change along with it."""
+    """Return d(value of each parameter)/d(each chosen one), (P, C), including dependent parameters."""
     names = [p.name for p in model.parameters]
     slopes = {name: np.zeros(len(chosen)) for name in names}
     values = model.parameter_values()
@@ -38,7 +38,7 @@ def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
 
 
 def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: np.ndarray) -> np.ndarray:
-    """d(initial values)/d(chosen parameters), (len(expressions), C)."""
+    """Return d(initial values)/d(chosen parameters), (len(expressions), C)."""
     slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
     values = model.parameter_values()
     rows = [expression_slope(e, values, slopes, by_parameter.shape[1]) for e in expressions]
@@ -48,7 +48,7 @@ def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: 
 def expression_slope(
     expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray], width: int
 ) -> np.ndarray:
-    """d(expression of parameters)/d(chosen parameters), (width,), by the chain rule."""
+    """Return d(expression of parameters)/d(chosen parameters), (width,), by the chain rule."""
     total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():

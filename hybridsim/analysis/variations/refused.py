@@ -1,4 +1,4 @@
-"""Limits of series of events that derivatives are not carried through, and inputs that they are not known by."""
+"""This module refuses accumulations and inputs through which derivatives are not carried."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from hybridsim.model import Model
 
-# A series that was followed to its last thousand roundings of the time has all its derivatives in the events passed.
+# A series that was followed to its last thousand roundings of time has all its derivatives in the passed
+# events.
 _ROUNDINGS = 4096.0
 
 
@@ -29,8 +30,8 @@ def refuse_limits(solution: Solution) -> None:
         names = [guard.name for guard in component.mode(event.source).guards]
         if event.guard == LIMIT and LIMIT in names and component.limit:
             raise UsageError(
-                f"the guard {LIMIT} of {event.component} has the name of the changes that are made where its "
-                f"events accumulate, as at t = {event.t!r}: its own are not told apart from them",
+                f"the guard {LIMIT} of {event.component} has the reserved name of changes at an accumulation, as at "
+                f"t = {event.t!r}, so that the two cannot be distinguished",
                 remedy="give the guard another name",
             )
         if event.guard == LIMIT and LIMIT not in names:
@@ -38,14 +39,14 @@ def refuse_limits(solution: Solution) -> None:
                 raise UsageError(
                     f"the events that accumulate at t = {event.t!r} were not followed to rounding: derivatives are "
                     "not carried through them",
-                    remedy="take differences of runs",
+                    remedy="use finite differences of runs",
                 )
         elif event.t > before:
             before = event.t
 
 
 def refuse_inputs(model: Model, G: np.ndarray) -> None:
-    """Refuse parameters that change an input's shape: the derivatives G (P, M) by them are not known."""
+    """Refuse parameters that change an input's shape, because the derivatives G (P, M) by them are unknown."""
     moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
     starts = {part.name: part.start.names for part in model.discrete}
     for declared in model.inputs:
@@ -53,7 +54,7 @@ def refuse_inputs(model: Model, G: np.ndarray) -> None:
         used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
         if used:
             raise UsageError(
-                f"{declared.subject} depends on {used[0]}, and its derivative by that is not known",
+                f"{declared.subject} depends on {used[0]}, but its derivative by {used[0]} is not known",
                 remedy=f"leave {used[0]} out, or write the input as an expression of t"
                 if declared.kind != "step"
                 else f"leave {used[0]} out, or let a schedule at that time reset a discrete state",

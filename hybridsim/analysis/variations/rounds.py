@@ -1,4 +1,4 @@
-"""Resets of one instant with their derivatives: in the rounds in which they follow from each other."""
+"""This module applies the resets of one instant with their derivatives, in rounds that follow from each other."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from hybridsim.engine.pieces import Occurrence, Segment
     from hybridsim.engine.system import System
 
-_ALIKE = 1e-7  # guards fire together if their delays are alike to that part
+_ALIKE = 1e-7  # relative; guards fire together if their delays agree
 
 
 def is_knot(system: System, instant: Instant) -> bool:
-    """Whether an input has a knot at an instant, to rounding."""
+    """Return whether an input has a knot at an instant, to rounding."""
     slack = 4.0 * math.ulp(float(instant))
     for signal in system.signals:
         knot = signal.next_knot(instant.plus(-slack), True)
@@ -34,7 +34,7 @@ def is_knot(system: System, instant: Instant) -> bool:
 
 
 def batches(happened: Sequence[Occurrence]) -> list[list[Occurrence]]:
-    """What happened at one instant, apart where the state was recorded in between."""
+    """Return the events of one instant, split where the state was recorded in between."""
     found: list[list[Occurrence]] = []
     for one in happened:
         if (
@@ -57,10 +57,10 @@ class Rounds:
     Y, Yd : derivatives (n, M), (d, M).
     changes : of guards and monitors, with the derivatives of the parameters.
     shift : derivatives (M,) of the time of the instant.
-    large : sizes (n, M) of the terms whose sums Y are.
-    loose : components that hold from this instant on, each with a mode in which nothing is held: states are read in it.
-    is_start : whether what has fired was at its zero before anything moved.
-    sided : whether directions that move off a zero are followed on their own side of it.
+    large : sizes (n, M) of the terms of the sums Y.
+    loose : components that hold from this instant on, each with a free mode, in which states are evaluated.
+    is_start : whether the fired functions were at zero before any motion.
+    sided : whether directions that move off a zero are followed on their own side.
     """
 
     def __init__(
@@ -84,17 +84,17 @@ class Rounds:
         self._loose, self._has_moved = loose, is_start
         self.has_reset = self.has_jumped = False
         self.off: list[OffZero] = []
-        self.overtaken: list[OffZero] = []  # what else happens, where a change delays a round
+        self.overtaken: list[OffZero] = []  # other events, if a change delays a round
         self._later: list[np.ndarray] = []
         self._reset = differentiated(system.code.module.reset)
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
     def at_end(self, segment: Segment, happened: Sequence[Occurrence]) -> None:
-        """Behind events that were found along a segment."""
+        """Apply the events that were found along a segment."""
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Behind what was due at an instant, inputs as they are from then on."""
+        """Apply the events that were due at an instant, with inputs on their next pieces."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
@@ -113,7 +113,7 @@ class Rounds:
             pending = [one for one in pending if not any(one is other for other in fired)]
 
     def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
-        """Whether a guard or monitor is at its zero, or beyond: what is not follows from another reset."""
+        """Return whether a guard or monitor is at or below zero; otherwise it follows from another reset."""
         system = self.system
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
@@ -147,15 +147,15 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """To when the guards of a round fire, where a change has moved them off their zero.
+        """Move to the time when the guards of a round fire, if a change has moved them off zero.
 
-        They have to do so together, and nothing else may happen before that.
+        They must fire together, and no other event may happen before that.
         """
         system, later, values = self.system, self._later[0], self._with_discrete(p)
         at = Place(s, origin, self.x, values, self.z, self.Y, self.Yd, self.shift, self.large)
         apart = [np.abs(other - later) > _ALIKE * (np.abs(other) + np.abs(later)) for other in self._later]
         lost, names = np.any(apart, axis=0), [f"guard {one.guard} of {one.component}" for one in fired]
-        for c, _ in self._loose:  # which comes to hold on its way there
+        for c, _ in self._loose:  # which begins to hold on the way there
             free, k = replace(at, z=self._reading()), system.surface_of.index(c)
             lost |= self._changes.of(free, surfaces=(k,))[0].moves & (later > 0.0)
         if lost.any():
@@ -168,7 +168,7 @@ class Rounds:
         self.shift = self.shift + later
 
     def _reading(self) -> np.ndarray:
-        """Modes in which states are read as they are, and not evaluated from what is to hold them."""
+        """Return the modes in which states are evaluated freely, not from later constraints."""
         z = self.z.copy()
         for c, mode in self._loose:
             z[c] = mode
@@ -180,7 +180,7 @@ class Rounds:
         return values
 
     def _apply(self, fired: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
-        """All resets of one round: each reads the state before; those that add are summed."""
+        """Apply all resets of one round to the state before it; adding resets are summed."""
         system, n = self.system, self.system.n
         values = self._with_discrete(p)
         x, lifted = self._lifted(values, origin)
@@ -212,7 +212,7 @@ class Rounds:
         self.z = modes
 
     def _lifted(self, p: np.ndarray, origin: float) -> tuple[list[Dual], list[Any]]:
-        """States and run-time vector as numbers with their derivatives."""
+        """Return states and run-time vector as dual numbers."""
         layout = self.system.layout
         return with_slopes(self.x, self.Y), lifted_vector(
             layout, p, self._G, self._by_rates * origin, self.d, self.Yd
@@ -238,7 +238,7 @@ class Rounds:
 def lifted_vector(
     layout: Any, p: np.ndarray, G: np.ndarray, by_angles: np.ndarray, d: np.ndarray, Yd: np.ndarray
 ) -> list[Any]:
-    """The run-time vector as numbers with the derivatives of parameters, angles and discrete states."""
+    """Return the run-time vector as dual numbers, by parameters, angles and discrete states."""
     found: list[Any] = list(p)
     P, at = layout.parameters, layout.phases_at
     found[:P] = with_slopes(p[:P], G)
@@ -248,7 +248,7 @@ def lifted_vector(
 
 
 def is_recorded(system: System, one: Occurrence) -> bool:
-    """Whether something is a monitor that changes nothing."""
+    """Return whether an event is a monitor that changes nothing."""
     if one.kind != "monitor":
         return False
     key = "monitor", system.monitor_names.index(one.component)
@@ -256,13 +256,13 @@ def is_recorded(system: System, one: Occurrence) -> bool:
 
 
 def component_of(system: System, one: Occurrence) -> tuple[int, Any]:
-    """The component of a transition, by number and as the engine sees it."""
+    """Return the component of a transition, as number and automaton."""
     c = [a.name for a in system.automata].index(one.component)
     return c, system.automata[c]
 
 
 def guard_number(system: System, one: Occurrence) -> int:
-    """Number of the guard that a transition names; -1 where none of its mode did it: a jump, a limit."""
+    """Return the number of the guard of a transition; -1 if no guard of its mode caused it."""
     _, automaton = component_of(system, one)
     m = automaton.modes.index(one.source)
     names = automaton.guard_names[m]

@@ -1,4 +1,4 @@
-"""Directions in all that formulas read: states, local time, discrete states, parameters and angles of forcing."""
+"""This module builds derivative directions of all inputs of formulas: states, time, discrete states, parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def rate_slopes(system: System, at: Instant) -> np.ndarray:
-    """d(angular rates of the forcing)/d(parameters), (R, P)."""
+    """Return d(angular rates of the forcing)/d(parameters), (R, P)."""
     layout, module = system.layout, system.code.module
     P = layout.parameters
     p: list[Any] = list(system.vector(at, np.zeros(layout.discrete)))
@@ -25,9 +25,9 @@ def rate_slopes(system: System, at: Instant) -> np.ndarray:
 
 
 def seeds(system: System, origin: float, rates: np.ndarray) -> np.ndarray:
-    """Of the states, local time, discrete states and parameters, (n + 1 + layout.size, n + 1 + d + P).
+    """Return the seeds of states, local time, discrete states and parameters, (n + 1 + layout.size, n + 1 + d + P).
 
-    rates: what `rate_slopes` returns.
+    rates: the result of `rate_slopes`.
     """
     layout, n = system.layout, system.n
     P, d = layout.parameters, layout.discrete

@@ -1,4 +1,4 @@
-"""`sensitivities`: derivatives of the end and of all event times of a run by its start and by parameters."""
+"""This module computes derivatives of a run's end and event times by its start and by parameters."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sensitivities(Readable):
-    """Derivatives of a run.
+    """The derivatives of a run's end and event times by its start and by parameters.
 
     Parameters
     ----------
     states, parameters : tuple of str
-        Names: of the n states and d discrete states, of the P chosen parameters.
+        Names of the n states and d discrete states, and of the P chosen parameters.
     by_start : array
         (n + d, n + d), d(state at the end)/d(state at the start): the transition or monodromy matrix.
     by_parameter : array
-        (n + d, P), d(state at the end)/d(parameter); starts that are declared over parameters move along, and
-        so do parameters that are declared over others.
+        (n + d, P), d(state at the end)/d(parameter); starts and parameters that are declared as expressions of
+        a parameter change with it.
     times : array
-        (E,) of the instants inside the run at which modes or states changed; several events may share one.
+        (E,) the instants inside the run at which modes or states changed; several events may share one.
     times_by_start, times_by_parameter : array
         (E, n + d), (E, P), derivatives of these times.
     warnings : tuple of str
-        What the run lies exactly on, at its start, behind a jump or at its end, and what moves it off, if one side's
-        derivatives differ from those of the other: they are NaN then.
+        Guards, surfaces or ends on which the run lies exactly, with the changes that move it off, if the derivatives
+        on the two sides differ; the derivatives are then NaN.
 
     Examples
     --------
@@ -83,19 +83,19 @@ def sensitivities(
     """Differentiate the end and the event times of a run by its start and by parameters, through all events.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
-    its saltation matrix (`hybridsim.analysis.variations.carried`), a contact's loss of rank in stick included. They are
-    derivatives for a fixed sequence of events: where a graze or a coincidence changes the sequence, there is none. The
-    end is a fixed time, also where an event has ended the run: the derivatives are those at that time, and not of the
-    state at the event. For how such a time moves let the monitor record, and run on: it is then among ``times``.
+    its saltation matrix (`hybridsim.analysis.variations.carried`), including a contact's loss of rank in stick. The
+    derivatives hold for a fixed sequence of events; if a graze or a coincidence changes the sequence, there is none.
+    They are taken at a fixed end time, even if a monitor ended the run. To get the derivative of the monitor's time,
+    set its action to "record" and continue the run past it; the time is then among ``times``.
 
     Parameters
     ----------
     solution : Solution
-        Of `simulate`, forward in time, with save="all"; as accurate as it is are the derivatives.
+        A run of `simulate`, forward in time, with save="all". The derivatives are as accurate as this run.
     parameters : sequence of str, optional
-        Names; None takes all.
+        Names of the parameters; by default all.
     starts_follow : bool, optional
-        Whether starts that are declared over parameters change with them, where the run was given no others.
+        Whether starts that are declared as expressions of parameters change with them, unless the run set others.
 
     Returns
     -------
@@ -105,8 +105,8 @@ def sensitivities(
     Raises
     ------
     UsageError
-        For a run that is not whole, a model of Python functions, an unknown parameter, and an event whose
-        guard only touches zero.
+        For a run that was not kept completely, a model of Python functions, an unknown parameter, or an event
+        whose guard only touches zero.
 
     Examples
     --------
@@ -121,7 +121,7 @@ def sensitivities(
 def derivatives(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Of a run, on its own side where it lies exactly on a guard, a surface or the end."""
+    """Return the derivatives of a run, on its own side of a guard, surface or end on which it lies exactly."""
     return _found(solution, parameters, starts_follow, _own_side)
 
 
@@ -142,7 +142,7 @@ def _found(
     ],
 ) -> Sensitivities:
     if not hasattr(solution, "_segments"):
-        raise UsageError(f"solution is {solution!r}", remedy="give what hs.simulate returns")
+        raise UsageError(f"solution is {solution!r}", remedy="give the result of hs.simulate")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     starts_follow = flag(starts_follow, "starts_follow")
@@ -180,8 +180,8 @@ def _found(
         shifts[:, : n + d],
         shifts[:, n + d :],
         tuple(
-            f"{name}, and a change of {' or '.join(np.array(changed)[mask])} moves it off: derivatives are NaN where "
-            "those to both sides differ"
+            f"{name}, and a change of {' or '.join(np.array(changed)[mask])} moves it off: derivatives are NaN if "
+            "those on the two sides differ"
             for name, mask in parted
         ),
     )
@@ -190,9 +190,9 @@ def _found(
 def _refuse(solution: Solution) -> None:
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with save={solution._save!r}: derivatives need all of it",
+            f"the run was made with save={solution._save!r}, but derivatives need all of it",
             remedy="run it with save='all'",
         )
     if solution.t_end <= solution.t_start:
-        raise UsageError("the run goes backward in time, or nowhere", remedy="give a run forward in time")
+        raise UsageError("the run does not go forward in time", remedy="give a run with t1 > t0")
     refuse_limits(solution)

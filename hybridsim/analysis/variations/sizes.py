@@ -1,4 +1,4 @@
-"""How large each state becomes along a run."""
+"""This module measures how large each state becomes along a run."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-_POINTS = 513  # equally spaced, beside the ends of all steps
+_POINTS = 513  # equally spaced, in addition to the ends of all steps
 
 
 def sizes(solution: Solution) -> np.ndarray:
-    """Largest absolute value (n,) of each state along a run."""
+    """Return the largest absolute value (n,) of each state along a run."""
     low, high = ranges(solution)
     return np.maximum(np.abs(low), np.abs(high))
 
 
 def ranges(solution: Solution, since: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest value (n,) of each state along a run, or its part after a time."""
+    """Return the least and greatest value (n,) of each state along a run, or its part after a time."""
     begin = max(since, solution.t_start)
     sampled = solution(np.linspace(begin, solution.t_end, _POINTS)).T
     index, s, x = solution._segments.knots()

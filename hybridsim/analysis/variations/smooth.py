@@ -1,8 +1,9 @@
-"""The variational flow over one segment: Y' = A(t) Y + B(t) by Gauss collocation along the dense output.
+"""This module integrates the variational flow Y' = A(t) Y + B(t) over one segment by Gauss collocation.
 
-Eight Gauss points a piece are of order 16 at its end (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
-Differential Equations I, 2nd ed., 1993, section II.7); the equation is linear, so that each piece is one linear system.
-Where changes die out within a step, the pieces are carried one after the other by the formula of Radau IIA instead
+It runs along the dense output. Eight Gauss points per piece have order 16 (E. Hairer, S. P. Norsett, G.
+Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, section II.7). The equation is linear, so
+that each piece is one linear system. If changes decay within a step, the pieces are computed one after the
+other by the formula of Radau IIA instead
 (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, section IV.5).
 """
 
@@ -19,26 +20,26 @@ from hybridsim.errors import UsageError
 
 _STAGES = 8
 _RESOLVED = (
-    1e-8  # last coefficients of the rates on a piece; the end of the piece is good to about their square
+    1e-8  # last coefficients of the rates on a piece; the end of the piece is accurate to about their square
 )
 _TAIL = 2
-_NOISE = 1e-5  # below that, what halving does not make smaller is rounding
-_STIFF_RESOLVED = 1e-11  # there the end of a piece is no better than the last coefficients
+_NOISE = 1e-5  # below this, a residual that halving does not reduce is rounding
+_STIFF_RESOLVED = 1e-11  # the end of a Radau piece is no more accurate than the last coefficients
 _STIFF_NOISE = 1e-9
 _HALVINGS = 30
 _CANCELS = (
-    1e-5  # times _RESOLVED: a change of the states, in units of their sizes, of a few hundred roundings
+    1e-5  # times _RESOLVED: a change of the states, relative to their sizes, of a few hundred roundings
 )
 
-_FADES = 32  # decays by a factor e a step of the run: explicit methods stay below that, stiff ones do not
+_FADES = 32  # decays by a factor e per step of the run: explicit methods stay below it, stiff methods do not
 _AT_ONCE = 2**22  # entries of the linear systems that are solved together
-_TURNS = 2**17  # radians that are followed beside that: more take minutes
+_TURNS = 2**17  # additional radians that are followed; more take minutes
 
 
 class Collocation(NamedTuple):
-    """Nodes c_i on (0, 1), a_ij: the integral from 0 to c_i of the j-th Lagrange polynomial, b_j: that from 0 to 1.
+    """Nodes c_i on (0, 1), a_ij: integral from 0 to c_i of the j-th Lagrange polynomial, b_j: from 0 to 1.
 
-    coefficients : the Legendre coefficients of what has given values at the nodes.
+    coefficients : maps values at the nodes to Legendre coefficients.
     """
 
     nodes: np.ndarray
@@ -48,7 +49,7 @@ class Collocation(NamedTuple):
 
     @classmethod
     def at(cls, x: np.ndarray) -> Collocation:
-        """With nodes x on [-1, 1]."""
+        """Return the collocation with nodes x on [-1, 1]."""
         coefficients = np.linalg.inv(legendre.legvander(x, len(x) - 1))
         integrals = [legendre.legint(column, lbnd=-1.0) for column in coefficients.T]
         A = np.array([0.5 * legendre.legval(x, c) for c in integrals]).T
@@ -62,14 +63,14 @@ GAUSS = Collocation.at(legendre.leggauss(_STAGES)[0])
 RADAU = Collocation.at(np.sort(legendre.legroots([*[0.0] * (_STAGES - 1), -1.0, 1.0]).real))
 
 Slopes = Callable[[np.ndarray], np.ndarray]
-"""Derivatives (m, n, n + q) of the rates at local times (m,): by the states, then by q things that stay constant."""
+"""The type of derivatives (m, n, n + q) of the rates at local times (m,), by n states and q constants."""
 
 
 def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray) -> np.ndarray:
-    """d(states at the last knot)/d(states at the first, things that stay constant), (n, n + q).
+    """Return d(states at the last knot)/d(states at the first knot, constants), (n, n + q).
 
-    knots: local times, ascending, between which the flow is smooth. scale (n,), constants (q,): sizes of the states and
-    of what stays constant, all above zero.
+    knots: ascending local times, between which the flow is smooth. scale (n,), constants (q,): sizes of the
+    states and of the constants, all positive.
     """
     begins, ends = knots[:-1], knots[1:]
     fades, turns = _work(slopes, begins, ends)
@@ -77,7 +78,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
         return stiff_transition(slopes, knots, scale, constants)
     if turns > _FADES * len(begins) + _TURNS:
         raise UsageError(
-            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) turn through about "
+            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
             f"{turns:.1g} radians: following that takes minutes or longer",
             remedy="take a shorter run, or slower parameters",
         )
@@ -108,7 +109,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
 
 
 def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
-    """By how many factors e the fastest change decays, and through how many radians or factors changes go at most."""
+    """Return the number of e-folds by which the fastest change decays, and the radians or e-folds of all changes."""
     middle, lengths = 0.5 * (begins + ends), ends - begins
     found = slopes(middle)
     A = found[:, :, : found.shape[1]]
@@ -124,9 +125,9 @@ def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, 
 def stiff_transition(
     slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> np.ndarray:
-    """The same where changes die out much faster than the run goes: one piece after the other, by Radau's formula.
+    """Return the same transition if changes decay much faster than the run, piece by piece with Radau's formula.
 
-    It damps what it does not resolve, so that only what has not died out has to be resolved.
+    The formula damps unresolved changes, so that only those that have not decayed need to be resolved.
     """
     n = len(scale)
     Y = np.eye(n, n + len(constants))
@@ -162,7 +163,7 @@ def stiff_transition(
 def _pieces(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The transition (K, n, n + q) over each piece, and how well the rates are resolved on it (K,)."""
+    """Return the transition (K, n, n + q) over each piece, and the resolution of the rates on it (K,)."""
     lengths = ends - begins
     rates = _rates(GAUSS, slopes, begins, lengths)
     moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)
@@ -176,7 +177,7 @@ def _pieces(
     # the states by the states as one matrix without units; each of the constants by itself
     resolved = tails[:, :, :n].max(axis=(1, 2)) / sizes[:, :, :n].max(axis=(1, 2))
     others, largest = tails[:, :, n:].max(axis=1), sizes[:, :, n:].max(axis=1)
-    # what a change of a constant by its own size does: below that it cancels, and rounding is left
+    # relative to the effect of a change of a constant by its own size; below _CANCELS only rounding is left
     relative = others / np.maximum(largest, _CANCELS / constants)
     return moved, np.maximum(resolved, relative.max(axis=1, initial=0.0))
 
@@ -184,7 +185,7 @@ def _pieces(
 def _rates(
     method: Collocation, slopes: Slopes, begins: np.ndarray, lengths: np.ndarray, Y: np.ndarray | None = None
 ) -> np.ndarray:
-    """Rates (K, stages, n, n + q) at the nodes of each piece, of derivatives that begin it as Y, or as the identity."""
+    """Return the rates (K, stages, n, n + q) at the nodes of each piece."""
     D = slopes((begins[:, None] + lengths[:, None] * method.nodes).ravel())
     stages, count, n, width = len(method.nodes), len(begins), D.shape[1], D.shape[2]
     D = D.reshape(count, stages, n, width)

@@ -1,4 +1,4 @@
-"""A run as derivatives are carried along it: its segments, and what happened between them."""
+"""This module divides a run into segments with the events between them, for carrying derivatives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A segment, the monitors that were recorded along it, and what happened between its end and the next one."""
+    """A segment, the monitors recorded along it, and the events between its end and the next segment."""
 
     segment: Segment
     recorded: tuple[Occurrence, ...]
@@ -24,7 +24,7 @@ class Stretch:
 
 
 class Last(NamedTuple):
-    """What happened exactly at the end of a run: the segment and derivatives before it, and those of its time."""
+    """The events exactly at the end of a run: segment and derivatives before them, and derivatives of the time."""
 
     segment: Segment
     Y: np.ndarray
@@ -34,13 +34,13 @@ class Last(NamedTuple):
 
 
 def stretches_of(solution: Solution) -> Iterator[Stretch]:
-    """Segments, each with what happened until the next one begins and changed modes or states."""
+    """Yield the segments, each with the events before the next segment that changed modes or states."""
     waiting = [o for o in solution._trajectory.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
     for segment, following in zip(segments, [*segments[1:], None], strict=True):
         # an event and the end of its segment are one instant if they differ by no more than this
         rounding = 4.0 * math.ulp(float(segment.end))
-        # where events accumulate, the next segment begins at their limit
+        # at an accumulation of events, the next segment begins at their limit
         until = segment.end if following is None else following.start
         recorded = []
         while at < len(waiting) and waiting[at].instant.minus(segment.end) < -rounding:
@@ -54,7 +54,7 @@ def stretches_of(solution: Solution) -> Iterator[Stretch]:
 
 
 def at_start(solution: Solution) -> list[Occurrence]:
-    """What happened at the first instant of a run."""
+    """Return the events of the first instant of a run."""
     first = solution._segments[0].start
     found = []
     for one in solution._trajectory.occurrences:
