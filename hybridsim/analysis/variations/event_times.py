@@ -64,8 +64,8 @@ class EventTimes:
                 shifts += [] if shift is None else [shift]
         if not shifts:
             raise UsageError(
-                f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is unknown, "
-                "and so are the derivatives of its time",
+                f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is "
+                "unknown, and so are the derivatives of its time",
                 remedy="take other parameters, or a run that ends before",
             )
         first = shifts[0]
