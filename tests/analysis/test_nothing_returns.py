@@ -19,7 +19,7 @@ def test_one_that_adds_up_beside_one_that_comes_to_rest_is_named(rate, integrato
     states = [hs.State("x", 1.0, "v"), hs.State("v", 0.0, "-x - 0.1*v"), hs.State("th", 0.0, rate)]
     found = hs.steady_state(hs.Model("shaft", states=states), integrator=integrator)
     assert not found.success
-    assert "th does not come back" in found.message
+    assert "th does not return" in found.message
 
 
 @pytest.mark.parametrize(
