@@ -404,7 +404,7 @@ def test_a_full_model_without_an_answer_is_an_error() -> None:
         ([1.0], "not a number"),
         (math.nan, "returned nan"),
         (math.inf, "returned inf"),
-        (10**400, "no number"),
+        (10**400, "not a number"),
     ],
 )
 def test_a_function_that_returns_no_number_is_an_error(answer: Any, words: str) -> None:
