@@ -13,7 +13,7 @@ from typing import Any
 
 __version__ = "0.1.0.dev0"
 
-# The module that defines each public name. `__init__.pyi` tells type checkers the same; a test compares them.
+# The module that defines each public name. `__init__.pyi` repeats them for type checkers; a test compares both.
 _HOME = {
     # declaring
     "Choice": "hybridsim.model",
@@ -88,7 +88,7 @@ __all__ = ["__version__", *_HOME]
 
 
 class _Package(ModuleType):
-    """A package whose public names are not replaced by the modules of the same name.
+    """A package in which submodules do not replace the public names of the same name.
 
     The import system binds every submodule to its package on first import, so that after
     `import hybridsim.simulate` anywhere, `hs.simulate` would be the module and not the function.

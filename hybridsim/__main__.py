@@ -1,4 +1,4 @@
-"""`python -m hybridsim` is the command `hybridsim`."""
+"""`python -m hybridsim` runs the command line program `hybridsim`."""
 
 from hybridsim.cli import command
 

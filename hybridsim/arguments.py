@@ -1,4 +1,4 @@
-"""What `simulate` is given, checked: every fault is a UsageError that names the argument, its value and the remedy."""
+"""Check the arguments of `simulate`; every error names the argument, its value and the remedy."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ RTOL = 1e-9
 
 
 def without_a_name(value: Any) -> UsageError:
-    """The error of what follows t_span by its place alone, as y0 does in SciPy's solve_ivp."""
+    """Return the error for a positional argument after t_span, such as y0 in SciPy's solve_ivp."""
     shown = repr(value)
     if isinstance(value, Mapping):
-        remedy = f"name it: params={shown} for parameters, x0={shown} for initial values"
+        remedy = f"pass params={shown} for parameters, or x0={shown} for initial values"
     elif is_row(value):
-        remedy = f"name it: x0={shown}"
+        remedy = f"pass x0={shown}"
     elif isinstance(value, str):
-        remedy = f"name it: integrator={shown}"
+        remedy = f"pass integrator={shown}"
     else:
-        remedy = "name it: x0=..., params=..., rtol=..."
-    return UsageError(f"{shown} is given to simulate without a name", remedy=remedy)
+        remedy = "pass it as a keyword, such as x0=..., params=... or rtol=..."
+    return UsageError(f"simulate() accepts {shown} only as a keyword argument", remedy=remedy)
 
 
-def number(value: Any, what: str, remedy: str = "give a number") -> float:
-    """A real number as a double; texts, truth values, complex numbers and sequences are refused."""
+def number(value: Any, what: str, remedy: str = "use a number") -> float:
+    """Return a real number as float; strings, bools, complex numbers and sequences raise an error."""
     found = as_real(value)
     if found is None:
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
@@ -45,7 +45,7 @@ def number(value: Any, what: str, remedy: str = "give a number") -> float:
 
 
 def as_real(value: Any) -> float | None:
-    """A real number as a double, or None; NumPy would drop the imaginary part of a complex one with a warning."""
+    """Return a real number as float, or None; NumPy would drop the imaginary part of a complex number."""
     if isinstance(value, str | bytes | bool | np.bool_ | complex | np.complexfloating) or is_row(value):
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind not in "iufO":
@@ -57,51 +57,51 @@ def as_real(value: Any) -> float | None:
 
 
 def finite_number(value: Any, what: str) -> float:
-    """A finite real number as a double."""
-    found = number(value, what, "give a finite number")
+    """Return a finite real number as float, or raise an error."""
+    found = number(value, what, "use a finite number")
     if not math.isfinite(found):
-        raise UsageError(f"{what} is {value!r}", remedy="give a finite number")
+        raise UsageError(f"{what} is {value!r}", remedy="use a finite number")
     return found
 
 
 def whole_number(value: Any, what: str, least: int, most: int) -> int:
-    """A whole number within bounds; truth values are refused."""
+    """Return an integer within bounds; bools are rejected."""
     found = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else least - 1
     if not least <= found <= most:
-        raise UsageError(f"{what} is {value!r}", remedy=f"give a whole number from {least} to {most}")
+        raise UsageError(f"{what} is {value!r}", remedy=f"use a whole number from {least} to {most}")
     return found
 
 
 def text(value: Any, what: str) -> str:
-    """A text."""
+    """Return a string, or raise an error."""
     if not isinstance(value, str):
-        raise UsageError(f"{what} is {value!r}", remedy="give a name")
+        raise UsageError(f"{what} is {value!r}", remedy="use a name (a string)")
     return value
 
 
 def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
-    """One of the names that are known; `what` says of whom it is none, such as "the run has no contact"."""
+    """Return a known name; the error message is `what`, such as "The run has no contact", and the name."""
     if not isinstance(value, str) or value not in known:
         raise UsageError(f"{what} {value!r}", remedy=nearest(str(value), known, kind=kind))
     return value
 
 
 def flag(value: Any, what: str) -> bool:
-    """A truth value."""
+    """Return a bool, or raise an error."""
     if not isinstance(value, bool | np.bool_):
-        raise UsageError(f"{what} is {value!r}", remedy="give True or False")
+        raise UsageError(f"{what} is {value!r}", remedy="use True or False")
     return bool(value)
 
 
 def side_of_event(side: Any) -> str:
-    """Which of the two states at the time of an event is asked for."""
+    """Return the requested side of an event, '-' or '+'."""
     if not (isinstance(side, str) and side in ("+", "-")):
-        raise UsageError(f"side is {side!r}", remedy="give '+' or '-'")
+        raise UsageError(f"side is {side!r}", remedy="use '-' (before the event) or '+' (after it)")
     return side
 
 
 def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
-    """Finite real numbers in an array of any shape."""
+    """Return finite real numbers as an array of any shape."""
     try:
         found = np.asarray(value)
     except ValueError:  # rows of different lengths
@@ -115,7 +115,7 @@ def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
 
 
 def is_row(value: Any) -> bool:
-    """Whether a value has items in a row: a text, a mapping and an array of no dimension have none."""
+    """Return whether a value is a sequence; strings, mappings and zero-dimensional arrays are not."""
     if type(value) in (tuple, list):
         return True
     if isinstance(value, np.ndarray):
@@ -124,7 +124,7 @@ def is_row(value: Any) -> bool:
 
 
 def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
-    """Real numbers in one dimension."""
+    """Return a sequence of real numbers as a one-dimensional array."""
     if not is_row(value):
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
     if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf":
@@ -133,8 +133,8 @@ def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
 
 
 def as_times(t: Any) -> np.ndarray:
-    """One time, or times in a row, as (k,)."""
-    remedy = "give a time, or times in a row"
+    """Return one time or a sequence of times as an array (k,)."""
+    remedy = "use a time, or a sequence of times"
     try:
         found = np.asarray(t)
     except ValueError:  # rows of different lengths
@@ -149,29 +149,29 @@ def as_times(t: Any) -> np.ndarray:
 
 
 def chosen_model(model: Any, params: Any) -> Model:
-    """The model itself, or loaded by its name or path, with parameters changed."""
+    """Return the model itself, or load it by name or path, with changed parameters."""
     if not isinstance(model, Model):
         model = load(model)
     if params is None:
         return model
     if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):
         raise UsageError(
-            f"params is {params!r}", remedy="give a mapping from names of parameters to values, {'F0': 30.0}"
+            f"params is {params!r}", remedy="use a dict of parameter names and values, such as {'F0': 30.0}"
         )
     return model.with_(**params)
 
 
 def time_span(t_span: Any) -> tuple[float, float]:
-    """(t0, t1), both finite."""
-    remedy = "give two numbers, (t0, t1)"
+    """Return the finite times (t0, t1)."""
+    remedy = "use two numbers, (t0, t1)"
     if is_row(t_span):
         t_span = t_span if isinstance(t_span, tuple | list | np.ndarray) else list(t_span)
-        remedy += "; the times at which states are wanted go to t_eval" if len(t_span) > 2 else ""
+        remedy += "; pass output times as t_eval" if len(t_span) > 2 else ""
     return two_numbers(t_span, "t_span", remedy, "; a monitor can end a run early")
 
 
 def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
-    """Two finite numbers; `but`: what to do who wants one that is not finite."""
+    """Return two finite numbers; `but` completes the remedy for infinite ones."""
     if not is_row(value):
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
     ends = [number(t, f"a value of {what}", remedy) for t in value]
@@ -179,12 +179,12 @@ def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[floa
         given = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
         raise UsageError(f"{what} is {given}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
-        raise UsageError(f"{what} is {value!r}", remedy=f"give two finite numbers{but}")
+        raise UsageError(f"{what} is {value!r}", remedy=f"use two finite numbers{but}")
     return ends[0], ends[1]
 
 
 def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
-    """The remedy for an unknown state: the near ones, else all in the order in which a sequence gives them."""
+    """Return the remedy for an unknown state: similar names, or all states in their order."""
     remedy = nearest(name, states + discrete, kind="states")
     if "did you mean" in remedy or not states or len(states) > 12:
         return remedy
@@ -194,17 +194,18 @@ def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
 
 
 def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
-    """Values of states by name, and the model with those of its discrete states changed; `what`: the argument."""
+    """Return the initial values by name, and the model with new discrete states; `what` names the argument."""
     names = [s.name for s in model.states]
     if x0 is None:
         return {}, model
     if not isinstance(x0, Mapping):
-        each = f"give one number for each of {', '.join(names)}, or a mapping from names to numbers"
+        each = f"use one number for each of {', '.join(names)}, or a dict of names and numbers"
         values = numbers(x0, what, each)
         if len(values) != len(names):
             raise UsageError(
-                f"{what} has {len(values)} values and model {model.name} has {len(names)} states ({', '.join(names)})",
-                remedy="give one value for each state, or a mapping from names to values",
+                f"{what} has {len(values)} values, but model '{model.name}' has {len(names)} states "
+                f"({', '.join(names)})",
+                remedy="use one value for each state, or a dict of names and values",
             )
         x0 = dict(zip(names, values, strict=True))
     discrete = [d.name for d in model.discrete]
@@ -212,47 +213,47 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
     for name, value in x0.items():
         if name not in names + discrete:
             raise UsageError(
-                f"{what} names {name!r}, which is no state of model {model.name}",
+                f"{what} contains {name!r}, which is not a state of model '{model.name}'",
                 remedy=_states_in_order(str(name), names, discrete),
             )
         found[name] = number(
-            value, f"{what} of {name}", f"give a number; an expression goes to model.with_start({name}=...)"
+            value, f"{what} of {name}", f"use a number; for an expression use model.with_start({name}=...)"
         )
         if not math.isfinite(found[name]):
-            raise UsageError(f"{what} of {name} is {value!r}", remedy="give a finite number")
+            raise UsageError(f"{what} of {name} is {value!r}", remedy="use a finite number")
     changed = {n: v for n, v in found.items() if n in discrete}
     return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
 
 
 def integrator_name(integrator: Any) -> str:
-    """The name of an integrator, or "auto"."""
+    """Return the name of an integrator or "auto", or raise an error."""
     if not isinstance(integrator, str):
         raise UsageError(
-            f"integrator is {integrator!r}", remedy="give a name; hs.list_integrators() has them all"
+            f"integrator is {integrator!r}", remedy="use a name; hs.list_integrators() lists them"
         )
     return integrator
 
 
 def refuse_unused(method: Integrator, **given: Any) -> None:
-    """Refuse tolerances that a method with a fixed step would ignore; None is not given."""
+    """Reject tolerances that a fixed-step method would ignore; None means not set."""
     unused = [name for name, value in given.items() if value is not None]
     if unused and "adaptive" in method.lacks:
         raise UsageError(
-            f"{method.name} makes no use of {', '.join(unused)}: {method.lacks['adaptive']}",
-            remedy=f"set its own options ('hybridsim integrators {method.name}' lists them), or take another one",
+            f"{method.name} does not accept {', '.join(unused)}: {method.lacks['adaptive']}",
+            remedy=f"use an option that 'hybridsim integrators {method.name}' lists, or another integrator",
         )
 
 
 def callback(progress: Any) -> Any:
-    """A function to be told of progress, or None."""
+    """Return the progress function or None, or raise an error."""
     if progress is not None and not callable(progress):
-        raise UsageError(f"progress is {progress!r}", remedy="give a function")
+        raise UsageError(f"progress is {progress!r}", remedy="use a function of the finished fraction")
     return progress
 
 
 def relative_tolerance(rtol: Any) -> float:
-    """rtol, from what double precision can keep to below 1."""
-    remedy = f"give a number from {SMALLEST_RTOL!r} to below 1"
+    """Return rtol, which lies between 100 units in the last place and 1."""
+    remedy = f"use a number from {SMALLEST_RTOL!r} to below 1"
     value = RTOL if rtol is None else number(rtol, "rtol", remedy)
     if not (SMALLEST_RTOL <= value < 1.0):
         raise UsageError(f"rtol is {rtol!r}", remedy=remedy)
@@ -260,24 +261,24 @@ def relative_tolerance(rtol: Any) -> float:
 
 
 def step_bound(value: Any, name: str) -> float:
-    """A bound of the step, above zero."""
-    bound = number(value, name, "give a positive number")
+    """Return a positive limit of the step size."""
+    bound = number(value, name, "use a positive number")
     if not bound > 0.0:
-        raise UsageError(f"{name} is {value!r}", remedy="give a positive number")
+        raise UsageError(f"{name} is {value!r}", remedy="use a positive number")
     return bound
 
 
 def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
-    """atol for each state: as given, else rtol * 1e-3 * nominal size."""
+    """Return atol for each state; the default is rtol * 1e-3 * nominal size."""
     names = [s.name for s in model.states]
     sizes = [s.nominal or abs(x) or 1.0 for s, x in zip(model.states, start, strict=True)]
     values = 1e-3 * rtol * np.array(sizes, dtype=float)
-    remedy = f"give a number >= 0, or one for each of {', '.join(names)}"
+    remedy = f"use a number >= 0, or one for each of {', '.join(names)}"
     if isinstance(atol, Mapping):
         for name, value in atol.items():
             if name not in names:
                 raise UsageError(
-                    f"atol names {name!r}, which is no state of model {model.name}",
+                    f"atol contains {name!r}, which is not a state of model '{model.name}'",
                     remedy=nearest(str(name), names, kind="states"),
                 )
             values[names.index(name)] = number(value, f"atol of {name}")
@@ -293,23 +294,23 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
 
 
 def initial_modes(system: System, z0: Any) -> np.ndarray:
-    """Number of the first mode of each component, -1 where a surface decides."""
+    """Return the index of the initial mode of each component, or -1 if a surface selects it."""
     z = np.array([a.initial for a in system.automata], dtype=np.int64)
     if z0 is None:
         return z
     components = [a.name for a in system.declared]
     if not isinstance(z0, Mapping):
-        raise UsageError(f"z0 is {z0!r}", remedy="give a mapping from names of components to names of modes")
+        raise UsageError(f"z0 is {z0!r}", remedy="use a dict of component names and mode names")
     for name, mode in z0.items():
         if name not in components:
             raise UsageError(
-                f"z0 names {name!r}, which is no component of model {system.model.name}",
+                f"z0 contains {name!r}, which is not a component of model '{system.model.name}'",
                 remedy=nearest(str(name), components, kind="components"),
             )
         automaton = system.automata[components.index(name)]
         if mode not in automaton.modes:
             raise UsageError(
-                f"z0 of {name} is {mode!r}, which is no mode of it",
+                f"z0 of {name} is {mode!r}, which is not a mode of {name}",
                 remedy=nearest(str(mode), automaton.modes, kind="modes"),
             )
         z[components.index(name)] = automaton.modes.index(mode)
@@ -317,7 +318,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 
 def kept(save: Any, system: System) -> Keep:
-    """What is to be kept of a run: a word, or a length of time before its end."""
+    """Return the parts of the run to store, from a word or from a length of time before its end."""
     from hybridsim.engine.keep import ALL, EVENTS, NOTHING, Keep
 
     words = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
@@ -329,11 +330,11 @@ def kept(save: Any, system: System) -> Keep:
         length = system_period(system)
         if length is None:
             raise UsageError(
-                f"save is 'last-period', and the forcing of model {system.model.name} has no period",
-                remedy="give a length of time instead, save=1.5 keeps the last 1.5 units of t",
+                f"save is 'last-period', but model '{system.model.name}' has no forcing period",
+                remedy="use a length of time: save=1.5 stores the last 1.5 units of t",
             )
         return Keep(length, length)
-    remedy = "give 'all', 'events', 'last-period', 'nothing', or a length of time"
+    remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"
     length = number(save, "save", remedy)
     if not length > 0.0:
         raise UsageError(f"save is {save!r}", remedy=remedy)
@@ -341,7 +342,7 @@ def kept(save: Any, system: System) -> Keep:
 
 
 def run_limits(limits: Any) -> Limits:
-    """What a run may cost, from a mapping."""
+    """Return the limits of a run from a mapping."""
     from dataclasses import fields
 
     from hybridsim.engine.limits import UNLIMITED, Limits
@@ -352,37 +353,38 @@ def run_limits(limits: Any) -> Limits:
     if not isinstance(limits, Mapping):
         raise UsageError(
             f"limits is {limits!r}",
-            remedy=f"give a mapping from {', '.join(names)} to numbers, {{'events': 1000}}",
+            remedy=f"use a dict with the keys {', '.join(names)}, such as {{'events': 1000}}",
         )
     for name, value in limits.items():
         if name not in names:
-            raise UsageError(f"limits names {name!r}", remedy=nearest(str(name), names, kind="limits"))
+            raise UsageError(f"Unknown limit {name!r}", remedy=nearest(str(name), names, kind="limits"))
         if not number(value, f"limit of {name}") > 0.0:
-            raise UsageError(f"limit of {name} is {value!r}", remedy="give a positive number")
+            raise UsageError(f"limit of {name} is {value!r}", remedy="use a positive number")
     return Limits(**{name: float(value) for name, value in limits.items()})
 
 
 def time_grid(
     t_eval: Sequence[float] | None, span: tuple[float, float], keep: Keep, save: Any
 ) -> np.ndarray | None:
-    """Times within what is kept of the span."""
+    """Return the output times, which must lie in the stored part of the span."""
     if t_eval is None:
         return None
     if keep.segments is None:
         raise UsageError(
-            f"t_eval is given, and save={save!r} keeps no states between the ends",
-            remedy="leave t_eval out, or save='all'",
+            f"t_eval needs the states over time, which save={save!r} does not store",
+            remedy="remove t_eval, or use save='all'",
         )
-    grid = numbers(t_eval, "t_eval", "give times from t0 to t1")
+    grid = numbers(t_eval, "t_eval", "use times from t0 to t1")
     low, high = min(span), max(span)
     if len(grid) and not (grid.min() >= low and grid.max() <= high):
         bad = float(grid[~((grid >= low) & (grid <= high))][0])
         raise UsageError(
-            f"t_eval holds {bad!r}, which is not within t_span {span}", remedy="give times from t0 to t1"
+            f"t_eval contains {bad:.9g}, outside t_span ({span[0]:.9g}, {span[1]:.9g})",
+            remedy="use times from t0 to t1",
         )
     if keep.segments < math.inf and (np.abs(span[1] - grid) > keep.segments).any():
         raise UsageError(
-            f"t_eval begins before the last {keep.segments:.9g} of the run, which is what save={save!r} keeps",
-            remedy="give later times, or save='all'",
+            f"t_eval contains times before the last {keep.segments:.9g} of the run, which save={save!r} does not store",
+            remedy="use later times, or save='all'",
         )
     return grid

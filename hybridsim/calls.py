@@ -1,4 +1,4 @@
-"""Functions that say what they take where they are called with something else."""
+"""A decorator that turns wrong arguments of public functions into `UsageError`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 
 def refusing(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """A function, or a method, that refuses arguments which it does not take as everything else is refused."""
+    """Wrap a function or method so that unknown or missing arguments raise `UsageError` with a remedy."""
 
     @wraps(function)
     def call(*args: Given.args, **keywords: Given.kwargs) -> Result:
@@ -30,18 +30,18 @@ def refusing(function: Callable[Given, Result]) -> Callable[Given, Result]:
 def refuse_unless_taken(
     title: str, takes: Signature, args: Iterable[Any], keywords: Mapping[str, Any], unsaid: str
 ) -> None:
-    """Say what is wrong with arguments, if anything is: an unknown one before a missing one, which may be the same.
+    """Raise `UsageError` if the arguments do not fit the signature; unknown names are reported first.
 
-    unsaid: an argument that nobody has to know of.
+    `unsaid` is an argument to omit from the list, such as self.
     """
     try:
         takes.bind(*args, **keywords)
     except TypeError as error:
         names = [name for name in takes.parameters if name != unsaid]
-        said = f"it takes {', '.join(names)}"
+        said = f"arguments: {', '.join(names)}"
         for name in keywords:
             if name not in takes.parameters:
                 close = near(name, names)
                 remedy = f"did you mean '{close[0]}'? {said}" if close else said
-                raise UsageError(f"{title} has no argument '{name}'", remedy=remedy) from None
-        raise UsageError(f"{title}: {error}", remedy=said) from None
+                raise UsageError(f"{title}() has no argument '{name}'", remedy=remedy) from None
+        raise UsageError(f"{title}(): {error}", remedy=said) from None

@@ -1,4 +1,4 @@
-"""The colours of modes, the same in pictures and in notebooks."""
+"""The colours of modes, shared by pictures and notebooks."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hybridsim.model.component import Component
 
-# Okabe and Ito's palette, told apart with every kind of colour vision; yellow, too pale for a line, is out.
+# The palette of Okabe and Ito, distinguishable with every kind of colour vision, without its pale yellow.
 INK = "#222222"
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F4F24")
 
 
 def mode_colours(components: Collection[Component]) -> dict[str, str]:
-    """A colour for each mode by name: ink where a surface holds (stick), the palette in order for others."""
+    """Return a colour for each mode: ink for the modes that hold a surface, then the palette in order."""
     held = {component.surface.hold for component in components if component.surface}
     names = dict.fromkeys(mode.name for component in components for mode in component.modes)
     free = [name for name in names if name not in held]

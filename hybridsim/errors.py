@@ -1,4 +1,4 @@
-"""The one tree of errors: a message says what is wrong, where (file, line, caret) and what to do."""
+"""The exception classes; each message states the error, its place (file, line, caret) and the remedy."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-# a word of a file, or a path, without an end to it: of more than 400 characters the first and last are shown
+# a very long word or path, which is shortened to its first 200 and last 20 characters
 _ENDLESS = re.compile(r"(\S{200})\S{200,}(\S{20})")
-# how NumPy writes its scalars in a repr
+# the repr of a NumPy scalar
 _NUMPY = re.compile(r"\bnp\.(?:\w+\((?P<value>[-+.\w]+|'[^']*')\)|(?P<word>True|False)_)")
-# the same for words between blanks, such as a formula of a thousand terms in the place of a name
+# a very long line, such as a formula of a thousand terms, which is shortened likewise
 _LONG_LINE = re.compile(r"(.{1500}).{500,}(.{200})")
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where something was written.
+    """The place in a file or text that an error refers to.
 
     Parameters
     ----------
     file : str, optional
-        Path as the user gave it, or None for what was built in Python.
+        Path as the user wrote it, or None for a model built in Python.
     line : int, optional
         Line of the file, counted from 1.
     column : int, optional
@@ -44,12 +44,12 @@ class Place:
     text: str | None = None
 
     def at(self, text: str, column: int | None = None) -> Place:
-        """The same file and line, pointing at a piece of text."""
+        """Return the same file and line with another piece of text."""
         return replace(self, text=text, column=column)
 
     @property
     def prefix(self) -> str:
-        """The head of a message, ``file:line:`` and a blank, or nothing where neither is known."""
+        """The head of a message, ``file:line: ``, or an empty string if neither is known."""
         parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
         if not parts and self.line is not None:
             parts = [f"line {self.line}"]
@@ -57,7 +57,7 @@ class Place:
 
 
 class HybridsimError(Exception):
-    """Anything hybridsim refuses or fails to do.
+    """Base class of all errors that hybridsim raises.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class HybridsimError(Exception):
 
 
 class ModelError(HybridsimError):
-    """A model that cannot be; ``errors`` holds every fault found, each with its own place and remedy.
+    """A faulty model; ``errors`` holds every error found, each with its place and remedy.
 
     Parameters
     ----------
@@ -141,13 +141,13 @@ class ModelError(HybridsimError):
 
     @property
     def errors(self) -> tuple[ModelError, ...]:
-        """Every fault by itself; this error alone if it stands for no others."""
+        """Every single error; this error alone if it contains no others."""
         return self._errors or (self,)
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """One error out of many: the only one itself, or a list of all, by line, under a title."""
-        # a fault met twice is one
+        """Combine errors: return a single one itself, or a list of all, by line, under a title."""
+        # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
         found = sorted(every.values(), key=_line)
         if len(found) == 1:
@@ -157,7 +157,7 @@ class ModelError(HybridsimError):
 
 
 class ExpressionError(ModelError):
-    """A text that is no expression, or an expression that has no value.
+    """A text that is not a valid expression, or an expression without a value.
 
     Examples
     --------
@@ -166,12 +166,12 @@ class ExpressionError(ModelError):
     ...     hs.Model("m", states=[hs.State("x", 1, "-x*(")]).validate()
     ... except hs.ExpressionError as error:
     ...     print(error.message)
-    State x: der: not an expression: '(' was never closed
+    State x, der: invalid expression: '(' was never closed
     """
 
 
 class UsageError(HybridsimError, ValueError):
-    """A call or a command line that asks for something that does not exist.
+    """A call or a command line with a wrong or unknown argument.
 
     Examples
     --------
@@ -187,11 +187,11 @@ class UsageError(HybridsimError, ValueError):
 
 
 class SimulationError(HybridsimError):
-    """A run that could not be carried out.
+    """A computation that could not be carried out.
 
     Notes
     -----
-    A run that stops early raises nothing: the status and the message of its `Solution` say why.
+    A run that stops early does not raise. The status and message of its `Solution` state the reason.
 
     Examples
     --------
@@ -206,14 +206,14 @@ class SimulationError(HybridsimError):
 
 
 class RunInterrupted(KeyboardInterrupt):
-    """Ctrl-C, or KeyboardInterrupt from a function that is told of progress, in the middle of a run.
+    """A run stopped by Ctrl-C, or by KeyboardInterrupt from its progress function.
 
-    It ends the loop or the script that the run is in, as everywhere else.
+    Like any KeyboardInterrupt it ends the loop or the script around the run.
 
     Parameters
     ----------
     solution : Solution
-        What was computed by then; its ``resume()`` goes on.
+        The part computed before the interruption; its ``resume()`` continues the run.
     """
 
     def __init__(self, solution: Any) -> None:
@@ -225,16 +225,16 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 def plain(text: str) -> str:
-    """A message that shows what NumPy holds as a number or text shows it as that: 2.0, and not np.float64(2.0)."""
+    """Replace the repr of NumPy scalars in a message by plain numbers: 2.0 instead of np.float64(2.0)."""
     return re.sub(_NUMPY, lambda found: found["value"] or found["word"], text)
 
 
 def near(name: str, known: Iterable[str]) -> list[str]:
-    """Up to three names that an unknown one may be meant for: of other case, similar, or with it as a part."""
+    """Return up to three similar names: equal up to case, similar letters, or this name as a part."""
     names = sorted(set(known))
     folded = [other for other in names if other.lower() == name.lower()]
     similar = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
-    # a part of two letters is in too many names to mean one of them
+    # parts of one or two letters occur in too many names to be useful
     holding = [
         other for other in names if len(name) > 2 and name.lower() in re.split(r"[-_ .]", other.lower())
     ]
@@ -242,15 +242,15 @@ def near(name: str, known: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
-    """The remedy for an unknown name: the near ones, else a list of what there is."""
+    """Return the remedy for an unknown name: similar names, or the list of known names."""
     names = sorted(set(known))
     close = near(name, names)
     if close:
         return "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
     if not names:
-        return f"there are no {kind} here."
+        return f"there are no {kind}"
     shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
-    return f"known {kind}: {shown}."
+    return f"known {kind}: {shown}"
 
 
 def _line(error: HybridsimError) -> int:
@@ -258,12 +258,12 @@ def _line(error: HybridsimError) -> int:
 
 
 def printable(text: str) -> str:
-    """A text without what would steer the terminal that shows it; any blank is one column wide, like a caret."""
+    """Replace control characters of a text, which could steer the terminal, by "?" or a blank."""
     return "".join(c if c.isprintable() or c == "\n" else " " if c.isspace() else "?" for c in text)
 
 
 def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int | None]:
-    """A long line is cut to what is around the caret, so that a message stays readable."""
+    """Shorten a long line to the part around the caret."""
     if len(text) <= width:
         return text, column
     start = max(0, min((column or 0) - width // 2, len(text) - width))

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: what cannot be written to its end leaves what was there before."""
+"""Write files atomically: after an error the previous file is unchanged."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from typing import Any
 
 from hybridsim.errors import UsageError
 
-_TRIALS = 100  # of names of 64 random bits each
-_LETTERS = 100  # of a name that a temporary one begins with; file systems take 255 bytes
+_TRIALS = 100  # attempts to find an unused name with 64 random bits
+_LETTERS = 100  # leading characters of the name that a temporary name copies; file systems allow 255 bytes
 
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[str]:
-    """A path to write to in place of another, which it replaces once all is written.
+    """Yield a temporary path; after a successful block its file replaces `path`.
 
-    The path is a new one in the same folder, so that two processes that write one file do not meet: the last one's
-    file stays, whole. The file keeps its mode and its owner, and until it is in its place only this user may read it.
-    Where something fails it is removed. A device and a pipe are written to as they are.
+    The temporary file has a unique name in the same folder. If two processes write the same file, the last complete
+    file remains. A replaced file keeps its mode and owner, and before the replacement only this user can read the new
+    file. After an error the temporary file is deleted. Devices and pipes are written directly.
 
     Raises
     ------
     UsageError
-        Where the file cannot be written, with the reason of the system.
+        If the file cannot be written, with the reason from the operating system.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def whole_file(path: str | PathLike[str]) -> Iterator[str]:
                 _dress(partly, before)
             os.replace(partly, final)
         finally:
-            with suppress(OSError):  # it is in its place already
+            with suppress(OSError):  # after success the file no longer has this name
                 os.remove(partly)
     except BrokenPipeError:
         raise
@@ -70,7 +70,7 @@ def _found(path: str) -> os.stat_result | None:
 
 
 def _new_file(final: str, mode: int) -> str:
-    """Make an empty file beside another, under a name that nobody has; the ending tells libraries the format."""
+    """Create an empty file with an unused name in the same folder and with the same suffix."""
     folder, name = os.path.split(final)
     stem, suffix = os.path.splitext(name)
     for _ in range(_TRIALS):
@@ -82,7 +82,7 @@ def _new_file(final: str, mode: int) -> str:
 
 
 def _dress(path: str, before: os.stat_result) -> None:
-    """Give a file the owner and the mode of the one that it replaces, and see to it that its content is on the disk."""
+    """Flush a file to the disk, and copy owner and mode of the file that it replaces."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -95,24 +95,24 @@ def _dress(path: str, before: os.stat_result) -> None:
             try:
                 os.chown(path, before.st_uid, before.st_gid)
             except OSError:
-                mode &= ~0o070  # what one group may read is not for another
+                mode &= ~0o070  # the group differs, so it gets no access
     os.chmod(path, mode)
 
 
 @contextmanager
 def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
-    """Hold a file or a folder as long as the block lasts; another process, or thread, that wants it is refused.
+    """Lock a file or folder during a block; other processes and threads get an error.
 
-    A process that ends, however it does, holds nothing any more. Where the system has no such locks nothing is held.
+    The operating system releases the lock when the process ends. On systems without such locks nothing is locked.
 
     Raises
     ------
     UsageError
-        Where another one holds it, with the message `busy`.
+        If it is already locked, with the message `busy`.
     """
     try:
         handle = os.open(path, os.O_RDONLY)
-    except OSError:  # such as a folder on Windows
+    except OSError:  # for example a folder on Windows
         yield
         return
     try:
@@ -123,7 +123,7 @@ def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
 
 
 def hold(handle: int, busy: str) -> None:
-    """Hold an open file until it is closed; see `held`."""
+    """Lock an open file until it is closed (see `held`)."""
     try:
         import fcntl
     except ImportError:
@@ -131,42 +131,44 @@ def hold(handle: int, busy: str) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise UsageError(busy, remedy="wait for it to end, or give another path") from None
-    except OSError:  # a file system that has no locks
+        raise UsageError(busy, remedy="wait until it has finished, or use another path") from None
+    except OSError:  # a file system without locks
         return
 
 
 def write_text(path: str | PathLike[str], text: str) -> None:
-    """Write a text, whole or not at all."""
+    """Write a text file atomically."""
     with whole_file(path) as partly, open(partly, "w", encoding="utf-8") as file:
         file.write(text)
 
 
 def cannot_write(path: str | PathLike[str], fault: OSError) -> UsageError:
-    """What is raised for a file that cannot be written, with the reason of the system."""
+    """Return the error for a file that cannot be written, with the reason from the operating system."""
     why = fault.strerror or str(fault)
-    return UsageError(f"{os.fspath(path)} cannot be written: {why}", remedy="make room, or give another path")
+    return UsageError(
+        f"{os.fspath(path)} cannot be written: {why}", remedy="free some disk space, or use another path"
+    )
 
 
 def path_text(path: object) -> str:
-    """A path as a text.
+    """Return a path as a string.
 
     Raises
     ------
     UsageError
-        For what is neither a text nor a path.
+        If the object is neither a string nor a path.
     """
     try:
         found = os.fspath(path)  # type: ignore[call-overload]  # it may be anything
     except TypeError:
         found = path
     if not isinstance(found, str) or "\0" in found or not found:
-        raise UsageError(f"the path is {path!r}", remedy="give the path of a file as a text")
+        raise UsageError(f"The path is {path!r}", remedy="use the path of a file as a string")
     return found
 
 
 def json_text(value: Any) -> str:
-    """One JSON document; numbers that JSON does not have (nan, inf) become null."""
+    """Return a value as a JSON document; nan and inf become null."""
     return json.dumps(_plain(value), indent=2, ensure_ascii=True, allow_nan=False)
 
 

@@ -1,4 +1,4 @@
-"""What a child that is forked beside running threads needs: locks that are free, whoever held them before."""
+"""Locks that are released in a forked child, even if another thread of the parent held them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from weakref import WeakSet
 
 
 class SharedLock:
-    """A lock for short pieces of work that leave nothing half done; a forked child finds it free."""
+    """A lock for short critical sections, which a forked child finds released."""
 
     __slots__ = ("__weakref__", "_lock")
 
@@ -29,7 +29,7 @@ class SharedLock:
         self._lock.release()
 
     def renew(self) -> None:
-        """Be free, whoever holds it."""
+        """Release the lock, regardless of its holder."""
         self._lock = Lock()
 
 
@@ -37,10 +37,10 @@ _locks: WeakSet[SharedLock] = WeakSet()
 
 
 def _renew_all() -> None:
-    """Free all locks in a child that has just been forked."""
+    """Release all locks in a newly forked child."""
     for lock in list(_locks):
         lock.renew()
-    if sys.version_info < (3, 12):  # until then a cached property of a class has a lock for all its instances
+    if sys.version_info < (3, 12):  # older versions keep one lock per cached property in the class
         for name, module in list(sys.modules.items()):
             if name.partition(".")[0] == "hybridsim":
                 _renew_properties(module)

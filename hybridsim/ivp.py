@@ -1,4 +1,4 @@
-"""One mode of a model as an initial value problem, for solvers that know nothing of hybridsim."""
+"""One mode of a model as an initial value problem for other solvers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Function = Callable[[float, np.ndarray], Any]
 
 
 class Ivp(NamedTuple):
-    """What `to_ivp` hands out; the names are those of the arguments of `scipy.integrate.solve_ivp`."""
+    """The result of `to_ivp`, named like the arguments of `scipy.integrate.solve_ivp`."""
 
     fun: Function
     events: tuple[Function, ...]
@@ -31,7 +31,7 @@ def to_ivp(
     *,
     params: Mapping[str, Any] | None = None,
 ) -> Ivp:
-    """One mode of a model as functions of (t, x) in plain absolute time.
+    """Return one mode of a model as functions of time t and state x.
 
     fun(t, x) is dx/dt (n,), jac(t, x) its Jacobian (n, n), and events the guards of the mode: the mode lasts while
     all of them are >= 0. Each is a function (t, x) -> float with the attributes terminal = True and direction = -1
@@ -90,7 +90,7 @@ def to_ivp(
     flows: dict[bytes, Flow] = {}
 
     def at(t: float, x: np.ndarray) -> tuple[Flow, float]:
-        """A flow and the local time in it; pieces of inputs and tables are those that hold at t and x."""
+        """Return the flow at (t, x) and its local time, with the active pieces of inputs and tables."""
         vector, s = (
             (system.vector(Instant(float(t)), discrete), 0.0) if system.signals else (from_zero, float(t))
         )

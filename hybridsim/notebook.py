@@ -1,4 +1,4 @@
-"""A run as a piece of HTML for notebooks: how it went, a strip of modes for each component, the events."""
+"""HTML summary of a run for notebooks: outcome, a strip of modes for each component, events."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from hybridsim.colours import INK, mode_colours
 if TYPE_CHECKING:
     from hybridsim.model.component import Component
 
-# Bounds that keep the text small whatever the run: rectangles of all strips together, strips, rows of the table.
+# Limits of the size of the HTML: rectangles in all strips, strips, first and last rows of the table, warnings.
 _RECTANGLES, _STRIPS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
-_WIDTH, _HEIGHT = 1000, 24  # of a strip in units of its own; it is stretched to the width of the page
-_OVERLAP = 0.3  # of rectangles, so that no background shines through between them
-_GOOD, _BAD = "#009E73", "#D55E00"  # both can be read on black and on white
+_WIDTH, _HEIGHT = 1000, 24  # size of a strip in its own units; the page stretches its width
+_OVERLAP = 0.3  # added width of a rectangle, so that no gap is visible between neighbours
+_GOOD, _BAD = "#009E73", "#D55E00"  # readable on black and on white
 _CELL = "padding:0 .8em 0 0;text-align:left;border:none"
 
 
 class Interval(Protocol):
-    """A stretch of time in one mode."""
+    """A time interval in one mode."""
 
     @property
     def mode(self) -> str: ...
@@ -39,15 +39,15 @@ def run_html(
     events: Sequence[Any],
     warnings: Sequence[str],
 ) -> str:
-    """HTML without scripts or style sheets, of bounded size, on light and dark pages; all text is escaped.
+    """Return HTML of limited size without scripts or style sheets, for light and dark pages; text is escaped.
 
     Parameters
     ----------
-    head : lines of text about the run; the first stands beside the mark of success.
-    success : whether the run did what was asked.
-    span : first and last time, None where nothing was computed.
+    head : lines of text about the run by label; the first line is next to the mark of success.
+    success : whether the run reached its end.
+    span : first and last time, or None if nothing was computed.
     modes : intervals of each component.
-    events : with t, component, source, target, kind.
+    events : objects with the attributes t, component, source, target and kind.
     """
     mark, colour = ("✔", _GOOD) if success else ("✘", _BAD)
     (first, text), *rest = head.items()
@@ -76,7 +76,7 @@ def _faint(text: str) -> str:
 def _strips(
     colours: Mapping[str, str], modes: Mapping[str, Sequence[Interval]], t0: float, t1: float
 ) -> Iterator[str]:
-    """One strip a component, the times of its ends and a legend."""
+    """Yield one strip per component, the times at its ends, and a legend."""
     shown = dict(list(modes.items())[:_STRIPS])
     most = _RECTANGLES // len(shown)
     yield '<table style="width:100%;border-collapse:collapse;background:none;margin:.5em 0 0 0">'
@@ -90,7 +90,7 @@ def _strips(
         yield from _rectangles(intervals, colours, t0, t1, most)
         yield "</svg></td></tr>"
     crowded = any(len(intervals) > most for intervals in shown.values())
-    note = _faint("each column shows the shares of its modes") if crowded else ""
+    note = _faint("each column shows the fraction of time in each mode") if crowded else ""
     yield (
         f'<tr style="background:none"><td style="border:none"></td><td style="padding:0;border:none">'
         f'<div style="display:flex;justify-content:space-between">'
@@ -109,14 +109,14 @@ def _strips(
 
 
 def _fill(colour: str) -> str:
-    """Ink is whatever the page writes with, so that it is seen on a dark one too."""
+    """Return the fill colour; ink becomes the text colour of the page, which is visible on dark pages."""
     return "currentColor" if colour == INK else colour
 
 
 def _rectangles(
     intervals: Sequence[Interval], colours: Mapping[str, str], t0: float, t1: float, most: int
 ) -> Iterator[str]:
-    """Rectangles of the intervals; where they are too many, columns that show the share of each mode."""
+    """Yield a rectangle per interval, or for many intervals columns with the fraction of each mode."""
     scale = _WIDTH / (t1 - t0)
     if len(intervals) <= most:
         for interval in intervals:
@@ -144,7 +144,7 @@ def _rectangles(
 def _shares(
     intervals: Sequence[Interval], names: Sequence[str], t0: float, t1: float, columns: int
 ) -> list[list[float]]:
-    """Share of each mode in each of so many equal columns of time."""
+    """Return the fraction of each mode in equal columns of time."""
     number = {mode: i for i, mode in enumerate(names)}
     shares = [[0.0] * len(names) for _ in range(columns)]
     for interval in intervals:
@@ -165,7 +165,7 @@ def _rectangle(x: float, y: float, width: float, height: float, colour: str, tit
 
 
 def _event_table(events: Sequence[Any]) -> Iterator[str]:
-    """The events, folded; of many the first and the last."""
+    """Yield the collapsible table of events; a long table shows its first and last rows."""
     many = len(events) > _FIRST + _LAST
     yield f"<details><summary>{len(events)} event{'s' if len(events) > 1 else ''}</summary>"
     yield '<table style="border-collapse:collapse;background:none;margin:0"><tr style="background:none">'

@@ -1,6 +1,6 @@
-"""From the arguments of `simulate` to a run: model, system, method and task, each checked.
+"""Check the arguments of `simulate` and prepare the run: model, system, method and task.
 
-Apart from `simulate` because it imports the engine, which a program that only declares models does without.
+It is separate from `simulate` because it imports the engine, which a program that only declares models does not need.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from hybridsim.model import Model
 from hybridsim.model.velocity_powers import velocity_powers
 from hybridsim.solution.run import Run
 
-_MOST = 16  # runs that a system remembers: a loop asks for one or a few, and what is kept of each is small
-_PLAIN = frozenset({int, float, np.float64, str, type(None)})  # what is equal to another means the same
+_MOST = 16  # prepared runs stored per system; a loop usually repeats one or a few
+_PLAIN = frozenset({int, float, np.float64, str, type(None)})  # types whose equal values are interchangeable
 
 
 def _question(t_span: Any, words: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """What is asked, by which a run is known again; None where anything but plain numbers and words is among it.
+    """Return the arguments as a key that identifies an equal run, or None if they are not all plain values.
 
-    To check and to bind the arguments takes as long as a tenth of a short run, and loops ask the same again and again.
+    Checking the arguments costs up to a tenth of a short run, and loops often repeat the same arguments.
     """
     question = (*t_span, *words) if type(t_span) is tuple else (t_span,)
     return question if _PLAIN.issuperset(map(type, question)) else None
@@ -60,16 +60,16 @@ def prepared(
     options: dict[str, Any],
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
-    """The run of these arguments, and the seconds that compiling took; keywords: what an option may be meant to be."""
+    """Return the run and the compile time in seconds; `keywords` are suggested for unknown options."""
     question = None
     if x0 is z0 is limits is None:
         words: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
-        if options:  # an option that is a whole number is refused as 16.0, which equals 16
+        if options:  # an integer option rejects 16.0, which equals 16
             words += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
         question = _question(t_span, words)
         known = known_system(model)
         run = None if known is None else known.runs.get(question)
-        if run is not None and type(run.method) is integrator_class(run.method.name):  # as registered now
+        if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.keep, save)), 0.0
     x0_states, model = arguments.start_values(model, x0)
@@ -109,7 +109,7 @@ def prepared(
     )  # fmt: skip
     refuse_driving(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
-    if question is not None and not isinstance(system.code, PythonCode):  # which may change its answers
+    if question is not None and not isinstance(system.code, PythonCode):  # a Python function may change
         if len(system.runs) >= _MOST:
             system.runs.clear()
         system.runs[question] = run
@@ -117,31 +117,30 @@ def prepared(
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
-    """Refuse what cannot run a model of Python functions, and functions that return something else than they should."""
-    reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or choose dop853"
+    """Check that the method supports Python functions, and that they return values of the right shape."""
+    reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or use dop853"
     if code.refused and not method.name.startswith("scipy-"):
-        reason, remedy = code.refused_in_words, "choose scipy-dop853, which calls them from Python"
+        reason, remedy = code.refused_in_words, "use scipy-dop853, which calls the functions in Python"
     if reason:
-        raise UsageError(f"{method.name} cannot run {system.model.name}: {reason}", remedy=remedy)
+        raise UsageError(f"{method.name} cannot run model '{system.model.name}': {reason}", remedy=remedy)
     code.check(x0, system.vector(Instant(t0), system.discrete_start))
 
 
 def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
-    """Refuse to decide between stick and slip by derivatives that are not there."""
+    """Reject models in which stick and slip would be decided by a derivative that does not exist."""
     if type(method).run is not Integrator.run:
-        return  # it decides by itself, and takes no derivative
+        return  # the method selects the modes itself, without derivatives
     for power in velocity_powers(model):
         raise UsageError(
-            f"{method.name} cannot run {model.name}: '{power.text}' in {power.where} is a root of the "
-            f"velocity of contact {power.contact}, or a power of it that is not written as a whole number: it has no "
-            "Taylor series where the contact sticks, so that stick and slip cannot be told apart there",
+            f"{method.name} cannot run model '{model.name}': '{power.text}' in {power.where} has no Taylor series at "
+            f"zero velocity of contact {power.contact}, so the solver cannot decide between stick and slip",
             place=power.place,
-            remedy=f"{power.remedy}; or choose integrator='moreau', step=..., which takes no derivatives",
+            remedy=f"{power.remedy}, or use integrator='moreau', step=..., which needs no derivatives",
         )
 
 
 def _refuse_lacking(method: Integrator, model: Model, system: System, span: tuple[float, float]) -> None:
-    # capabilities that a model may need, and what tells that it does, asked for those alone that the method lacks
+    # tests whether the model needs a capability; evaluated only for capabilities that the method lacks
     needs: dict[str, Callable[[], bool]] = {
         "contacts": lambda: any(
             a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata
@@ -157,14 +156,14 @@ def _refuse_lacking(method: Integrator, model: Model, system: System, span: tupl
     for capability in needs:
         if capability in method.lacks and needs[capability]():
             needed = [other for other, is_needed in needs.items() if is_needed()]
-            # what is not linear is not known here, and would be refused next
+            # exclude methods for linear models, since nonlinearity is only checked later
             able = [one.name for one in list_integrators() if not {"nonlinear", *needed} & one.lacks.keys()]
             such = (
-                f"choose one that can, such as {', '.join(able[:3])}"
+                f"use an integrator that supports it, such as {', '.join(able[:3])}"
                 if able
-                else "no integrator takes all of it"
+                else "no integrator supports the whole model"
             )
             raise UsageError(
-                f"{method.name} cannot run {model.name}: {method.lacks[capability]}",
-                remedy=f"{such} (hs.list_integrators() says what each lacks)",
+                f"{method.name} cannot run model '{model.name}': {method.lacks[capability]}",
+                remedy=f"{such} (hs.list_integrators() lists the limitations of each)",
             )

@@ -1,4 +1,4 @@
-"""The one place where model, integrator, decisions and solution meet."""
+"""The public function `simulate`, which runs a model with an integrator."""
 
 from __future__ import annotations
 
@@ -59,63 +59,63 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Solution | MechanicalSolution | SteppedSolution:
-    """Run a model from t0 to t1 and return its trajectory, its events and its cost.
+    """Simulate a model from t0 to t1 and return its trajectory, its events and its cost.
 
     Parameters
     ----------
     model : str, path, Model or MechanicalSystem
-        A `Model`, the name of a packaged one, or the path of a ``.toml`` file; or a `MechanicalSystem`, which
-        runs by Taylor series of its own, or by ``moreau``.
+        A `Model`, the name of a packaged model, the path of a ``.toml`` file, or a `MechanicalSystem`, which
+        has its own Taylor series integrator and ``moreau``.
     t_span : tuple of float
         (t0, t1); t1 < t0 runs backward in time.
     params : mapping of str to str or float, optional
         Parameter values that replace the declared ones: numbers, or expressions of other parameters.
     x0 : mapping of str to float or sequence of float, optional
-        Initial values that replace the declared ones, by name (states and discrete states) or as a whole
-        sequence.
+        Initial values that replace the declared ones, by name (states and discrete states) or as a sequence
+        of all states.
     z0 : mapping of str to str, optional
-        Initial modes by component; where a surface decides, the engine finds the mode from x0 if none is given. One
-        that x0 rules out is taken all the same, the state is put onto the surface, and ``sol.warnings`` says so.
+        Initial modes by component. For contacts and surfaces without an entry the engine finds the mode from x0. If
+        x0 contradicts a mode given here, the state is projected onto its surface and ``sol.warnings`` reports it.
     integrator : str, optional
-        A name from `list_integrators`; "auto" takes ``exact`` where all modes are linear in the states,
-        ``rodas5p`` where they are stiff at the start, else ``taylor`` below rtol = 1e-10 and ``dop853``;
-        ``sol.message`` says which and why.
+        A name from `list_integrators`. "auto" selects ``exact`` if all modes are linear in the states,
+        ``rodas5p`` if they are stiff at the start, otherwise ``taylor`` for rtol below 1e-10 and ``dop853``.
+        ``sol.message`` reports the selection and its reason.
     rtol, atol : float, mapping of str to float or sequence of float, optional
-        Error control. rtol is 1e-9 if not given. atol is a number, one for each state, or by name; its
-        default is rtol * 1e-3 * nominal, with the nominal size from the declaration, else ``|x0|``, else 1. An
-        integrator with a fixed step refuses both.
+        Error control. The default of rtol is 1e-9. atol is one number, one number per state, or a mapping by
+        name. Its default is rtol * 1e-3 * nominal; the nominal size is the declared one, otherwise ``|x0|``,
+        otherwise 1. An integrator with a fixed step accepts neither.
     max_step, first_step : float, optional
-        Bounds of the step, in the unit of t.
+        Largest step and length of the first step, in the unit of t.
     t_eval : sequence of float, optional
-        Times at which ``sol.t`` and ``sol.y`` are given; without it the integrator's own steps. It never
-        changes the run.
+        Times of ``sol.t`` and ``sol.y``; the default is the steps of the integrator. It does not change the
+        run.
     save : str or float, optional
-        What is kept of the run, which it never changes. "all"; "events": no states between them;
-        "last-period": the last period of the forcing, states and events; a number: the last so much time, in
-        the unit of t; "nothing": the state at the end, status and cost. With the last three a run of any
-        length takes the same memory.
+        Parts of the run to store, without any effect on the run itself. "all" stores everything, "events" no
+        states between events, "last-period" the states and events of the last forcing period, a number those of
+        the last such length of time, and "nothing" the final state, status and cost. With the last three the
+        memory does not grow with the length of the run.
     limits : mapping of str to float, optional
-        What the run may cost, by name: "events", "steps", "seconds" by the clock, "megabytes" by which the
-        process grows. A run that has had its share stops soon after (a compiled loop looks at them every 1024
-        events or 4096 steps), with status "limit" and what it computed; ``sol.resume()`` goes on from there, to
-        the same digits as if it had never stopped.
+        Limits of the run: "events", "steps", "seconds" of elapsed time, "megabytes" of memory growth. They are
+        checked every 1024 events or 4096 steps in compiled code, so a run stops shortly after a limit is
+        exceeded. It then has status "limit" and its partial result; ``sol.resume()`` continues it bit for bit as
+        if it had never stopped.
     progress : callable, optional
-        Called with the finished fraction of the span, from time to time.
+        Called at intervals with the finished fraction of the time span.
     **options : Any
         Options of the integrator.
 
     Returns
     -------
     Solution
-        Also where the run stopped early: ``sol.status`` and ``sol.message`` say why. Of a `MechanicalSystem`
-        a `MechanicalSolution`, or a `SteppedSolution` by ``moreau``.
+        The solution, also of a run that stopped early; ``sol.status`` and ``sol.message`` state the reason. For a
+        `MechanicalSystem` it is a `MechanicalSolution`, or a `SteppedSolution` with ``moreau``.
 
     Raises
     ------
     UsageError
-        For anything that does not fit the model or the integrator.
+        If an argument does not fit the model or the integrator.
     ModelError
-        For a faulty model.
+        If the model is faulty.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def simulate(
 
 
 _DECLARED = signature(simulate)
-# what has no name is taken in order to be refused: the signature that is shown has what can be given
+# positional arguments are accepted only to reject them with a remedy, so the displayed signature omits them
 vars(simulate)["__signature__"] = _DECLARED.replace(
     parameters=[p for p in _DECLARED.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL]
 )

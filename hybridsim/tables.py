@@ -1,4 +1,4 @@
-"""A run as a table, and the forms it is given in: CSV, NPZ, pandas, xarray."""
+"""A run as a table, with export to CSV, NPZ, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Table:
-    """Quantities and modes at times.
+    """Quantities and modes at given times.
 
     Parameters
     ----------
     t : times (k,).
     columns : values (k,) by the name of a state, discrete state, output or other quantity.
-    modes : for each component its modes at the times: their names, and a number into them (k,).
-    units : units by name, of ``t`` too; without those that were not declared.
-    about : what the run was: name of the model, integrator, status and the like.
+    modes : for each component the names of its modes, and the index (k,) of the active mode at each time.
+    units : declared units by name, including that of ``t``.
+    about : name of the model, integrator, status and further facts about the run.
     """
 
     t: np.ndarray
@@ -41,12 +41,12 @@ class Table:
     about: Mapping[str, str]
 
     def mode_names(self, component: str) -> np.ndarray:
-        """Names (k,) of the modes of a component."""
+        """Return the mode names (k,) of a component."""
         names, numbers = self.modes[component]
         return np.array(names, dtype=np.str_)[numbers]
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write it as CSV: t, quantities with all their digits, modes."""
+        """Write a CSV file with t, the quantities in full precision, and the modes."""
         with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["t", *self.columns, *map(mode_title, self.modes)])
@@ -57,12 +57,12 @@ class Table:
                 writer.writerow(row + [column[k] for column in texts])
 
     def to_npz(self, path: str | PathLike[str], events: Mapping[str, np.ndarray]) -> None:
-        """Write it for `numpy.load`: an array for each quantity, ``mode(c)``, ``events/...``, and ``about.json``."""
+        """Write an NPZ file: an array per quantity, ``mode(c)``, ``events/...`` and ``about.json``."""
         arrays = {"t": self.t, **self.columns}
         arrays |= {mode_title(component): self.mode_names(component) for component in self.modes}
         arrays |= {f"events/{name}": values for name, values in events.items()}
         about = {**self.about, "units": dict(self.units)}
-        # numpy.savez takes names as keywords, and a state may be called `file`
+        # numpy.savez cannot store a state called `file`, which is one of its arguments
         with whole_file(path) as partly, zipfile.ZipFile(partly, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, values in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
@@ -70,7 +70,7 @@ class Table:
             archive.writestr("about.json", json.dumps(about, indent=1))
 
     def to_pandas(self) -> pd.DataFrame:
-        """A data frame over t: a column for each quantity, a categorical one for each component's mode."""
+        """Return a data frame over t, with a categorical column for the mode of each component."""
         pandas = library("pandas")
         columns: dict[str, Any] = dict(self.columns)
         for component, (names, numbers) in self.modes.items():
@@ -80,7 +80,7 @@ class Table:
         return frame
 
     def to_xarray(self) -> xr.Dataset:
-        """A data set over t: a variable for each quantity with its unit, a coordinate for each component's mode."""
+        """Return a data set over t, with units, and a coordinate for the mode of each component."""
         xarray = library("xarray")
         variables = {
             name: ("t", values, {"units": self.units[name]} if name in self.units else {})
@@ -93,12 +93,12 @@ class Table:
 
 
 def mode_title(component: str) -> str:
-    """What the column of a component's modes is called; no quantity can have that name."""
+    """Return the column name of a component's modes, which no quantity can have."""
     return f"mode({component})"
 
 
 def event_columns(events: Sequence[Any], states: Sequence[str]) -> dict[str, np.ndarray]:
-    """The events as columns of equal length: t, kind, ..., and for each state ``x-`` and ``x+``."""
+    """Return the events as columns of equal length: t, kind, ..., and ``x-`` and ``x+`` for each state."""
     columns = {"t": np.array([e.t for e in events], dtype=float)}
     for name in ("kind", "component", "guard", "source", "target"):
         columns[name] = np.array([getattr(e, name) for e in events], dtype=np.str_)
@@ -110,16 +110,16 @@ def event_columns(events: Sequence[Any], states: Sequence[str]) -> dict[str, np.
 
 
 def event_frame(events: Sequence[Any], states: Sequence[str]) -> pd.DataFrame:
-    """The events as a data frame, one row each."""
+    """Return the events as a data frame with one row per event."""
     return library("pandas").DataFrame(event_columns(events, states))
 
 
 def library(name: str) -> Any:
-    """pandas or xarray, which not everybody has."""
+    """Import pandas or xarray, or raise an error if it is not installed."""
     try:
         return import_module(name)
     except ImportError:
         raise UsageError(
             f"{name} is not installed",
-            remedy=f"install it: pip install {name} (or both libraries of tables: pip install 'hybridsim[tables]')",
+            remedy=f"run 'pip install {name}', or 'pip install hybridsim[tables]' for pandas and xarray",
         ) from None

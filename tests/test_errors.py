@@ -89,6 +89,6 @@ def test_errors_travel_between_processes_whole() -> None:
 def test_nearest_names() -> None:
     assert nearest("omga", ["omega", "mu", "N"]) == "did you mean 'omega'?"
     assert nearest("n", ["N", "mu"]) == "did you mean 'N'?"
-    assert nearest("zzz", ["b", "a"], kind="laws") == "known laws: a, b."
-    assert nearest("zzz", [], kind="laws") == "there are no laws here."
+    assert nearest("zzz", ["b", "a"], kind="laws") == "known laws: a, b"
+    assert nearest("zzz", [], kind="laws") == "there are no laws"
     assert "(40 in all)" in nearest("zzz", [f"parameter_{i}" for i in range(40)])

@@ -1,4 +1,4 @@
-"""The command line: one file a command; `main` runs one line and answers for its errors."""
+"""Command line interface: one module per command. `main` runs one command line and reports its errors."""
 
 from hybridsim.cli.entry import command as command
 from hybridsim.cli.entry import main as main

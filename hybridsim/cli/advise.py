@@ -1,4 +1,4 @@
-"""`hybridsim advise MODEL --quantity Q --tol TOL`: how little model, and which integrator, is enough."""
+"""`hybridsim advise MODEL --quantity Q --tol TOL`: find the simplest model that is accurate enough."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 _EXAMPLES = """\
-quantities: amplitude.x, peak.x, maximum.f, minimum.f, mean.x, energy.x, harmonic.x.3, dissipated.f, stick_fraction.f,
-period: of the steady motion, or with --t-end of a run; of a run alone final.x and event_time.f.2.
+quantities of the steady motion, or with --t-end of a run: amplitude.x, peak.x, maximum.f, minimum.f, mean.x, energy.x,
+harmonic.x.3, dissipated.f, stick_fraction.f, period. Quantities of a run only: final.x, event_time.f.2.
 
 examples:
   hybridsim advise dfcs -p F0=100 --quantity amplitude.x --tol 0.03
@@ -31,13 +31,13 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "advise",
-        help="say how little model, and which integrator, is enough for a question",
-        description="Hold a ladder of simpler models against the full one, and name the simplest that gives a quantity "
-        "within a tolerance, with errors and costs that are measured; likewise integrator settings.",
+        help="find the simplest model and the cheapest integrator that are accurate enough",
+        description="Compare simpler models with the full model, and report the simplest one that computes a quantity "
+        "within a tolerance. Compare integrator settings likewise. All errors and run times are measured.",
         epilog=_EXAMPLES,
     )
     values.add_model_arguments(parser)
-    parser.add_argument("--quantity", metavar="Q", required=True, help="what is asked: see below")
+    parser.add_argument("--quantity", metavar="Q", required=True, help="the quantity to compute (see below)")
     parser.add_argument(
         "--tol",
         metavar="TOL",
@@ -45,13 +45,15 @@ def add_to(commands: Any) -> None:
         default=0.01,
         help="largest relative error (default: 0.01)",
     )
-    parser.add_argument("--t-end", metavar="TIME", help="ask about a run from 0 to this time (as in run)")
+    parser.add_argument(
+        "--t-end", metavar="TIME", help="evaluate a run from 0 to this time instead of the steady motion"
+    )
     parser.add_argument(
         "--over",
         metavar="NAME=VALUES",
         nargs="+",
         type=values.assignment,
-        help="a map over values of parameters, FROM:TO:COUNT or A,B,C, as in sweep",
+        help="compute a map over parameter values, written FROM:TO:COUNT or A,B,C as in sweep",
     )
     parser.add_argument(
         "--uncertain",
@@ -59,7 +61,7 @@ def add_to(commands: Any) -> None:
         type=values.assignment,
         action="append",
         default=[],
-        help="a parameter is known in this range only: is the tolerance finer than that?",
+        help="range of an uncertain parameter; the report compares its effect with the tolerance",
     )
     parser.add_argument(
         "--rungs", metavar="A,B", type=values.names, help="simpler models to try (default: all)"
@@ -68,18 +70,18 @@ def add_to(commands: Any) -> None:
         "--v0",
         metavar="SPEED",
         type=values.positive,
-        help="width of regularised forces (default: a hundredth of the largest sliding speed)",
+        help="velocity width of the regularised forces (default: 1 %% of the largest sliding speed)",
     )
-    parser.add_argument("--no-integrators", action="store_true", help="try no integrator settings")
-    options.add_workers(parser, " of --over")
-    options.add_budget(parser, "120; with --over as long as it takes")
-    options.add_plot(parser, "it")
-    options.add_json(parser, "everything")
+    parser.add_argument("--no-integrators", action="store_true", help="skip the integrator settings")
+    options.add_workers(parser, " for --over")
+    options.add_budget(parser, "120; unlimited with --over")
+    options.add_plot(parser, "the result")
+    options.add_json(parser, "the result")
     parser.set_defaults(execute=execute, lighter="a shorter --t-end or a looser --tol")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Ask, print the table and draw the picture."""
+    """Compute the advice, print the table and draw the picture."""
     options.check_plot(args)
     model = values.changed_model(args)
     over = None if args.over is None else values_by_name(model, args.over)
@@ -101,7 +103,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             budget=args.budget,
             progress=progress.of_steps,
         )
-    try:  # before anything is printed to a reader who may have gone
+    try:  # write files first: printing fails if the reader of the pipe has gone
         if args.plot:
             from hybridsim.plot import advice, save
 
@@ -116,14 +118,16 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _ranges(model: Model, pairs: list[tuple[str, str]]) -> dict[str, tuple[float, float]]:
-    """Ranges of parameters; each end may be an expression."""
+    """Return the range of each uncertain parameter; its limits may be expressions."""
     from hybridsim.cli.sweep import number_of
 
     found = {}
     for name, text in pairs:
         low, colon, high = text.partition(":")
         if not colon:
-            raise UsageError(f"--uncertain {name}={text}", remedy="write NAME=LOW:HIGH")
+            raise UsageError(
+                f"--uncertain: cannot read '{name}={text}'", remedy=f"write {name}=LOW:HIGH with two numbers"
+            )
         with values.blaming_the_command_line():
             found[name] = (number_of(model, name, low), number_of(model, name, high))
     return found

@@ -1,4 +1,4 @@
-"""`hybridsim atlas [SCENE ...]`: scenes that break simulators against every integrator, with a verdict on each pair."""
+"""`hybridsim atlas [SCENE ...]`: run every integrator on the benchmark scenes and report each failure."""
 
 from __future__ import annotations
 
@@ -18,35 +18,38 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas import Atlas
 
 _FOLDER = Path("atlas")
-_MATRIX_DPI = 130.0  # its letters are small
+_MATRIX_DPI = 130.0  # the labels are small
 
 
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "atlas",
-        help="what every integrator makes of the scenes that break simulators, and why",
-        description="Run scenes whose answer is known and which break simulators, with every integrator and with what "
-        "else people use, and say of each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
-        epilog="The folder gets atlas.json, matrix.png, index.md, and a page and a folder of pictures for each class. "
-        "All of it takes some ten minutes on two processors.",
+        help="run all integrators on the benchmark scenes and report failures",
+        description="Run benchmark scenes with known answers with every integrator and with other common methods. "
+        "Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
+        epilog="The folder receives atlas.json, matrix.png, index.md, and a page and a folder of pictures for each "
+        "class. A full run takes about ten minutes on two processors.",
     )
-    parser.add_argument("scenes", metavar="SCENE", nargs="*", help="these scenes only (default: all)")
+    parser.add_argument("scenes", metavar="SCENE", nargs="*", help="run only these scenes (default: all)")
     parser.add_argument(
-        "--class", dest="trouble", metavar="CLASS", default="", help="the scenes of this class"
+        "--class", dest="trouble", metavar="CLASS", default="", help="run only the scenes of this class"
     )
-    parser.add_argument("--list", action="store_true", help="print the scenes by class, and run nothing")
+    parser.add_argument("--list", action="store_true", help="print the scenes by class and exit")
     parser.add_argument(
         "--integrators",
         metavar="A,B",
         type=values.names,
-        help="these only, with the variants of each; 'rk4 tanh' and 'rk4 karnopp' by name (default: all)",
+        help="run only these integrators and their variants, or 'rk4 tanh', 'rk4 karnopp' (default: all)",
     )
     parser.add_argument(
-        "--quick", action="store_true", help="only the loosest setting of each study: gross failures"
+        "--quick", action="store_true", help="run only the loosest setting, which finds gross failures"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=values.workers, help="processes (default: one for each processor)"
+        "--workers",
+        metavar="N",
+        type=values.workers,
+        help="number of processes (default: one per processor)",
     )
     options.add_out(parser, "atlas")
     options.add_json(parser, "all verdicts")
@@ -54,9 +57,11 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the matrix, print the counts and fill the folder."""
+    """Run the scenes, print the counts and write the results."""
     if args.scenes and args.trouble:
-        raise UsageError("scenes by name and --class", remedy="leave out one of the two")
+        raise UsageError(
+            "Scene names and --class cannot be combined", remedy="use either the scene names or --class"
+        )
     from hybridsim.testing.atlas import atlas, listing, scenes_named, told
 
     scenes = scenes_named(args.scenes, args.trouble)
@@ -81,7 +86,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         fault: UsageError | None = None
         try:
             _write(result, folder, session, progress)
-        except OSError as failed:  # some places say that they may be written, and are not
+        except OSError as failed:  # access rights may promise more than the file system allows
             fault = cannot_write(folder, failed)
         except UsageError as failed:
             fault = failed
@@ -98,7 +103,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
-    """Data, matrix, pages and pictures; of what was interrupted the data alone, which take no time."""
+    """Write data, matrix, pages and pictures; after an interruption only the data."""
     from hybridsim.plot.atlas import matrix, save_small
     from hybridsim.testing.atlas import pages
 
@@ -116,14 +121,14 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
 
 
 def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
-    """Draw the scenes, each in the folder of its class; the names of those that have a picture."""
+    """Draw the scenes into the folders of their classes, and return the names of the drawn ones."""
     from hybridsim.plot.atlas import save_small
     from hybridsim.plot.atlas import scene as picture
     from hybridsim.testing.atlas import example
 
     drawn = set()
     for number, scene in enumerate(result.scenes):
-        progress(number / len(result.scenes), f"picture of {scene.name}")
+        progress(number / len(result.scenes), f"drawing {scene.name}")
         found = example(result, scene)
         if found is not None:
             place = folder / (scene.trouble or "scenes")

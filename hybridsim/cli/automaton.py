@@ -1,4 +1,4 @@
-"""A model as text: its quantities, the automaton it expands to, its events, what the engine makes of it."""
+"""Describe a model as text: quantities, hybrid automaton, events and compiled code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def lines_of(
     model: Model, report: Report, primitives: Iterable[Primitive], facts: Iterable[str]
 ) -> Iterator[str]:
-    """The whole description, line by line."""
+    """Yield the whole description, line by line."""
     yield f"{model.name}: {model.title}" if model.title else model.name
     for label in ("source", "look"):
         if text := getattr(model, label):
@@ -46,22 +46,22 @@ def lines_of(
 
 
 def _primitive(primitive: Primitive) -> str:
-    """A line on what became of it."""
+    """Return a line that says how a non-smooth expression is treated."""
     text, remark = primitive.text, primitive.remark
     became = {
-        COMPONENT: "two modes that agree where they change"
-        + (f", those of {remark}" if remark != text else ""),
-        SURFACE: f"it jumps, and switches with {remark}",
-        TIMED: f"a known signal, which changes where {remark} is zero",
+        COMPONENT: "two modes, continuous at the change of mode"
+        + (f", shared with {remark}" if remark != text else ""),
+        SURFACE: f"a jump at the switching surface {remark}",
+        TIMED: f"a known function of time that switches at the zeros of {remark}",
         MODE: remark,
-        KEPT: f"integrated as it stands, {remark}; exact and taylor refuse it",
+        KEPT: f"not replaced by modes, {remark}; exact and taylor reject it",
         POWER: f"a fractional power, {remark}",
     }
     return f"{text} in {', '.join(primitive.where)}: {became[primitive.became]}"
 
 
 def _flat(expression: Expression) -> str:
-    """Text of an expression in one line; a file may have it in several."""
+    """Return the text of an expression on one line; a file may break it."""
     return " ".join(expression.text.split())
 
 
@@ -104,30 +104,30 @@ def _input(declared: Input) -> str:
 
 
 def _component(component: Component, report: Report) -> Iterator[str]:
-    yield f"starts in {component.initial}" if component.initial else "starts as the initial state decides"
+    yield f"initial mode: {component.initial or 'from the initial state'}"
     sides: tuple[str, ...] = ()
     if surface := component.surface:
         sides = surface.modes
         held, projected = report.held.get(component.name), report.projected.get(component.name)
         beyond = (
-            f"impacts of restitution {_flat(surface.restitution)} where it comes to 0"
+            f"impact with restitution {_flat(surface.restitution)} when it reaches 0"
             if surface.restitution is not None
             else f"{surface.below} where it is < 0"
         )
         yield (
             f"{surface.above} where {_flat(surface.function)} > 0, {beyond}; "
-            f"{surface.hold} keeps it at 0 by {surface.unknown}"
-            + (f", with {held} exact" if held else "")
-            + (f", with {', '.join(projected)} projected onto it" if projected else "")
+            f"{surface.hold} holds it at 0 with the force {surface.unknown}"
+            + (f"; {held} is then computed from the constraint" if held else "")
+            + (f"; {', '.join(projected)} are projected onto the surface" if projected else "")
             + (
                 ""
                 if held or projected
-                else ", which its rate does not depend on: it is crossed, not slid along"
+                else f"; its rate does not depend on {surface.unknown}: the surface can only be crossed"
             )
         )
     if limit := component.limit:
         reset = ", ".join(_flat_reset(name, value, "=") for name, value in limit.reset.items())
-        yield f"where its transitions accumulate: to {limit.to}" + (f", with {reset}" if reset else "")
+        yield f"if its events accumulate: to {limit.to}" + (f" with {reset}" if reset else "")
     for mode in component.modes:
         linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
         yield f"mode {mode.name}{linear}"
@@ -142,7 +142,7 @@ def _mode(mode: Mode, sides: list[str]) -> Iterator[str]:
     for guard in mode.guards:
         text = _flat(guard.expr)
         attracts = text.startswith(ATTRACTION)
-        yield f"while {'both sides lead to the surface' if attracts else f'{text} >= 0'}   ({guard.name})"
+        yield f"while {'both sides point to the surface' if attracts else f'{text} >= 0'}   ({guard.name})"
         yield from (f"    {line}" for line in _then(guard, sides))
 
 
@@ -151,9 +151,9 @@ def _then(guard: Guard, sides: list[str]) -> Iterator[str]:
         condition = f"if {_flat(choice.when)}: " if choice.when else ""
         yield f"{condition}to {choice.to}{_resets(choice.reset)}"
     if guard.fatal:
-        yield f"else the run stops: {guard.fatal}"
+        yield f"otherwise the run stops: {guard.fatal}"
     elif not guard.then and sides:
-        yield f"to {' or '.join(sides)}, whichever is admissible"
+        yield f"to the admissible mode of {', '.join(sides)}"
 
 
 def _resets(reset: Mapping[str, Expression]) -> str:
@@ -183,11 +183,11 @@ def _schedule(schedule: Schedule) -> str:
 def _engine(report: Report) -> Iterator[str]:
     clusters = [", ".join(cluster) for cluster in report.clusters]
     if clusters:
-        yield f"clusters, each decided jointly: {'; '.join(clusters)}"
-    written = f", written in {report.lowering_seconds:.1g} s" if report.lowering_seconds else ""
+        yield f"contacts whose modes are selected together: {'; '.join(clusters)}"
+    written = f", generated in {report.lowering_seconds:.1g} s" if report.lowering_seconds else ""
     cost = (
-        f"a run compiles those that it uses, once, in up to about {report.compile_seconds:.1g} s of a processor"
+        f"compiled once at the first run, in up to about {report.compile_seconds:.1g} s"
         if report.compile_seconds
-        else "all are compiled already"
+        else "cached"
     )
-    yield f"{report.operations} operations{written}: {cost}"
+    yield f"compiled code: {cost} ({report.operations} operations{written})"

@@ -1,4 +1,4 @@
-"""`hybridsim cache`: where compiled functions are kept; clear them, or compile the engine ahead of time."""
+"""`hybridsim cache`: show or clear the cache of compiled code, or compile the engine ahead of time."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "cache",
-        help="show, clear or fill the folder of compiled functions",
-        description="Show, clear or fill the folder where compiled functions are kept.",
-        epilog="HYBRIDSIM_CACHE=FOLDER puts the cache elsewhere; HYBRIDSIM_JIT=0 runs without compiling.",
+        help="show, clear or fill the cache of compiled code",
+        description="Show, clear or fill the folder that caches compiled code.",
+        epilog="Set HYBRIDSIM_CACHE=FOLDER to move the cache, and HYBRIDSIM_JIT=0 to run without compiling.",
     )
     parser.add_argument(
         "action",
@@ -26,26 +26,26 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Do what `action` says."""
+    """Carry out the requested action."""
     from hybridsim.engine.cache import cache_root, clear, kernel_folder
 
     root = cache_root()
     if root is None or (args.action == "warm" and kernel_folder() is None):
-        return 1  # the reason is told already
+        return 1  # a warning has reported the reason
     if args.action == "path":
         say(str(root))
     elif args.action == "clear":
         freed, others = clear()
-        complain(f"freed {freed / 1e6:.1f} MB in {root}")
+        complain(f"deleted {freed / 1e6:.1f} MB in {root}")
         for other in others:
-            complain(f"{other} is left alone: hybridsim did not mark it as its own")
+            complain(f"{other} is left alone, because hybridsim did not create it")
     else:
         _warm()
     return 0
 
 
 def _warm() -> None:
-    """Compile everything that a run needs, by a short run of the reference model with every integrator."""
+    """Compile all kernels by a short run of the reference model with every integrator."""
     import hybridsim
     from hybridsim.engine.period import forcing_period
 
@@ -53,6 +53,6 @@ def _warm() -> None:
     period = forcing_period(model)
     assert period is not None, "the reference model is forced by a sine"
     for integrator in hybridsim.list_integrators():
-        complain(f"warming {integrator.name}")
+        complain(f"compiling {integrator.name}")
         solution = hybridsim.simulate(model, (0.0, period), integrator=integrator.name)
-        solution(solution.t)  # the dense output has kernels of its own
+        solution(solution.t)  # compiles the kernels of the dense output

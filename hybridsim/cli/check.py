@@ -1,4 +1,4 @@
-"""`hybridsim check MODEL`: report every fault and every oddity, and print the automaton that the model expands to."""
+"""`hybridsim check MODEL`: report errors and suspicious parts, and print the hybrid automaton."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help="check a model and print its automaton",
-        description="Read a model, report every fault, warn about what is odd (guards that never fire, pulses that a "
-        "step may pass over, missing units), and print the automaton that it expands to.",
+        description="Read a model, report every error, warn about suspicious parts (guards that never fire, pulses "
+        "that a step may miss, missing units), and print the hybrid automaton of the model.",
     )
     values.add_model_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -34,7 +34,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Print the expanded automaton, and warnings; a bad model has already been refused on loading."""
+    """Print the automaton and the warnings; loading has already rejected a faulty model."""
     from hybridsim.engine.report import describe
     from hybridsim.model.hygiene import warnings_of
     from hybridsim.model.smoothing import smoothing_of

@@ -1,4 +1,4 @@
-"""`hybridsim compare MODEL`: which integrator buys accuracy cheapest on it; `compare --suite`: on many scenes."""
+"""`hybridsim compare`: compare error and run time of integrators on one model, or on a suite of scenes."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
-        help="compare integrators on a model, or on a suite of scenes: error against cost",
-        description="Compare integrators on a model, or on a suite of scenes, error against cost: a table, a chart "
-        "and the data.",
-        epilog="The folder gets chart.png (suite.png), table.csv and comparison.json.",
+        help="compare error and run time of integrators on a model or on a suite",
+        description="Compare error and run time of integrators on one model or on a suite of scenes. Print a table and "
+        "write a chart and the data.",
+        epilog="The folder receives chart.png (or suite.png), table.csv and comparison.json.",
     )
     values.add_model_arguments(parser, optional=True)
     values.add_span_argument(parser, values.COMPARED_PERIODS)
@@ -33,10 +33,13 @@ def add_to(commands: Any) -> None:
         "--suite", action="store_true", help="run the scenes of the suite instead of one model"
     )
     parser.add_argument(
-        "--scenes", metavar="A,B", type=values.names, help="of the suite, run these only (default: all)"
+        "--scenes", metavar="A,B", type=values.names, help="scenes of the suite to run (default: all)"
     )
     parser.add_argument(
-        "--integrators", metavar="A,B", type=values.names, help="compare these only (default: all that can)"
+        "--integrators",
+        metavar="A,B",
+        type=values.names,
+        help="integrators to compare (default: all that support the model)",
     )
     parser.add_argument(
         "--rtol",
@@ -45,19 +48,22 @@ def add_to(commands: Any) -> None:
         help="relative tolerances of the adaptive integrators",
     )
     parser.add_argument(
-        "--steps", metavar="N,N", type=values.counts, help="steps a period of the fixed-step integrators"
+        "--steps",
+        metavar="N,N",
+        type=values.counts,
+        help="steps per period of the fixed-step integrators",
     )
     parser.add_argument(
         "--regularized",
         metavar="KIND,KIND",
         type=values.names,
-        help="compare these regularised forms (tanh, arctan, karnopp) with the set-valued law",
+        help="also compare these regularised friction laws (tanh, arctan, karnopp)",
     )
     parser.add_argument(
         "--v0",
         metavar="V,V",
         type=values.positives,
-        help="their widths, in the unit of the velocity (default: 1e-1 to 1e-4 of its nominal size)",
+        help="velocity widths of the regularised laws (default: 1e-1 to 1e-4 of the nominal velocity)",
     )
     parser.add_argument(
         "--repeat",
@@ -66,7 +72,7 @@ def add_to(commands: Any) -> None:
         default=3,
         help="timed repetitions of every run (default: 3)",
     )
-    options.add_budget(parser, "120, and 600 for the suite")
+    options.add_budget(parser, "120; 600 with --suite")
     options.add_out(parser, "compare-MODEL")
     options.add_json(parser, "the data")
     parser.set_defaults(
@@ -75,16 +81,18 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Compare, print the table and fill the folder."""
+    """Compare the integrators, print the table and write the results."""
     folder: Path | None = args.out
     if folder is not None:
         require_folder(folder, "--out")
     if args.suite:
         return _suite(args, folder or _SUITE_FOLDER, session)
     if args.model is None:
-        raise UsageError("compare what?", remedy="name a model (see: hybridsim models), or say --suite")
+        raise UsageError(
+            "compare needs a model or --suite", remedy="name a model (see: hybridsim models) or add --suite"
+        )
     if args.scenes:
-        raise UsageError("--scenes is for --suite", remedy="say --suite too, or leave it out")
+        raise UsageError("--scenes requires --suite", remedy="add --suite or remove --scenes")
     return _model(args, folder, session)
 
 
@@ -122,7 +130,8 @@ def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
     for option, value in given.items():
         if value:
             raise UsageError(
-                f"{option} and --suite", remedy="the suite has its own models; leave out one of the two"
+                f"{option} cannot be combined with --suite, which has its own models",
+                remedy=f"remove {option} or --suite",
             )
     require_folder(folder, "--out")
 
@@ -152,7 +161,7 @@ def _write(
     draw: Any,
     session: Session,
 ) -> None:
-    """Fill the folder, and print the result, to a reader who may have gone."""
+    """Write the files and print the result; printing may fail if the reader of the pipe has gone."""
     from hybridsim.plot import save
 
     try:

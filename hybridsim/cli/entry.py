@@ -1,7 +1,7 @@
-"""From a command line to an exit code: no error of the user's ever ends in a traceback.
+"""Run a command line and return its exit code; user errors never end in a traceback.
 
-Exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted (Ctrl-C), 143
-asked to end (SIGTERM), 141 the reader of the output went away. Data goes to stdout, everything else to stderr.
+Exit codes: 0 success, 1 the simulation failed, 2 wrong usage, 3 faulty model, 130 interrupted (Ctrl-C), 143
+terminated (SIGTERM), 141 the reader of the pipe closed it. Data goes to stdout, everything else to stderr.
 """
 
 from __future__ import annotations
@@ -56,16 +56,16 @@ COMMANDS: tuple[ModuleType, ...] = (
     cache,
 )
 
-PIPE_CLOSED = 141  # 128 + SIGPIPE
+PIPE_CLOSED = 141  # 128 + SIGPIPE, as shells report it
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 
 
 def build_parser() -> Parser:
-    """The parser of the whole command line; every command adds its own part."""
+    """Return the parser of the whole command line, to which every command adds its part."""
     parser = Parser(
         prog="hybridsim",
-        description="Simulate piecewise-smooth systems (dry friction first) and compare integrators on them.",
-        epilog="exit codes: 0 done, 1 the simulation failed, 2 bad usage, 3 bad model, 130 interrupted",
+        description="Simulate piecewise-smooth systems (dry friction, impacts, switching) and compare integrators.",
+        epilog="exit codes: 0 success, 1 the simulation failed, 2 wrong usage, 3 faulty model, 130 interrupted",
     )
     parser.add_argument("--version", action="version", version=f"hybridsim {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
@@ -75,16 +75,16 @@ def build_parser() -> Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line (default: that of the process) and return its exit code."""
+    """Run one command line (default: `sys.argv`) and return its exit code."""
     if argv is None:
-        # imports make half a million objects that all live on: collecting among them costs a tenth of a short run
+        # imports create half a million permanent objects; scanning them would cost a tenth of a short run
         gc.set_threshold(100_000, 50, 50)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            # a title with an accent must not stop an ASCII terminal
+            # an accent in a title must not fail on an ASCII terminal
             stream.reconfigure(errors="backslashreplace")
     session = Session()
-    lighter = ""  # what takes less memory, of what a command has
+    lighter = ""  # options of the command that reduce its memory
     with warnings.catch_warnings(), session.listening():
         warnings.showwarning = _show_warning
         try:
@@ -92,12 +92,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             lighter = getattr(args, "lighter", "")
             with only_data_on_stdout():
                 code: int = args.execute(args, session)
-        except SystemExit as done:  # argparse after --help and --version
+        except SystemExit as done:  # argparse exits so after --help and --version
             return done.code if isinstance(done.code, int) else 0
         except KeyboardInterrupt:
             return _interrupted(session)
         except BrokenPipeError:
-            # Python flushes stdout once more at exit; give it somewhere to go.
+            # Python flushes stdout again at exit, which must not fail
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return PIPE_CLOSED
         except HybridsimError as error:
@@ -105,34 +105,34 @@ def main(argv: Sequence[str] | None = None) -> int:
             complain(str(error))
             return error.exit_code
         except MemoryError:
-            complain(f"out of memory{lighter and f'; try {lighter}'}")
+            complain(f"out of memory{lighter and f'; use {lighter}'}")
             return HybridsimError.exit_code
-        except Exception as bug:  # the last line of defence: whatever arrives here is a bug of ours
+        except Exception as bug:  # every other exception is a bug of hybridsim
             if isinstance(bug, OSError) and bug.errno in _NO_ROOM:
                 complain(str(cannot_write(bug.filename or "the output", bug)))
                 return UsageError.exit_code
-            if session.interrupted:  # unless Ctrl-C hit compiled code, which has errors of its own for it
+            if session.interrupted:  # compiled code may turn Ctrl-C into another exception
                 return _interrupted(session)
             if not _show_traceback_if_wanted():
                 complain(
                     f"internal error, please report it: {type(bug).__name__}: {bug}\n"
-                    "set HYBRIDSIM_TRACEBACK=1 to see where it comes from"
+                    "set HYBRIDSIM_TRACEBACK=1 to print the traceback"
                 )
             return HybridsimError.exit_code
     return code
 
 
 def command() -> NoReturn:
-    """Run the command line of the process, and end the process.
+    """Run the command line of the process, then end the process without freeing its memory.
 
-    The interpreter would first take apart all that it holds, compiled code among it, which takes a second or more after
-    the last line. What is to be done at the exit is done; the memory goes back to the system as it is.
+    The interpreter would otherwise free all objects and the compiled code, which takes a second or more. The exit
+    handlers run and the streams are flushed; the operating system frees the memory.
     """
-    # what SUNDIALS warns of while it runs is in the messages of runs, as far as it matters
+    # hybridsim reports the relevant warnings of SUNDIALS in the messages of runs
     os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
     code = main()
     atexit._run_exitfuncs()
-    with suppress(OSError, ValueError, AttributeError):  # whoever read it went away, or there was none
+    with suppress(OSError, ValueError, AttributeError):  # a stream may be closed or missing
         sys.stdout.flush()
         sys.stderr.flush()
     os._exit(code)

@@ -1,4 +1,4 @@
-"""`hybridsim integrators [NAME]`: what can run a model, when to choose which, what each one lacks, its options."""
+"""`hybridsim integrators [NAME]`: list the integrators with their uses, limitations and options."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "integrators",
-        help="list the integrators and when to choose which",
-        description="List what can run a model, when to choose which, and what each one lacks; of one, its options.",
+        help="list the integrators and their uses",
+        description="List the integrators, their uses and their limitations, or describe one with its options.",
     )
-    parser.add_argument("name", metavar="NAME", nargs="?", help="one integrator: with its options")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="describe only this one, with its options")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List every integrator, its own and those that other packages registered, or one with its options."""
+    """List all integrators, including those of other packages, or describe one with its options."""
     from hybridsim.integrators import integrator_class, list_integrators
     from hybridsim.integrators.base import CAPABILITIES
     from hybridsim.integrators.options import options_of
@@ -49,7 +49,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             ]
         )
         return 0
-    _paragraph(f"What a model may need: {', '.join(CAPABILITIES)}.", indent="")
+    _paragraph(f"Capabilities that a model may need: {', '.join(CAPABILITIES)}.", indent="")
     say()
     lacking = [[c for c in CAPABILITIES if c in each.lacks] for each in found]
     print_table(
@@ -60,7 +60,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         options = options_of(each)
         say()
         say(f"{each.name}: {each.title} (order {each.order})")
-        _paragraph(f"choose it: {each.when}")
+        _paragraph(f"use it for: {each.when}")
         for capability, reason in each.lacks.items():
             _paragraph(f"lacks {capability}: {reason}")
         _paragraph(f"reference: {each.reference}")
@@ -73,7 +73,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _options(options: tuple[Option, ...]) -> None:
     if not options:
-        say("\nIt has no options of its own.")
+        say("\nThis integrator has no options.")
     for option in options:
         default = option.default
         shown = (

@@ -1,4 +1,4 @@
-"""`hybridsim models`: the models that can be run by name, or the friction laws that a contact can name."""
+"""`hybridsim models`: list the packaged models, or the packaged friction laws."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List name and title of every model, or of every law with its parameters."""
+    """List name and title of every model, or name, title and parameters of every friction law."""
     import hybridsim
 
     if args.laws:
@@ -32,7 +32,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if args.json:
         print_json([{"name": info.name, "title": info.title} for info in found])
     else:
-        print_table(("MODEL", "WHAT IT IS"), [(info.name, info.title) for info in found])
+        print_table(("MODEL", "DESCRIPTION"), [(info.name, info.title) for info in found])
     return 0
 
 
@@ -55,4 +55,4 @@ def _laws(json: bool) -> None:
         )
     else:
         rows = [(law.name, law.title, ", ".join(law.parameters)) for law in laws]
-        print_table(("LAW", "WHAT IT IS", "PARAMETERS"), rows)
+        print_table(("LAW", "DESCRIPTION", "PARAMETERS"), rows)

@@ -1,4 +1,4 @@
-"""Options that several commands have, each declared once."""
+"""Options shared by several commands, each declared once."""
 
 from __future__ import annotations
 
@@ -9,64 +9,70 @@ from hybridsim.cli import values
 from hybridsim.cli.output import require_writable
 
 PICTURES = (".png", ".pdf", ".svg")
-_UNNAMED = Path()  # --plot without a file
+_UNNAMED = Path()  # value of --plot without a file name
 
 
 def add_integrator(parser: argparse.ArgumentParser) -> None:
-    """Which integrator."""
+    """Add the option that selects the integrator."""
     parser.add_argument(
-        "--integrator", metavar="NAME", default="auto", help="see: hybridsim integrators (default: auto)"
+        "--integrator",
+        metavar="NAME",
+        default="auto",
+        help="name of an integrator (see: hybridsim integrators; default: auto)",
     )
 
 
 def add_rtol(parser: argparse.ArgumentParser, default: str) -> None:
-    """How accurate; `default` says what holds without it."""
+    """Add the option for the relative tolerance; `default` describes its default in the help text."""
     parser.add_argument(
         "--rtol", metavar="TOL", type=values.positive, help=f"relative tolerance (default: {default})"
     )
 
 
 def add_workers(parser: argparse.ArgumentParser, of: str = "") -> None:
-    """How many threads, of what."""
+    """Add the option for the number of threads; `of` completes the help text."""
     parser.add_argument(
-        "--workers", metavar="N", type=values.workers, help=f"threads{of} (default: one for each processor)"
+        "--workers",
+        metavar="N",
+        type=values.workers,
+        help=f"number of threads{of} (default: one per processor)",
     )
 
 
 def add_budget(parser: argparse.ArgumentParser, default: str) -> None:
-    """How long all may take."""
+    """Add the option for the total time limit."""
     parser.add_argument(
         "--budget",
         metavar="SECONDS",
         type=values.positive,
-        help=f"what all of it may take (default: {default}); what does not fit is left out, and said",
+        help=f"total time limit (default: {default}); settings that do not fit are skipped and listed",
     )
 
 
 def add_out(parser: argparse.ArgumentParser, default: str) -> None:
-    """Where results go."""
+    """Add the option for the folder of the results."""
     parser.add_argument(
         "--out",
         metavar="FOLDER",
         type=values.folder,
-        help=f"folder of the results (default: {default}, here)",
+        help=f"folder for the results (default: ./{default})",
     )
 
 
 def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
-    """A picture of what, to a file."""
+    """Add the option that writes a picture; `what` names its content in the help text."""
     parser.add_argument(
         "--plot",
         metavar="FILE",
         nargs="?",
         const=_UNNAMED,
         type=Path,
-        help=f"draw {what} ({', '.join(PICTURES)}; default: NAME.png, after the model or the file)",
+        help=f"plot {what} to a {', '.join(PICTURES)} file (default: the name of the model or file with .png)",
     )
 
 
 def check_plot(args: argparse.Namespace) -> None:
-    """Name the picture if the user did not, and refuse a file that cannot be written."""
+    """Set the default file name of the picture, and reject a file that cannot be written."""
     if args.plot == _UNNAMED:
         args.plot = Path(Path(getattr(args, "model", None) or args.solution).with_suffix(".png").name)
     if args.plot:
@@ -74,5 +80,5 @@ def check_plot(args: argparse.Namespace) -> None:
 
 
 def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:
-    """What is printed as JSON, and instead of what."""
+    """Add the option that prints JSON; `what` and `instead` complete the help text."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON instead of {instead}")

@@ -1,4 +1,4 @@
-"""What becomes of a solution on the command line: a summary or JSON, files, an exit code."""
+"""Output of a solution on the command line: summary or JSON, files and exit code."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where a solution is to go, and what the run may cost."""
+    """Add the options for the outputs and the limits of a run."""
     parser.add_argument(
         "--limit",
         metavar="NAME=VALUE",
         type=values.assignment,
         action="append",
         default=[],
-        help="stop with what there is after so many events, steps, seconds or megabytes",
+        help="stop the run, and keep its result, after this number of events, steps, seconds or megabytes",
     )
     options.add_plot(parser, "the run")
-    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the run as a table")
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the time series as a CSV table")
     parser.add_argument(
-        "--npz", metavar="FILE", type=Path, help="write the run and its events for numpy.load"
+        "--npz", metavar="FILE", type=Path, help="write the time series and the events for numpy.load"
     )
     parser.add_argument(
         "--points",
         metavar="N",
         type=values.count,
-        help="equal steps of time for --csv and --npz (default: the integrator's own, events on both sides)",
+        help="number of equally spaced times in --csv and --npz (default: all steps, and both sides of events)",
     )
     parser.add_argument(
         "--save",
         metavar="FILE",
         type=Path,
-        help="write all of the run, for hybridsim resume and hs.load_solution (.hsol)",
+        help="write the whole solution (.hsol) for hybridsim resume and hs.load_solution",
     )
     parser.add_argument(
         "--explain",
@@ -52,13 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         action="append",
         default=[],
-        help="say why the N-th event went as it did (from 0; again for more)",
+        help="explain the N-th event, counted from 0; repeat the option for more events",
     )
     options.add_json(parser, "the result", "the summary")
 
 
 def check_arguments(args: argparse.Namespace) -> None:
-    """Refuse what cannot be written, before the work is done."""
+    """Reject output files that cannot be written, before the run starts."""
     options.check_plot(args)
     if args.csv:
         require_writable(args.csv, "--csv")
@@ -67,39 +67,39 @@ def check_arguments(args: argparse.Namespace) -> None:
     if args.save:
         if str(args.save) in ("all", "events", "last-period", "nothing"):
             raise UsageError(
-                f"--save: {args.save} is no file",
-                remedy=f"name a file such as run.hsol; 'hybridsim run --keep {args.save}' says what is kept",
+                f"--save needs a file name, not '{args.save}'",
+                remedy=f"use --save run.hsol to write the solution, or --keep {args.save} to choose what is stored",
             )
         require_writable(args.save, "--save", (".hsol",))
-    others = {"the model's own file": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
+    others = {"the file of the model": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
     for option in ("plot", "csv", "npz", "save"):
         path = getattr(args, option)
         if path:
             require_apart(path, f"--{option}", others)
-            others |= {f"what --{option} writes": path}
+            others |= {f"the output file of --{option}": path}
     if args.points is not None and not (args.csv or args.npz):
-        raise UsageError("--points without --csv or --npz", remedy="say where the table is to be written")
+        raise UsageError("--points requires --csv or --npz", remedy="add --csv FILE or --npz FILE")
     if args.points == 1:
-        raise UsageError("--points 1", remedy="give at least 2: the start and the end")
+        raise UsageError("--points is 1", remedy="use at least 2 (the start and the end)")
     if args.points is not None:
         from hybridsim.solution.tabulated import MOST_POINTS
 
         if args.points > MOST_POINTS:
-            raise UsageError(f"--points {args.points}", remedy=f"give at most {MOST_POINTS}")
+            raise UsageError(f"--points is {args.points}", remedy=f"use at most {MOST_POINTS}")
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:
-    """What the run may cost."""
+    """Return the limits of the run by name."""
     found: dict[str, Any] = {}
     for name, text in args.limit:
         if name in found:
-            raise UsageError(f"--limit {name} is given twice", remedy="give one value")
+            raise UsageError(f"--limit {name} occurs twice", remedy=f"set {name} once")
         found[name] = values.option_value(text)
     return found
 
 
 def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
-    """The solution of a run, also where Ctrl-C ends it: what was computed by then."""
+    """Return the solution of a run; after Ctrl-C it contains the part computed so far."""
     try:
         return run()
     except RunInterrupted as stopped:
@@ -108,10 +108,10 @@ def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
 
 
 def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:
-    """Print the summary, write the files; 1 where the simulation did not succeed. Warnings `told` are not repeated."""
+    """Write the files, print the summary and return the exit code. Warnings in `told` are not repeated."""
     explanations, unexplained = _explanations(solution, args.explain)
-    try:  # first, since whoever reads the rest may have had enough, as `head` has
-        if solution.t.size:  # else it stopped before the first step, and there is nothing to write
+    try:  # write files first: printing fails if the reader of the pipe, such as `head`, has gone
+        if solution.t.size:  # a run that stopped before its first step has nothing to write
             _write(solution, args, session)
         if args.save:
             solution.save(args.save)
@@ -132,14 +132,14 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
     said = solution.message if begins else f"{solution.status}: {solution.message}"
     if solution.status in ("limit", "interrupted"):
         said = said.removesuffix(", and sol.resume() goes on").removesuffix("; what was computed is kept")
-        goes_on = f"'hybridsim resume {args.save}' goes on"
-        said += f"; {goes_on if args.save else 'with --save FILE.hsol, hybridsim resume could go on'}"
+        resume = f"'hybridsim resume {args.save}' continues the run"
+        said += f"; {resume if args.save else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
     complain(said)
     return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
 
 
 def _explanations(solution: Solution, numbers: Sequence[int]) -> tuple[list[Explanation], UsageError | None]:
-    """Explanations of events, and what is wrong with a number that has none: the run itself is not lost by it."""
+    """Return the explanations of events, and the first error, raised only after the output is written."""
     found, fault = [], None
     for number in numbers:
         try:
@@ -164,12 +164,12 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
 
 
 def _has_events(solution: Solution) -> bool:
-    """Whether the events of a run, and with them its modes, were kept."""
+    """Return whether the events and modes of the run are stored."""
     return solution._run.save != "nothing"
 
 
 def _shares(solution: Solution) -> dict[str, dict[str, float]]:
-    """Share of the time that each component spent in each of its modes."""
+    """Return the fraction of time that each component spent in each of its modes."""
     shares: dict[str, dict[str, float]] = {}
     for component, intervals in solution.modes.items():
         spent: dict[str, float] = {}
@@ -181,7 +181,7 @@ def _shares(solution: Solution) -> dict[str, dict[str, float]]:
 
 
 def _final(solution: Solution) -> list[tuple[str, float]]:
-    """Name and value of every state at the end of the run; none where the run never began.
+    """Return name and value of every state at the end of the run, or nothing if the run never started.
 
     Those of discrete states follow, where something of the run is kept.
     """
@@ -205,11 +205,11 @@ def _summary(solution: Solution) -> list[str]:
         f"  status       {solution.status}",
         f"  events       {sum(found.values())}{f' ({counted})' if counted else ''}"
         if has_events
-        else "  events       not kept",
+        else "  events       not stored",
     ]
     for component, modes in (_shares(solution) if has_events else {}).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
-        lines.append(f"  {f'modes of {component}':<12} {shares}")
+        lines.append(f"  {f'modes ({component})':<12} {shares} of the time")
     if solution.t.size:
         units = {state.name: state.unit for state in model.states}
         final = ", ".join(

@@ -1,4 +1,4 @@
-"""What leaves the program: messages to stderr, data to stdout, files where they can be written."""
+"""Output of the program: messages to stderr, data to stdout, and checks that files are writable."""
 
 from __future__ import annotations
 
@@ -14,27 +14,25 @@ from hybridsim.errors import UsageError, printable
 from hybridsim.files import json_text
 from hybridsim.readable import aligned
 
-TRIAL = ".hybridsim-"  # how the name of a folder begins that is made, and removed, to see whether it can be
+TRIAL = ".hybridsim-"  # prefix of the temporary folder that tests whether a folder is writable
 
 
 class _Data:
-    """Where data go while everything else that is printed goes to standard error; None: to `sys.stdout` as it is."""
+    """The stream for data while stdout is redirected to stderr; None stands for `sys.stdout`."""
 
     stream: TextIO | None = None
 
 
 @contextmanager
 def only_data_on_stdout() -> Iterator[None]:
-    """Send what libraries print to standard error, be it by Python or by C: standard output holds data alone."""
+    """Redirect the output of libraries, in Python or C, to stderr, so that stdout contains only data."""
     real = sys.stdout
-    if real is None:  # the process was started without one
+    if real is None:  # the process has no standard output
         yield
         return
     real.flush()
     saved, stream = -1, real
-    with suppress(
-        OSError, ValueError
-    ):  # a stream or a process without descriptors: what C prints is not seen there
+    with suppress(OSError, ValueError):  # without file descriptors, the output of C code cannot be redirected
         number, errors = real.fileno(), sys.stderr.fileno()
         saved = os.dup(1)
         if number == 1:
@@ -47,7 +45,7 @@ def only_data_on_stdout() -> Iterator[None]:
             yield
         stream.flush()
     except BrokenPipeError:
-        with suppress(OSError, ValueError):  # Python flushes it once more at its end
+        with suppress(OSError, ValueError):  # Python flushes the stream again at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
         raise
     finally:
@@ -60,57 +58,57 @@ def only_data_on_stdout() -> Iterator[None]:
 
 
 def complain(message: str) -> None:
-    """Print a message for the person at the terminal."""
+    """Print a message to stderr."""
     print(printable(f"hybridsim: {message}"), file=sys.stderr, flush=True)
 
 
 def say(text: str = "") -> None:
-    """Print data for people: what a model's titles, units and names hold does not steer the terminal."""
+    """Print data for people; control characters of titles, units and names are removed."""
     print(printable(text), file=_Data.stream)
 
 
 def print_json(value: Any) -> None:
-    """Print one JSON document; numbers that JSON does not have (nan, inf) become null."""
+    """Print one JSON document; nan and inf become null."""
     print(json_text(value), file=_Data.stream)
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print rows under a header, columns aligned to the left."""
+    """Print rows under a header, with columns aligned to the left."""
     for line in aligned([header, *rows]):
         say(line)
 
 
 def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:
-    """Refuse a file that cannot be written before the work is done, not after it."""
+    """Reject, before the work starts, a file that cannot be written."""
     if suffixes and path.suffix.lower() not in suffixes:
-        found = f"the ending {path.suffix!r}" if path.suffix else "no ending"
-        raise UsageError(f"{option}: {path} has {found}", remedy=f"use one of {' '.join(suffixes)}")
+        fault = f"unsupported file type '{path.suffix}'" if path.suffix else f"'{path}' has no file type"
+        raise UsageError(f"{option}: {fault}", remedy=f"use {' or '.join(suffixes)}")
     try:
         is_folder = path.is_dir()
-    except OSError as fault:  # a name that no file can have
-        raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="name another file") from None
+    except OSError as error:  # an invalid file name
+        raise UsageError(f"{option}: {path}: {error.strerror}", remedy="use another file name") from None
     if is_folder:
-        raise UsageError(
-            f"{option}: {path} is a folder", remedy=f"name a file in it, such as {path / 'result'}"
-        )
+        raise UsageError(f"{option}: {path} is a folder", remedy=f"name a file, such as {path / 'result'}")
     folder = path.parent
     if not folder.is_dir():
-        raise UsageError(f"{option}: there is no folder {folder}", remedy="create it first, or name another")
+        raise UsageError(
+            f"{option}: the folder {folder} does not exist", remedy="create it first, or use another folder"
+        )
     if not (os.access(path, os.W_OK) if path.exists() else _takes_files(folder)):
         raise UsageError(
-            f"{option}: {path} may not be written", remedy="choose a place that you may write to"
+            f"{option}: no permission to write {path}", remedy="use a folder that you can write to"
         )
 
 
 def require_apart(path: Path, option: str, others: Mapping[str, Path]) -> None:
-    """Refuse to write over a file that the command reads, or that another of its options writes."""
+    """Reject an output file that the command reads, or that another option writes."""
     for what, other in others.items():
         if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
-            raise UsageError(f"{option}: {path} is {what}", remedy="name another file")
+            raise UsageError(f"{option}: {path} is also {what}", remedy="use another file name")
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether files can be made in a folder; some say that they may be written, and are not."""
+    """Return whether files can be created in a folder; access rights alone are not reliable."""
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=TRIAL):
             return True
@@ -119,16 +117,16 @@ def _takes_files(folder: Path) -> bool:
 
 
 def require_folder(path: Path, option: str) -> None:
-    """Refuse a folder for results that does not exist and cannot be made."""
+    """Reject a results folder that neither exists nor can be created."""
     nearest = path
     try:
         while not nearest.exists() and nearest != nearest.parent:
             nearest = nearest.parent
-    except OSError as fault:  # a name that no file can have
-        raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="name a folder") from None
+    except OSError as fault:  # an invalid folder name
+        raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="use another folder") from None
     if not nearest.is_dir():
-        raise UsageError(f"{option}: {nearest} is a file", remedy="name a folder")
+        raise UsageError(f"{option}: {nearest} is a file", remedy="use the name of a folder")
     if not _takes_files(nearest):
         raise UsageError(
-            f"{option}: {nearest} may not be written", remedy="choose a place that you may write to"
+            f"{option}: no permission to write to {nearest}", remedy="use a folder that you can write to"
         )

@@ -1,4 +1,4 @@
-"""An argparse parser whose complaints are `UsageError`s that name the nearest known option or command."""
+"""An argparse parser that raises `UsageError` and suggests the nearest option or command."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hybridsim.errors import UsageError, nearest
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser that raises instead of exiting, and accepts no abbreviated options."""
+    """Argument parser that raises instead of exiting, and accepts no abbreviated options."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse, and refuse here what this parser does not know: it has the names that are nearest."""
+        """Parse the line, and report unknown options here, where the similar names are known."""
         line = sys.argv[1:] if args is None else list(args)
         known, unknown = super().parse_known_args(_join_negative_values(line), namespace)
         if unknown:
@@ -28,17 +28,17 @@ class Parser(argparse.ArgumentParser):
     def _refuse(self, unknown: Sequence[str]) -> NoReturn:
         first = unknown[0]
         if not first.startswith("-"):
-            self.error(f"unexpected argument {first!r}")
+            self.error(f"Unexpected argument {first!r}")
         options = re.findall(r"(?<![\w-])--?[a-z][a-z0-9-]*", self.format_help())
-        self.error(f"unknown option {first!r}", nearest(first.split("=")[0], options, kind="options"))
+        self.error(f"Unknown option {first!r}", nearest(first.split("=")[0], options, kind="options"))
 
     def error(self, message: str, remedy: str | None = None) -> NoReturn:
-        """Raise a `UsageError` with the remedy, or with where to read about the command."""
+        """Raise a `UsageError` with the remedy, by default a pointer to the help of the command."""
         raise UsageError(message, remedy=remedy or f"see: {self.prog} --help")
 
 
 def _join_negative_values(line: Sequence[str]) -> list[str]:
-    """Write `--t-end -5T` as `--t-end=-5T`, which argparse does not take for an option named `-5T`."""
+    """Write `--t-end -5T` as `--t-end=-5T`, because argparse would read `-5T` as an option."""
     joined: list[str] = []
     for word in line:
         if re.match(r"-\.?\d", word) and joined and re.fullmatch(r"--[a-z][a-z0-9-]*", joined[-1]):

@@ -1,4 +1,4 @@
-"""A line that shows how far long work has come: on a terminal only, and gone when the work is done."""
+"""A progress line on a terminal, which is erased when the work is finished."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Self
 
 from hybridsim.cli.session import Session
 
-_WAIT = 1.0  # seconds; what is done sooner needs no progress
-_WIDTH = 79  # a line that wraps cannot be taken back
-_PAUSE = 0.1  # seconds between updates, so that showing costs nothing
+_WAIT = 1.0  # seconds before the first display; shorter work shows no progress
+_WIDTH = 79  # characters; a wrapped line could not be erased
+_PAUSE = 0.1  # seconds between updates
 
 
 class Progress:
-    """Callable with the finished fraction and what comes next; silent where stderr is no terminal."""
+    """Show the finished fraction and the current item; print nothing if stderr is not a terminal."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -31,7 +31,7 @@ class Progress:
             self._next = time.monotonic() + _PAUSE
 
     def of_steps(self, done: int, total: int, what: str) -> None:
-        """The same, from a count of steps."""
+        """Show progress as a number of finished steps out of a total."""
         self(done / total, what)
 
     def __enter__(self) -> Self:

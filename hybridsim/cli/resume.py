@@ -1,4 +1,4 @@
-"""`hybridsim resume FILE`: go on with a run that stopped early, or further than it was asked for."""
+"""`hybridsim resume FILE`: continue a saved run to its end time or to a later one."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "resume",
-        help="go on with a run from a file",
-        description="Go on with a run that 'hybridsim run --save' or sol.save() has written, from its last event; the "
-        "result is that of a run that never stopped.",
+        help="continue a saved run",
+        description="Continue a run that 'hybridsim run --save' or sol.save() wrote to a file. The result equals that "
+        "of a run that never stopped.",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("solution", metavar="FILE", type=Path, help="what was saved (.hsol)")
+    parser.add_argument("solution", metavar="FILE", type=Path, help="file of the saved run (.hsol)")
     parser.add_argument(
-        "--t-end", metavar="TIME", help="where to end (default: where the run should have ended)"
+        "--t-end", metavar="TIME", help="new end time (default: the end time of the saved run)"
     )
     outcome.add_arguments(parser)
     parser.set_defaults(
-        execute=execute, lighter="a shorter --t-end; --limit megabytes=1000 stops with what there is"
+        execute=execute, lighter="a shorter --t-end, or --limit megabytes=1000 to stop with a partial result"
     )
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Load, go on, print the summary, write the files; 1 where the simulation did not succeed."""
+    """Load the run, continue it, and write the output; the exit code is 1 if the simulation failed."""
     outcome.check_arguments(args)
 
     import hybridsim

@@ -1,4 +1,4 @@
-"""`hybridsim run MODEL`: simulate a model, say how it went, and write what was asked for."""
+"""`hybridsim run MODEL`: simulate a model, print a summary and write the requested files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "run",
         help="simulate a model",
-        description="Simulate a model, say how it went, and write what was asked for.",
+        description="Simulate a model, print a summary, and write the requested files.",
         epilog=_EXAMPLES,
     )
     values.add_model_arguments(parser)
@@ -51,20 +51,19 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--keep",
         metavar="WHAT",
-        help="what is kept; the run stays the same. all: everything (the default). events: no states between the "
-        "events (memory grows with them). last-period, or a number: the end of the run alone, so many units of t. "
-        "nothing: the state at the end. --plot, --csv and --npz are refused with events and nothing, --explain with "
-        "all but all",
+        help="parts of the run to store, without any effect on the run itself. all (default): everything. events: the "
+        "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
+        "nothing: only the final state. --plot, --csv and --npz need all, last-period or a number; --explain needs all",
     )
     outcome.add_arguments(parser)
     parser.set_defaults(
         execute=execute,
-        lighter="a shorter --t-end or a looser --rtol; --limit megabytes=1000 stops with what there is",
+        lighter="a shorter --t-end or a looser --rtol, or --limit megabytes=1000 to stop with a partial result",
     )
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Simulate, print the summary, write the files; 1 where the simulation did not succeed."""
+    """Simulate the model and write the output; the exit code is 1 if the simulation failed."""
     outcome.check_arguments(args)
     settings = _settings(args)
     model = values.changed_model(args)
@@ -74,7 +73,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     from hybridsim.model.hygiene import forces_of, jumps_of
 
     cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model))]
-    for caution in cautions:  # now, and not after a run that may crawl
+    for caution in cautions:  # before the run, which may be very slow
         complain(f"warning: {caution}")
     with Progress(session) as progress, session.stopping_gently():
         solution = outcome.as_far_as_it_came(
@@ -91,7 +90,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
-    """Keywords for `simulate`; what was not given is left to its defaults."""
+    """Return the keyword arguments for `simulate`; omitted options keep their defaults."""
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }
@@ -99,24 +98,24 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
         settings["save"] = _kept(args)
     for name, text in args.option:
         if name in settings:
-            raise UsageError(f"--option {name} is given twice", remedy="give one value")
+            raise UsageError(f"--option {name} occurs twice", remedy=f"set {name} once")
         settings[name] = values.option_value(text)
     return settings
 
 
 def _kept(args: argparse.Namespace) -> str | float:
-    """What is kept of the run; what cannot be written of so little is refused before the run."""
+    """Return the value of `save` for the run, and reject outputs that it cannot serve."""
     if args.keep in ("events", "nothing"):
         for option in ("plot", "csv", "npz"):
             if getattr(args, option):
                 raise UsageError(
-                    f"--{option} with --keep {args.keep}: no states are kept but those at the end",
-                    remedy="keep last-period, or the last so much time",
+                    f"--{option} needs the states over time, which --keep {args.keep} does not store",
+                    remedy="use --keep all, --keep last-period or --keep TIME",
                 )
     if args.keep != "all" and args.explain:
         raise UsageError(
-            f"--explain with --keep {args.keep}: events are explained from a whole run",
-            remedy="leave --keep out",
+            f"--explain needs the whole run, but --keep is {args.keep}",
+            remedy="remove --keep",
         )
     if args.keep in ("all", "events", "last-period", "nothing"):
         return str(args.keep)
@@ -124,6 +123,6 @@ def _kept(args: argparse.Namespace) -> str | float:
         return values.positive(args.keep)
     except argparse.ArgumentTypeError:
         raise UsageError(
-            f"--keep {args.keep}",
-            remedy="give all, events, last-period, nothing, or a length of time above zero",
+            f"--keep: unknown value '{args.keep}'",
+            remedy="use all, events, last-period, nothing, or a length of time above zero",
         ) from None

@@ -1,4 +1,4 @@
-"""One run of the program: which files it has written, and whether it has been asked to stop."""
+"""State of one run of the program: the files written so far, and requests to stop."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from typing import Any
 
 from hybridsim.cli.output import complain
 
-_SOON = 0.05  # seconds until an interruption that was lost is repeated
+_SOON = 0.05  # seconds until a lost interruption is repeated
 
 
 class Session:
-    """What a command has to know about the program that runs it."""
+    """Keep the state that a command shares with the program that runs it."""
 
     def __init__(self) -> None:
         self.written: list[Path] = []
@@ -27,20 +27,17 @@ class Session:
         self._gently = False
 
     def wrote(self, path: Path) -> None:
-        """Record a finished file and say so."""
+        """Record a finished file and report it."""
         self.written.append(path)
         complain(f"wrote {path}")
 
     def kept(self) -> str:
-        """What there is after an interruption, in words."""
+        """Describe in words the files written before an interruption."""
         return "kept " + ", ".join(map(str, self.written)) if self.written else "nothing was written"
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Take notice of Ctrl-C and of being asked to end, unless whoever started the program had that ignored.
-
-        As a shell has Ctrl-C for `&`.
-        """
+        """Handle Ctrl-C and SIGTERM, unless the parent process set them to be ignored (as a shell does for `&`)."""
         usual: dict[signal.Signals, Any] = {
             signal.SIGINT: signal.default_int_handler,
             signal.SIGTERM: signal.SIG_DFL,
@@ -58,7 +55,7 @@ class Session:
                 _thread.interrupt_main(signal.Signals(self.interrupted_code - 128))
 
         def raise_again(lost: sys.UnraisableHookArgs) -> None:
-            # What is raised where the compiler calls back goes no further, so it is raised once more after that.
+            # Python discards an exception raised inside a callback of the compiler, so raise it again later
             if isinstance(lost.exc_value, KeyboardInterrupt) and ours and not over.is_set():
                 again = threading.Timer(_SOON, repeat)
                 again.daemon = True
@@ -77,10 +74,10 @@ class Session:
 
     @contextmanager
     def stopping_gently(self) -> Iterator[None]:
-        """Where Ctrl-C waits for `stop_if_asked`, so that it hits no compiled code and no result is lost.
+        """Delay Ctrl-C until `stop_if_asked`, so that it never interrupts compiled code.
 
-        An exception that is raised in the middle of a compiled call or of the compiler comes out as an error of
-        these. A second Ctrl-C does not wait.
+        An exception raised inside a compiled call or inside the compiler would surface as an unrelated error. A second
+        Ctrl-C interrupts immediately.
         """
         self._gently = True
         try:
@@ -89,7 +86,7 @@ class Session:
             self._gently = False
 
     def stop_if_asked(self) -> None:
-        """Raise KeyboardInterrupt if a signal is waiting, or was taken by somebody for an error of another kind."""
+        """Raise KeyboardInterrupt if a signal is pending or was swallowed as another exception."""
         if self.interrupted:
             raise KeyboardInterrupt
 
@@ -97,6 +94,6 @@ class Session:
         first, self.interrupted = not self.interrupted, True
         self.interrupted_code = 128 + number
         if first and self._gently:
-            complain("stopping at the next step; Ctrl-C once more stops at once")
+            complain("stopping at the next step; press Ctrl-C again to stop immediately")
         else:
             raise KeyboardInterrupt

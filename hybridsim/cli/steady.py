@@ -1,4 +1,4 @@
-"""`hybridsim steady MODEL`: the motion that a model settles on, measured over one period."""
+"""`hybridsim steady MODEL`: find the steady motion of a model and measure one period of it."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "steady",
-        help="find the motion that a model settles on, and measure it",
-        description="Find the motion that a model settles on (a forced vibration, a limit cycle, rest) and print its "
-        "period, amplitudes, energies, time in stick and Floquet multipliers.",
+        help="find the steady motion of a model and measure it",
+        description="Find the steady motion of a model (forced vibration, limit cycle or rest) and print its period, "
+        "amplitudes, energies, stick fractions and Floquet multipliers.",
         epilog=_EXAMPLES,
     )
     values.add_model_arguments(parser)
@@ -39,20 +39,27 @@ def add_to(commands: Any) -> None:
         metavar="TOL",
         type=values.positive,
         default=1e-10,
-        help="how closely the motion repeats, relative to the size of each state (default: 1e-10)",
+        help="largest difference after one period, relative to the size of each state (default: 1e-10)",
     )
     parser.add_argument(
-        "--period", metavar="TIME", type=values.positive, help="of the forcing, where the model does not say"
+        "--period",
+        metavar="TIME",
+        type=values.positive,
+        help="forcing period, if it cannot be determined from the model",
     )
     parser.add_argument(
         "--max-periods",
         metavar="N",
         type=values.count,
         default=4096,
-        help="periods after which the motion is judged as it is (default: 4096)",
+        help="give up after N periods and classify the motion (default: 4096)",
     )
     parser.add_argument(
-        "--harmonics", metavar="N", type=values.count, default=5, help="how many to print (default: 5)"
+        "--harmonics",
+        metavar="N",
+        type=values.count,
+        default=5,
+        help="number of harmonics to print (default: 5)",
     )
     options.add_plot(parser, "one period")
     options.add_json(parser, "the result")
@@ -60,7 +67,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Find the motion and print what it is; 1 where it neither repeats nor rests."""
+    """Find the steady motion and print it; the exit code is 1 if no steady motion was found."""
     options.check_plot(args)
     model = values.changed_model(args)
 
@@ -76,7 +83,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             progress=progress,
         )
     record = found.to_dict(args.harmonics)
-    try:  # before anything is printed to a reader who may have gone
+    try:  # write files first: printing fails if the reader of the pipe has gone
         if args.plot:
             from hybridsim.plot import save, time_history
 
@@ -108,26 +115,26 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         work = f", work {record['dissipated'][name]:.6g}" if name in rubbing else ""
         lines.append(
             f"  {name:<12} {100.0 * share:.4g} % of the period in {found.held_mode(name)}, "
-            f"{record['stops_per_period'][name]:g} stops a period{work}"
+            f"{record['stops_per_period'][name]:g} stops per period{work}"
         )
     if record["multipliers"] is None:
-        lines.append(f"  stable       not known: {record['no_multipliers']}")
+        lines.append(f"  stable       unknown: {record['no_multipliers']}")
     else:
         sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
         lines.append(f"  stable       {'yes' if found.stable else 'no'}")
         lines.append(
-            f"  multipliers  |{sizes}|" if sizes else "  multipliers  none beside the one along the motion"
+            f"  multipliers  |{sizes}|" if sizes else "  multipliers  only the trivial one along the motion"
         )
     if found.grazing is not None:
         near = found.grazing
-        lines.append(f"  nearest      {near.guard} turns back at {near.relative:.3g} of its largest value")
+        lines.append(f"  near grazing {near.guard}: minimum is {near.relative:.3g} of its maximum")
     header: tuple[str, ...] = ("quantity", "amplitude", "min", "max", "mean", "energy")
     rows = [
         (name, *(f"{record[key][name]:.6g}" for key in ("amplitude", "minimum", "maximum", "mean", "energy")))
         for name in record["amplitude"]
     ]
     lines += ["", *aligned([header, *rows], indent="  ")]
-    lines += [f"  {name}: varies too fast, or jumps too often, to be read" for name in record["too_fast"]]
+    lines += [f"  {name}: varies too fast to be measured" for name in record["too_fast"]]
     count = len(next(iter(record["harmonics"].values()), [])) - 1
     if count > 0 and found.kind == "periodic":
         header = ("harmonic", *(str(k) for k in range(1, count + 1)))

@@ -1,4 +1,4 @@
-"""`hybridsim study NAME`: a published study done again, with a verdict on every claim, its pictures and a page."""
+"""`hybridsim study NAME`: reproduce a published study, with a verdict on every claim, pictures and a page."""
 
 from __future__ import annotations
 
@@ -25,23 +25,28 @@ def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "study",
-        help="do a published study again: its figures, and a verdict on each of its claims",
-        description="Do a published study again with the published method, hold every figure against the exact motion, "
-        "and judge every claim.",
-        epilog="The folder gets NAME.json (the verdicts), NAME.md (the page) and NAME-*.png (the pictures).",
+        help="reproduce a published study",
+        description="Reproduce a published study with the published method, compare every figure with the exact "
+        "motion, and test every claim.",
+        epilog="The folder receives NAME.json (verdicts), NAME.md (page) and NAME-*.png (pictures).",
     )
-    parser.add_argument("name", metavar="NAME", choices=STUDIES, help="which study: " + ", ".join(STUDIES))
-    parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: some minutes")
+    parser.add_argument("name", metavar="NAME", choices=STUDIES, help="study to run: " + ", ".join(STUDIES))
+    parser.add_argument(
+        "--quick", action="store_true", help="use coarser grids and shorter runs (a few minutes)"
+    )
     options.add_out(parser, "study-NAME")
     parser.add_argument(
-        "--images", metavar="FOLDER", type=Path, help="folder of the pictures (default: that of the results)"
+        "--images",
+        metavar="FOLDER",
+        type=Path,
+        help="folder for the pictures (default: the folder of the results)",
     )
     options.add_json(parser, "the verdicts")
     parser.set_defaults(execute=execute, lighter="--quick")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the study, print the verdicts and fill the folder."""
+    """Run the study, print the verdicts and write the results."""
     folder: Path = args.out or Path(f"study-{args.name}")
     images: Path = args.images or folder
     require_folder(folder, "--out")
@@ -82,5 +87,5 @@ def _write(study: Study, name: str, folder: Path, images: Path, session: Session
 
 
 def _link(title: str, name: str, folder: Path, images: Path) -> str:
-    """Path of a picture as the page in the folder has to write it."""
+    """Return the path of a picture relative to the folder of the page."""
     return Path(os.path.relpath(images / f"{name}-{title}.png", folder)).as_posix()

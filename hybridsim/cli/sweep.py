@@ -1,4 +1,4 @@
-"""`hybridsim sweep MODEL NAME=VALUES ...`: a measure over values of parameters, as data and as a picture."""
+"""`hybridsim sweep MODEL NAME=VALUES ...`: measure a model at many parameter values."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 _EXAMPLES = """\
-values: FROM:TO:COUNT, equal steps with both ends; FROM:TO:COUNT:log, equal ratios; or A,B,C. Each may be an expression
-of parameters; in a row A,B,C it is evaluated at every point.
+values: FROM:TO:COUNT (equal steps, ends included), FROM:TO:COUNT:log (equal ratios), or A,B,C. Each number may be an
+expression of parameters. In a list A,B,C the expressions are evaluated at every point.
 
 examples:
   hybridsim sweep dfcs F0=20:40:11 omega=400:900:26 --measure amplitude.x,stick_fraction.f
@@ -29,19 +29,19 @@ examples:
   hybridsim sweep dfcs F0=20:60:101 'omega=0.05*sqrt(k/m):2*sqrt(k/m):101' --measure amplitude.x --after 100
   hybridsim sweep belt v_belt=0.05:0.2:16 --measure final --t-end 50
 """
-_MOST_DRAWN = 2  # parameters of a picture
+_MOST_DRAWN = 2  # largest number of swept parameters in a picture
 
 
 def add_to(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "sweep",
-        help="measure a model at many values of its parameters",
-        description="Measure a model at many values of its parameters: the steady state, or the end of a run. A point "
-        "that fails leaves its status, and all the others.",
+        help="measure a model at many parameter values",
+        description="Measure the steady state, or the end of a run, at many parameter values. If one point fails, its "
+        "status is recorded and the other points still run.",
         epilog=_EXAMPLES
-        + "\nThe folder gets sweep.csv, sweep.json and sweep.png. Until then sweep.journal has what is done: the same "
-        "command goes on from there, after Ctrl-C or worse.",
+        + "\nThe folder receives sweep.csv, sweep.json and sweep.png. Finished points are recorded in sweep.journal: "
+        "after Ctrl-C or a crash the same command continues from there.",
     )
     values.add_model_arguments(parser)
     parser.add_argument(
@@ -49,49 +49,55 @@ def add_to(commands: Any) -> None:
         metavar="NAME=VALUES",
         nargs="+",
         type=values.assignment,
-        help="a parameter, or a state with its initial value, and what it is set to",
+        help="a parameter, or a state for its initial value, and the values to use",
     )
     parser.add_argument(
         "--measure",
         metavar="A,B",
         type=values.names,
         default=("steady",),
-        help="readings of the steady state: steady (the default) for the usual ones, or amplitude.x, energy.x, "
-        "harmonic.x.1, stick_fraction.f, period, kind, ...; final or final.x: states at --t-end",
+        help="quantities of the steady state: steady (default) for the usual ones, or amplitude.x, energy.x, "
+        "harmonic.x.1, stick_fraction.f, period, kind, ...; or the states at --t-end: final, final.x",
     )
     parser.add_argument(
-        "--list", action="store_true", help="take the k-th values of all together, not all combinations"
+        "--list",
+        action="store_true",
+        help="combine the k-th values of all parameters, instead of all combinations",
     )
-    parser.add_argument("--t-end", metavar="TIME", help="end of each run, for --measure final (as in run)")
+    parser.add_argument("--t-end", metavar="TIME", help="end time of each run, for --measure final")
     parser.add_argument(
         "--after",
         metavar="PERIODS",
         type=values.count,
-        help="readings of the period that ends so many periods of the forcing after the start, whether or not the "
-        "motion repeats by then: for maps of many points",
+        help="measure one period after this number of forcing periods, even if the motion is not yet periodic; "
+        "useful for maps of many points",
     )
     parser.add_argument(
-        "--warm-start", action="store_true", help="start from the neighbour on the first axis"
+        "--warm-start",
+        action="store_true",
+        help="start each run from the result of the previous point on the first axis",
     )
     options.add_integrator(parser)
-    options.add_rtol(parser, "that of the measure")
+    options.add_rtol(parser, "depends on the measure")
     options.add_workers(parser)
-    parser.add_argument("--over", metavar="NAME", help="draw lines over this parameter instead of maps")
+    parser.add_argument("--over", metavar="NAME", help="plot lines over this parameter instead of a map")
     options.add_out(parser, "sweep-MODEL")
     options.add_json(parser, "the data")
     parser.set_defaults(execute=execute, lighter="fewer values at a time, fewer --workers or a looser --rtol")
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Sweep, print the table and fill the folder; 1 where no point has a result."""
+    """Run the sweep, print the table and write the results; the exit code is 1 if every point failed."""
     model = values.changed_model(args)
     folder: Path = args.out or Path(f"sweep-{model.name}")
     require_folder(folder, "--out")
     axes = values_by_name(model, args.axes)
     if args.over is not None and args.over not in axes:
-        raise UsageError(f"--over {args.over}", remedy=f"name one of the parameters: {', '.join(axes)}")
+        raise UsageError(
+            f"--over: parameter '{args.over}' is not swept", remedy=f"swept parameters: {', '.join(axes)}"
+        )
     if len(axes) > _MOST_DRAWN and not args.list:
-        complain("more than two parameters: there will be no picture")
+        complain("no picture is drawn, because more than two parameters are swept")
     given: dict[str, Any] = {
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
@@ -99,17 +105,17 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         given["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
             raise UsageError(
-                "--after is for readings of a period", remedy="leave it out beside --measure final"
+                "--after cannot be combined with --measure final", remedy="remove --after or measure a period"
             )
     elif args.t_end is not None:
-        raise UsageError("--t-end is for --measure final", remedy="leave it out: steady states have no end")
+        raise UsageError("--t-end requires --measure final", remedy="remove --t-end or add --measure final")
 
     if args.after is not None:
         given["after"] = args.after
 
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
-    with held(folder, f"another sweep is writing to {folder}"):
+    with held(folder, f"Another sweep is writing to {folder}"):
         return _fill(args, session, model, axes, given, folder, is_new)
 
 
@@ -122,12 +128,12 @@ def _fill(
     folder: Path,
     is_new: bool,
 ) -> int:
-    """Sweep, and write what comes of it into a folder that no other sweep writes to."""
+    """Run the sweep and write its results to a folder that this process has locked."""
     import hybridsim
 
     journal = folder / "sweep.journal"
     if journal.exists():
-        complain(f"going on with {journal}")
+        complain(f"continuing from {journal}")
     try:
         with Progress(session) as progress, session.stopping_gently():
             result = hybridsim.sweep(
@@ -145,7 +151,7 @@ def _fill(
         if is_new and not any(folder.iterdir()):
             folder.rmdir()
         raise
-    try:  # before anything is printed to a reader who may have gone
+    try:  # write files first: printing fails if the reader of the pipe has gone
         _write(result, args.over, folder, session)
         if not result.interrupted:
             journal.unlink(missing_ok=True)
@@ -173,39 +179,41 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
     save(sweep(result, over=over), folder / "sweep.png")
     session.wrote(folder / "sweep.png")
     if left := not_drawn(result, arrays=not is_map(result, over)):
-        complain(f"not drawn, but in the tables: {', '.join(left)} (--measure chooses)")
+        complain(
+            f"In the tables but not in the picture: {', '.join(left)}. Choose quantities with --measure."
+        )
 
 
 def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> float:
-    """The end of all runs, which is refused where it depends on what is swept."""
+    """Return the common end time of all runs; reject one that depends on a swept parameter."""
     end = values.end_time(model, text)
     for name, row in axes.items():
         ends = {end}
         for value in row:
-            with suppress(HybridsimError):  # a value that no model takes fails at its own points
+            with suppress(HybridsimError):  # an invalid value is reported at its own points
                 ends.add(values.end_time(model.with_(**{name: value}), text))
         if len(ends) > 1:
             what = "the end of the runs" if text is None else f"--t-end {text}"
             raise UsageError(
-                f"{what} depends on {name}, which is swept, and all runs end at one time",
-                remedy="give --t-end as a number",
+                f"{what} depends on the swept parameter {name}, but all runs must end at the same time",
+                remedy="set --t-end to a number",
             )
     return end
 
 
 def values_by_name(model: Model, pairs: list[tuple[str, str]]) -> dict[str, list[Any]]:
-    """Values of parameters as they are written on a command line, FROM:TO:COUNT or A,B,C, by name."""
+    """Return the values of each parameter, written FROM:TO:COUNT or A,B,C on the command line."""
     axes: dict[str, list[Any]] = {}
     for name, text in pairs:
         if name in axes:
-            raise UsageError(f"{name} is given twice", remedy="give all its values at once")
+            raise UsageError(f"{name} is swept twice", remedy=f"write all values of {name} in one argument")
         with values.blaming_the_command_line():
             axes[name] = _row(model, name, text)
     return axes
 
 
 def _row(model: Model, name: str, text: str) -> list[Any]:
-    """Values of one parameter: a row of expressions, or equal steps."""
+    """Return the values of one parameter: a list of expressions, or a range."""
     if ":" not in text:
         from hybridsim.expr import parse
 
@@ -214,15 +222,21 @@ def _row(model: Model, name: str, text: str) -> list[Any]:
     is_log = len(parts) == 4 and parts[3] == "log"
     if not (len(parts) == 3 or is_log) or not parts[2].isdecimal() or not parts[2].strip("0"):
         raise UsageError(
-            f"{name}={text}", remedy="write FROM:TO:COUNT, FROM:TO:COUNT:log, or values with commas between"
+            f"Cannot read the values '{name}={text}'",
+            remedy="write FROM:TO:COUNT, FROM:TO:COUNT:log, or values separated by commas",
         )
     from hybridsim.analysis.sweep.axes import MOST_POINTS
 
     if len(parts[2]) > len(str(MOST_POINTS)) or int(parts[2]) > MOST_POINTS:
-        raise UsageError(f"{name}={text}", remedy=f"a sweep has {MOST_POINTS} points at most; sweep in parts")
+        raise UsageError(
+            f"'{name}={text}' has too many points",
+            remedy=f"use at most {MOST_POINTS} points, in several sweeps if necessary",
+        )
     low, high, count = number_of(model, name, parts[0]), number_of(model, name, parts[1]), int(parts[2])
     if is_log and not (low > 0 and high > 0):
-        raise UsageError(f"{name}={text}", remedy="equal ratios go between two numbers above zero")
+        raise UsageError(
+            f"'{name}={text}': a logarithmic range needs positive limits", remedy="use FROM and TO above zero"
+        )
     between = [k / (count - 1) for k in range(1, count - 1)]
     if is_log:
         inner = [math.exp((1 - part) * math.log(low) + part * math.log(high)) for part in between]
@@ -232,7 +246,7 @@ def _row(model: Model, name: str, text: str) -> list[Any]:
 
 
 def _parts(text: str) -> list[str]:
-    """What is between the commas that stand in no brackets."""
+    """Split a text at the commas outside parentheses."""
     parts, depth = [""], 0
     for character in text:
         depth += {"(": 1, ")": -1}.get(character, 0)
@@ -244,7 +258,7 @@ def _parts(text: str) -> list[str]:
 
 
 def number_of(model: Model, name: str, text: str) -> float:
-    """A number that is written as an expression of the model's parameters."""
+    """Return the value of an expression of the model's parameters."""
     from hybridsim.expr import evaluate, parse, require_names
 
     known = model.parameter_values()

@@ -1,4 +1,4 @@
-"""Values on the command line: models with changed parameters, spans in periods, options of an integrator."""
+"""Read values of the command line: models with changed parameters, time spans, integrator options."""
 
 from __future__ import annotations
 
@@ -17,83 +17,83 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 DEFAULT_PERIODS = 100
-COMPARED_PERIODS = 20  # a comparison runs dozens of times: a minute, not five
-DEFAULT_SECONDS = 10.0  # for a model without a period of its own: a few swings of a mechanism of about 1 Hz
+COMPARED_PERIODS = 20  # shorter, because a comparison runs the model dozens of times
+DEFAULT_SECONDS = 10.0  # for a model without a forcing period: about ten oscillations at 1 Hz
 
-_MOST_DIGITS = 15  # of a count: whole numbers that doubles hold
-MOST_WORKERS = 1024  # beyond the processors of a machine; each takes memory
+_MOST_DIGITS = 15  # digits of a count, which a double represents exactly
+MOST_WORKERS = 1024  # more than the processors of any machine; each worker needs memory
 _NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
 _PERIODS, _WITH_UNIT = re.compile(_NUMBER + r"T\s*"), re.compile(_NUMBER + r"[A-Za-z]+\s*")
 
 
 def assignment(text: str) -> tuple[str, str]:
-    """Split NAME=VALUE."""
+    """Split NAME=VALUE into name and value."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form NAME=VALUE")
+        raise argparse.ArgumentTypeError(f"cannot read {text!r}; write NAME=VALUE")
     return name.strip(), value.strip()
 
 
 def positive(text: str) -> float:
-    """A finite number above zero."""
+    """Read a finite number above zero."""
     try:
         value = float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
     if not (value > 0 and math.isfinite(value)):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above zero")
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number above zero")
     return value
 
 
 def positives(text: str) -> tuple[float, ...]:
-    """Numbers above zero, separated by commas."""
+    """Read numbers above zero, separated by commas."""
     return tuple(positive(part) for part in text.split(","))
 
 
 def folder(text: str) -> Path:
-    """The name of a folder, which "" is not: it would be the one that one is in."""
+    """Read the name of a folder; an empty name, which would mean the current folder, is rejected."""
     if not text.strip():
-        raise argparse.ArgumentTypeError("the name is empty: name a folder, '.' for this one")
+        raise argparse.ArgumentTypeError("the folder name is empty; use '.' for the current folder")
     return Path(text)
 
 
 def count(text: str) -> int:
-    """A whole number above zero."""
+    """Read a whole number above zero."""
     if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) == 0:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a whole number above zero, of {_MOST_DIGITS} digits at most"
+            f"{text!r} is not a whole number above zero with at most {_MOST_DIGITS} digits"
         )
     return int(text)
 
 
 def workers(text: str) -> int:
-    """A number of threads or processes."""
+    """Read the number of threads or processes."""
     number = count(text)
     if number > MOST_WORKERS:
-        raise argparse.ArgumentTypeError(f"{text} workers are more than {MOST_WORKERS}")
+        raise argparse.ArgumentTypeError(f"{text} is too large; use at most {MOST_WORKERS} workers")
     return number
 
 
 def counts(text: str) -> tuple[int, ...]:
-    """Whole numbers above zero, separated by commas."""
+    """Read whole numbers above zero, separated by commas."""
     return tuple(count(part.strip()) for part in text.split(","))
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Names, separated by commas."""
+    """Read names, separated by commas."""
     found = tuple(part.strip() for part in text.split(","))
     if not all(found):
-        raise argparse.ArgumentTypeError(f"{text!r} holds an empty name")
+        raise argparse.ArgumentTypeError(f"{text!r} contains an empty name; write A,B")
     return found
 
 
 def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False) -> None:
-    """The arguments that say which model, with which parameters, from where and for how long."""
+    """Add the arguments that select a model, its parameters and its initial values."""
     parser.add_argument(
         "model",
         metavar="MODEL",
         nargs="?" if optional else None,
-        help="name of a model (see: hybridsim models) or a .toml file",
+        help="name of a model (see: hybridsim models) or path of a .toml file",
     )
     parser.add_argument(
         "-p",
@@ -102,7 +102,7 @@ def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False)
         type=assignment,
         action="append",
         default=[],
-        help="set a parameter; VALUE may be an expression of others, such as 'omega=0.6*sqrt(k/m)'",
+        help="set a parameter; VALUE may be an expression of other parameters, such as 'omega=0.6*sqrt(k/m)'",
     )
     parser.add_argument(
         "--x0",
@@ -115,18 +115,18 @@ def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False)
 
 
 def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PERIODS) -> None:
-    """The argument that says how long to run."""
+    """Add the option for the end time."""
     parser.add_argument(
         "--t-end",
         metavar="TIME",
-        help="end of the run: a time, an expression of the parameters, or '100T' for 100 periods of forcing "
-        f"(default: the model's own duration, else {periods}T; without a period the end of the longest table or chirp, "
-        f"else {DEFAULT_SECONDS:g})",
+        help="end of the run: a time, an expression of parameters, or '100T' for 100 forcing periods (default: the "
+        f"duration in the model file, otherwise {periods}T; without a forcing period the end of the longest table or "
+        f"chirp, otherwise {DEFAULT_SECONDS:g})",
     )
 
 
 def changed_model(args: argparse.Namespace) -> Model:
-    """The model that `args` names, with its parameters and initial values changed."""
+    """Return the selected model with changed parameters and initial values."""
     import hybridsim
 
     model: Model = hybridsim.load(args.model)
@@ -140,7 +140,7 @@ def changed_model(args: argparse.Namespace) -> Model:
 
 @contextmanager
 def blaming_the_command_line() -> Iterator[None]:
-    """Turn a bad expression into bad usage: the model was sound before the command line changed it."""
+    """Convert a model error into a usage error, because the model was valid before the change."""
     try:
         yield
     except ModelError as error:
@@ -153,16 +153,16 @@ def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Exp
     found: dict[str, Expression] = {}
     for name, text in pairs:
         if name in found:
-            raise UsageError(f"{option} {name} is given twice", remedy="give one value")
+            raise UsageError(f"{option} {name} occurs twice", remedy=f"set {name} once")
         found[name] = parse(text, Place(file=f"{option} {name}", text=text))
     return found
 
 
 def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERIODS) -> float:
-    """The end of the run in the model's unit of time.
+    """Return the end time of the run in the time unit of the model.
 
-    Raises `UsageError` where the text is no time, the time is not above zero, or periods are asked for and
-    the model has none.
+    Raises `UsageError` if the text cannot be read as a time, if the time is not above zero, or if it is a number of
+    periods and the model has no forcing period.
     """
     from hybridsim.engine.period import forcing_period
 
@@ -177,19 +177,19 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
         period = forcing_period(model)
         if period is None:
             raise UsageError(
-                f"--t-end {text}: {model.name} has no single forcing period",
-                remedy="give the time itself, such as --t-end 10",
+                f"--t-end {text}: model '{model.name}' has no forcing period",
+                remedy="use a time, such as --t-end 10",
             )
         value = float(periods[1]) * period
     else:
         value = _time(model, text)
     if not (value > 0 and math.isfinite(value)):
-        raise UsageError(f"--t-end {text} is {value:g}", remedy="give a finite time above zero")
+        raise UsageError(f"--t-end {text} equals {value:g}", remedy="use a finite time above zero")
     return value
 
 
 def _record_end(model: Model) -> float:
-    """When the longest table or chirp ends; 0 where there is none after that."""
+    """Return the time at which the longest table or chirp ends, or 0 if there is none."""
     from hybridsim.expr import evaluate
 
     values = model.parameter_values()
@@ -203,8 +203,8 @@ def _time(model: Model, text: str) -> float:
 
     if _WITH_UNIT.fullmatch(text):
         raise UsageError(
-            f"--t-end {text} ends in what is no unit here",
-            remedy="give a number in the model's unit of time, 20T for periods, or an expression of parameters",
+            f"--t-end: cannot read '{text}'",
+            remedy="use a number in the time unit of the model, 20T for 20 forcing periods, or an expression",
         )
     with blaming_the_command_line():
         values = model.parameter_values()
@@ -214,7 +214,7 @@ def _time(model: Model, text: str) -> float:
 
 
 def option_value(text: str) -> bool | int | float | str:
-    """The value of an integrator's option: a whole number, a number, true, false, or a word."""
+    """Read the value of an integrator option: an integer, a number, true, false or a word."""
     lowered = text.lower()
     if lowered in ("true", "false"):
         return lowered == "true"

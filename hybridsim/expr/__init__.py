@@ -1,4 +1,4 @@
-"""Text to checked expression: parsing by a whitelist, evaluation, substitution, conversion to SymPy."""
+"""Expressions: parsing with a whitelist, evaluation, substitution, conversion to SymPy."""
 
 from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function

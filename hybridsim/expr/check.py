@@ -1,4 +1,4 @@
-"""The whitelist: walks a syntax tree, refuses what is not an expression of ours, and collects the names."""
+"""The whitelist of expressions: check a syntax tree and collect its names."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KINDS = {
 
 
 class _Checker:
-    """One pass over one tree; `number` and `truth` say which kind of value a node must have."""
+    """A check of one tree; `number` and `truth` check that a node has the right kind of value."""
 
     def __init__(self, text: str, place: Place, columns: bool) -> None:
         self.text = text
@@ -38,30 +38,30 @@ class _Checker:
         return ExpressionError(message, place=self.place.at(self.text, column), remedy=remedy)
 
     def number(self, node: ast.expr) -> bool:
-        """Check a node whose value must be a number; returns whether it is constant."""
+        """Check a node whose value must be a number, and return whether it is constant."""
         constant, boolean = self.any(node)
         if boolean:
-            raise self.fail(
-                node, "a number is needed here, this is true or false", "write '1 if ... else 0'."
-            )
+            raise self.fail(node, "expected a number, but this is a condition", "write '1 if ... else 0'")
         return constant
 
     def truth(self, node: ast.expr) -> bool:
-        """Check a node whose value must be true or false; returns whether it is constant."""
+        """Check a node whose value must be true or false, and return whether it is constant."""
         constant, boolean = self.any(node)
         if not boolean:
-            raise self.fail(node, "a condition is needed here, this is a number", "compare it, e.g. 'x > 0'.")
+            raise self.fail(
+                node, "expected a condition, but this is a number", "write a comparison, such as 'x > 0'"
+            )
         return constant
 
     def every(self, check: Callable[[ast.expr], bool], nodes: Iterable[ast.expr]) -> bool:
-        """Check all nodes, not only up to the first that varies; returns whether all are constant."""
+        """Check all nodes, and return whether all are constant."""
         constant = True
         for node in nodes:
             constant = check(node) and constant
         return constant
 
     def any(self, node: ast.expr) -> tuple[bool, bool]:
-        """Check a node; returns (is constant, is boolean). A constant must have a finite real value."""
+        """Check a node and return (is constant, is boolean); a constant must have a finite real value."""
         constant, boolean = self.kind(node)
         if constant and not isinstance(node, ast.Constant):
             try:
@@ -70,7 +70,7 @@ class _Checker:
                 raise self.fail(
                     fault.node,
                     f"the constant has no finite real value: {fault.reason}",
-                    "correct the numbers.",
+                    "correct the numbers",
                 ) from None
         return constant, boolean
 
@@ -103,7 +103,7 @@ class _Checker:
         raise self.fail(
             node,
             f"{what} is not allowed in an expression",
-            "allowed are numbers, names, + - * / **, comparisons, and/or/not, 'a if c else b' and functions.",
+            "use numbers, names, + - * / **, comparisons, and/or/not, 'a if c else b' and functions",
         )
 
     def literal(self, node: ast.Constant) -> bool:
@@ -113,22 +113,24 @@ class _Checker:
         if isinstance(value, int):
             if value > MAX_INTEGER:
                 raise self.fail(
-                    node, "the whole number is too large to be exact", "write it as a decimal: 1e20."
+                    node, "the integer is too large for a double", "write it as a decimal, such as 1e20"
                 )
         elif not isinstance(value, float):
-            raise self.fail(node, f"{type(value).__name__} values are not allowed", "write a real number.")
+            raise self.fail(node, f"{type(value).__name__} values are not allowed", "write a real number")
         elif not math.isfinite(value):
-            raise self.fail(node, "the number is too large for a double", "give a number below 1.8e308.")
+            raise self.fail(node, "the number is too large for a double", "use a number below 1.8e308")
         return False
 
     def name(self, node: ast.expr, name: str) -> bool:
         if name in CONSTANTS:
             return True
         if name in FUNCTIONS:
-            raise self.fail(node, f"'{name}' is a function", f"call it: {name}(...).")
+            raise self.fail(node, f"'{name}' is a function", f"write its arguments, {name}(...)")
         if name.startswith("__"):
             raise self.fail(
-                node, f"the name '{name}' is not allowed", "names do not begin with two underscores."
+                node,
+                f"the name '{name}' is not allowed",
+                "use a name that does not start with two underscores",
             )
         self.names.add(name)
         return False
@@ -138,13 +140,13 @@ class _Checker:
             value = float(value_of(exponent, {}))
         except NoValue as fault:
             raise self.fail(
-                node, f"the exponent has no finite value: {fault.reason}", "correct it."
+                node, f"the exponent has no finite value: {fault.reason}", "correct the exponent"
             ) from None
         if abs(value) > MAX_POWER:
             raise self.fail(
                 exponent,
-                f"the exponent {value:g} is out of bounds, {MAX_POWER} is the largest",
-                "write large constants as decimals (1e-12), and fast decay as exp(...).",
+                f"the exponent {value:g} is too large; at most {MAX_POWER} is allowed",
+                "write large constants as decimals (1e-12), and fast decay as exp(...)",
             )
         if constant_base:
             self.underflow(node, base)
@@ -154,43 +156,51 @@ class _Checker:
             vanished = value_of(node, {}) == 0 and value_of(base, {}) != 0
         except NoValue as fault:
             raise self.fail(
-                fault.node, f"the constant has no finite real value: {fault.reason}", "correct it."
+                fault.node, f"the constant has no finite real value: {fault.reason}", "correct the numbers"
             ) from None
         if vanished:
-            raise self.fail(node, "the power is too small for a double", "write 0, or scale it.")
+            raise self.fail(node, "the power is too small for a double", "write 0, or change the scale")
 
     def conditional(self, test: ast.expr, body: ast.expr, orelse: ast.expr) -> tuple[bool, bool]:
         constant = self.truth(test)
         (first, boolean), (second, other) = self.any(body), self.any(orelse)
         if boolean != other:
             raise self.fail(
-                orelse, "one branch is a number, the other is true or false", "make both numbers."
+                orelse,
+                "one branch is a number and the other is a condition",
+                "write numbers in both branches",
             )
         return constant and first and second, boolean
 
     def call(self, node: ast.Call) -> bool:
         if not isinstance(node.func, ast.Name):
-            raise self.fail(node, "only the functions by their names can be called", _functions())
+            raise self.fail(node, "only functions can be called", _functions())
         name = node.func.id
         function = FUNCTIONS.get(name)
         if function is None:
             hint = nearest(name, FUNCTIONS, kind="functions")
-            if name == "v_rel":  # as results call it
-                hint = "write the velocity itself, as the contact has it, or give both a definition of it."
-            raise self.fail(node, f"'{name}' is no function of expressions", hint)
+            if name == "v_rel":  # a name of results
+                hint = (
+                    "v_rel exists only in results; write the velocity of the contact, or a definition of it"
+                )
+            raise self.fail(node, f"unknown function '{name}'", hint)
         if node.keywords:
-            raise self.fail(node, f"{name} takes no named arguments", f"{name} takes {function.arity}.")
+            raise self.fail(
+                node, f"{name}() has no keyword arguments", f"write {function.arity} without names"
+            )
         for argument in node.args:
             if isinstance(argument, ast.Starred):
-                raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments.")
+                raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments")
         count = len(node.args)
         if not function.least <= count <= function.most:
-            raise self.fail(node, f"{name} takes {function.arity}, {count} given", "correct the call.")
+            raise self.fail(
+                node, f"{name}() needs {function.arity}, but has {count}", "correct the arguments"
+            )
         return self.every(self.number, node.args)
 
 
 def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_nodes: int) -> None:
-    """Refuse a tree that is too deep or too large, before anything walks it; ``expr`` is what to show."""
+    """Reject a tree that is too deep or too large; ``expr`` is the text in the message."""
     level: list[ast.AST] = [tree]
     depth = nodes = 0
     while level:
@@ -198,9 +208,9 @@ def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_node
         if depth > max_depth or nodes > max_nodes:
             what = "nested too deeply" if depth > max_depth else "too large"
             raise ExpressionError(
-                f"the expression is {what} ({max_depth} levels and {max_nodes} parts are allowed)",
+                f"the expression is {what} (at most {max_depth} levels and {max_nodes} parts are allowed)",
                 place=place.at(expr),
-                remedy="name parts of it in [definitions], or group a long sum: (a + b + ...) + (c + ...).",
+                remedy="move parts of it to [definitions], or group a long sum: (a + b + ...) + (c + ...)",
             )
         level = [
             child
@@ -211,9 +221,9 @@ def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_node
 
 
 def check_tree(tree: ast.expr, text: str, place: Place, *, columns: bool = True) -> frozenset[str]:
-    """Refuse a tree that is not whitelisted; returns the names it depends on.
+    """Reject a tree that is not whitelisted, and return the names that it depends on.
 
-    ``columns`` says whether the nodes' columns are offsets into ``text`` (they are not after a substitution).
+    ``columns`` is False if the columns of the nodes are not offsets into ``text``, as after a substitution.
     """
     checker = _Checker(text, place, columns)
     checker.any(tree)
@@ -221,4 +231,4 @@ def check_tree(tree: ast.expr, text: str, place: Place, *, columns: bool = True)
 
 
 def _functions() -> str:
-    return "functions: " + ", ".join(FUNCTIONS) + "."
+    return "functions: " + ", ".join(FUNCTIONS)

@@ -1,4 +1,4 @@
-"""Values of expressions in double precision, and of parameters that are expressions of one another."""
+"""Evaluate expressions, and parameters that are expressions of each other, in double precision."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from hybridsim.expr.walk import NoValue, value_of
 
 
 def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
-    """Value of an expression; a condition gives 1.0 or 0.0.
+    """Return the value of an expression; a condition has the value 1.0 or 0.0.
 
     Raises
     ------
     ExpressionError
-        Naming the expression and the values it was given: an unknown name, division by zero, a
-        function outside its domain, overflow.
+        For an unknown name, a division by zero, a function outside its domain, or an overflow, with the expression and
+        the values of its names.
     """
     require_names(expr, values)
     try:
@@ -27,25 +27,25 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
         raise expr.error(
             f"'{expr.text}' has no finite real value: {fault.reason}",
             node=fault.node,
-            remedy=f"it was evaluated with {given}." if given else "correct the numbers.",
+            remedy=f"it was evaluated with {given}" if given else "correct the numbers",
         ) from None
 
 
 def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
-    """Values of expressions that may refer to one another, in the order given.
+    """Return the values of expressions that may refer to each other, in the given order.
 
     Raises
     ------
     ExpressionError
-        Naming the circle (``a -> b -> a``), an unknown name, or a value that is not finite.
+        For a cyclic definition (``a -> b -> a``), an unknown name, or a value that is not finite.
     """
     order = dependency_order(expressions, "parameters")
     values: dict[str, float] = {}
     for name in order:
         if TIME in expressions[name].names:
             raise expressions[name].error(
-                f"'{name}' depends on time",
-                remedy="a parameter is constant; a function of t is a definition or an input.",
+                f"parameter '{name}' depends on time",
+                remedy="declare a function of t as a definition or an input",
             )
         require_names(expressions[name], expressions)
         values[name] = evaluate(expressions[name], values)
@@ -53,12 +53,12 @@ def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
 
 
 def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[str]:
-    """The names in an order where each depends on earlier ones only; names that are no keys are known.
+    """Return the names in an order in which each depends only on earlier ones; other names are ignored.
 
     Raises
     ------
     ExpressionError
-        Naming the circle.
+        For a cyclic definition.
     """
     order: list[str] = []
     done: set[str] = set()
@@ -77,9 +77,9 @@ def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[s
             if name in path:
                 circle = " -> ".join([*path[path.index(name) :], name])
                 raise ExpressionError(
-                    f"a circle among {kind}: {circle}",
+                    f"cyclic dependency among {kind}: {circle}",
                     place=expressions[path[-1]].error("").place,
-                    remedy="give one of them a value of its own.",
+                    remedy="set one of them to an independent value",
                 )
             path.append(name)
             stack.append((name, True))

@@ -1,4 +1,4 @@
-"""A Python function where an expression may stand: carried along, never looked into."""
+"""Python functions in place of expressions."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from hybridsim.expr.parse import Expression
 
 @dataclass(frozen=True)
 class FunctionExpression(Expression):
-    """A function f(t, x, p) of a model whose rates are a Python function; two are equal when the functions are."""
+    """A function f(t, x, p) of a model with a Python flow; equal if the functions are equal."""
 
     function: Callable[..., Any]
 
 
 def of_function(function: Callable[..., Any], place: Place | None = None) -> FunctionExpression:
-    """Wrap a function; its name is its text."""
+    """Wrap a function as an expression; its text is the name of the function."""
     return FunctionExpression(function_name(function), frozenset(), place, ast.Constant(0.0), function)
 
 
 def function_name(function: Callable[..., Any]) -> str:
-    """What a function is called in messages."""
+    """Return the name of a function for messages."""
     return str(getattr(function, "__name__", None) or type(function).__name__)

@@ -1,4 +1,4 @@
-"""What an expression may contain: functions with their arity, constants, reserved names and bounds."""
+"""The grammar of expressions: functions, constants, reserved names and limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class Function:
-    """A function that expressions may call: its number of arguments and its value."""
+    """A function that expressions can call: its number of arguments and its value."""
 
     least: int
     most: int
@@ -19,13 +19,13 @@ class Function:
 
     @property
     def arity(self) -> str:
-        """How many arguments, for a message."""
+        """The number of arguments in words."""
         if self.most > self.least:
             return f"{self.least} to {self.most} arguments"
         return f"{self.least} argument" + ("s" if self.least > 1 else "")
 
 
-_MOST = 64  # arguments of min and max: each is a level of what they are taken apart into
+_MOST = 64  # largest number of arguments of min and max, which become nested calls with two arguments
 
 
 def _sign(x: float) -> float:
@@ -66,17 +66,17 @@ COMPARISONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
     {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 )
 
-# What a person writes is far shorter; what a hostile file holds is cut off before Python's parser sees it.
+# Largest number of characters and parts of an expression. It protects Python's parser against hostile files.
 MAX_LENGTH = 2_000
-# The tree walks are recursive, up to five frames a level; a sum of n terms is n levels deep.
+# Largest depth of an expression. Tree walks are recursive; a sum of n terms has n levels.
 MAX_DEPTH = 80
-# Substitution (a law into a contact, a definition into another) may multiply what was written.
+# Limits after substitutions (a law into a contact, a definition into another), which enlarge expressions.
 MAX_DERIVED_DEPTH = 140
 MAX_DERIVED_NODES = 20_000
-# x**64 spans the doubles already for x in [1e-5, 1e5]; larger constant powers are slips or bombs.
+# Largest constant exponent. x**64 covers the range of doubles for x in [1e-5, 1e5].
 MAX_POWER = 64
-# Whole values of a parameter for which a power with it as exponent is a product, and has a value at 0 and below. Three
-# products, as the dearest needs, cost as much as exp(p log u) does, which is there for all other values.
+# Integer values of an exponent parameter for which the power is computed by products, and is defined for bases <= 0.
+# Up to three products cost as much as exp(p log u), which all other values use.
 WHOLE_POWERS = range(-2, 5)
-# Whole numbers above this are not exact as doubles.
+# Integers above this limit are not exact as doubles.
 MAX_INTEGER = 2**53

@@ -1,9 +1,8 @@
-"""Hyperbolic functions of what is real: SymPy's own expand their argument to find out whether it is.
+"""Hyperbolic functions of real arguments, which avoid a slow expansion in SymPy.
 
-A name has a real value, and so has each operation of an expression wherever it has one at all. SymPy does not know that
-of a root or an arc sine, whose argument may be beyond its domain, and whether tanh of one is real it asks its real and
-its imaginary part, after products of sums are expanded and roots of them are taken apart: for minutes, in every step of
-a differentiation.
+All names and operations of expressions are real where they are defined. SymPy cannot infer this for roots or arc sines,
+whose arguments may be outside the domain. To decide whether tanh of such a term is real, SymPy expands the term into
+real and imaginary parts, which takes minutes in every step of a differentiation.
 """
 
 from __future__ import annotations
@@ -14,38 +13,38 @@ import sympy
 from sympy.core.function import ArgumentIndexError
 
 
-class sinh(sympy.sinh):  # named as what SymPy's printers know
-    """sinh(u) of a real u."""
+class sinh(sympy.sinh):  # SymPy's printers use the name of the class
+    """The hyperbolic sine of a real argument."""
 
     is_real = True
 
     def fdiff(self, argindex: int = 1) -> Any:
-        """cosh(u)."""
+        """Return the derivative cosh(u)."""
         return cosh(_only(self, argindex))
 
 
 class cosh(sympy.cosh):
-    """cosh(u) of a real u."""
+    """The hyperbolic cosine of a real argument."""
 
     is_positive = True
 
     def fdiff(self, argindex: int = 1) -> Any:
-        """sinh(u)."""
+        """Return the derivative sinh(u)."""
         return sinh(_only(self, argindex))
 
 
 class tanh(sympy.tanh):
-    """tanh(u) of a real u."""
+    """The hyperbolic tangent of a real argument."""
 
     is_real = True
 
     def fdiff(self, argindex: int = 1) -> Any:
-        """1 - tanh(u)**2."""
+        """Return the derivative 1 - tanh(u)**2."""
         return 1 - tanh(_only(self, argindex)) ** 2
 
 
 def _only(function: Any, argindex: int) -> Any:
-    """The argument by which a function is differentiated: it has one."""
+    """Return the only argument of a function, for its derivative."""
     if argindex != 1:
         raise ArgumentIndexError(function, argindex)
     return function.args[0]

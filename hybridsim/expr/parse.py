@@ -1,4 +1,4 @@
-"""Text to a checked expression tree: a whitelist over Python's syntax, never `eval`."""
+"""Parse text to a checked expression tree, with a whitelist of Python's syntax and without `eval`."""
 
 from __future__ import annotations
 
@@ -26,38 +26,40 @@ from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
-# a number and a word behind it
+# a number followed by a word
 _WITH_UNIT, _JOINED = re.compile(_NUMBER + r"\s+[A-Za-z]"), re.compile(_NUMBER + "[A-Za-z]")
-_WITHOUT_UNIT = "write the number alone: a unit stands in the field 'unit', and nothing is converted."
-_PRODUCT = "write the number alone, its unit in the field 'unit', or a product with '*', e.g. '2*x'."
-_AS_IN_PYTHON = "write it as in Python, e.g. 'a*sin(omega*t) - c*v'."
+_WITHOUT_UNIT = "write only the number; set the unit in the field 'unit' (units are not converted)"
+_PRODUCT = (
+    "write only the number and set its unit in the field 'unit', or write a product with '*', such as '2*x'"
+)
+_AS_IN_PYTHON = "use the syntax of Python, such as 'a*sin(omega*t) - c*v'"
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
 _ADVICE = {
-    "^": "write a power as **.",
-    "&": "write 'and'.",
-    "|": "write 'or'.",
-    "~": "write 'not'.",
-    "%": "the remainder is not available; a periodic signal is an input of kind 'wave'.",
-    "[": "there are no lists or subscripts in expressions.",
-    "{": "there are no sets or tables in expressions.",
-    ":": "there are no slices, lambdas or assignments in expressions.",
-    ";": "an expression is a single one.",
-    "#": "comments belong outside the expression.",
-    "'": "there are no texts in expressions.",
-    '"': "there are no texts in expressions.",
+    "^": "write powers as **",
+    "&": "write 'and'",
+    "|": "write 'or'",
+    "~": "write 'not'",
+    "%": "the remainder is not available; declare a periodic signal as an input of kind 'wave'",
+    "[": "expressions cannot contain lists or subscripts",
+    "{": "expressions cannot contain sets or tables",
+    ":": "expressions cannot contain slices, lambdas or assignments",
+    ";": "write a single expression",
+    "#": "write comments outside the expression",
+    "'": "expressions cannot contain strings",
+    '"': "expressions cannot contain strings",
 }
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A checked expression; two are equal when their texts are.
+    """A checked expression; two expressions are equal if their texts are equal.
 
     Parameters
     ----------
-    text : as written, on one line.
-    names : the names it depends on (``t`` included, functions and ``pi`` not).
-    place : where it was written; the caret of an error is set within ``text``.
-    tree : the checked syntax tree. Only node kinds that `hybridsim.expr.check` lets through occur in it.
+    text : source text on one line.
+    names : the names that it depends on, including ``t``, without functions and ``pi``.
+    place : place of the declaration; errors add a caret within ``text``.
+    tree : the syntax tree, which contains only node types accepted by `hybridsim.expr.check`.
     """
 
     text: str
@@ -79,13 +81,13 @@ class Expression:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it depends on no name at all."""
+        """Whether the expression contains no names."""
         return not self.names
 
     def error(
         self, message: str, *, node: ast.expr | None = None, remedy: str | None = None
     ) -> ExpressionError:
-        """An error that points at this expression, or at a node of it."""
+        """Return an error that points at this expression, or at a node of it."""
         column = None if node is None else getattr(node, "col_offset", None)
         place = (self.place or Place()).at(self.text, column)
         return ExpressionError(message, place=place, remedy=remedy)
@@ -95,18 +97,19 @@ class Expression:
 
 
 def parse(text: str | float | bool | Expression, place: Place | None = None) -> Expression:
-    """Check a text against the whitelist and keep its tree.
+    """Parse a text, check it against the whitelist, and return the expression.
 
     Parameters
     ----------
-    text : an expression, or a number as TOML and Python give it.
+    text : an expression as string, or a number.
     place : file and line for messages.
 
     Raises
     ------
     ExpressionError
-        With a caret: a character, construct, function or number that is not allowed, wrong arity,
-        too long, too deep, a power out of bounds, or a constant part without a finite real value.
+        For a character, construct, function or number that is not allowed, a wrong number of arguments, an expression
+        that is too long or too deep, an exponent that is too large, or a constant part without a finite real value.
+        The error has a caret.
     """
     if isinstance(text, Expression):
         return text
@@ -125,7 +128,7 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
         column = None if column is None else min(max(column - 1, 0), len(text))
         reason = getattr(fault, "msg", None) or str(fault)
         raise ExpressionError(
-            f"not an expression: {reason}",
+            f"invalid expression: {reason}",
             place=where.at(text, column),
             remedy=_WITHOUT_UNIT
             if _WITH_UNIT.match(text)
@@ -137,13 +140,13 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
         raise ExpressionError(
             "the expression is nested too deeply",
             place=where.at(text),
-            remedy="name parts of it in [definitions].",
+            remedy="move parts of it to [definitions]",
         ) from None
     return Expression(text, names, place, tree)
 
 
 def _of_number(number: float, place: Place | None) -> Expression:
-    """The expression that the text of a number gives, without the way through the text."""
+    """Return the expression of a number, without parsing its text."""
     tree: ast.expr = ast.Constant(abs(number))
     if math.copysign(1.0, number) < 0.0:
         tree = ast.UnaryOp(ast.USub(), tree)
@@ -151,7 +154,7 @@ def _of_number(number: float, place: Place | None) -> Expression:
 
 
 def require_names(expr: Expression, known: Iterable[str]) -> None:
-    """See to it that every name of an expression is known; else an error with the nearest ones."""
+    """Raise an error with similar names if the expression contains an unknown name."""
     unknown = expr.names.difference(known)
     if not unknown:
         return
@@ -159,7 +162,7 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
     nodes = [n for n in ast.walk(expr.tree) if isinstance(n, ast.Name) and n.id in unknown]
     node = min(nodes, key=lambda n: n.col_offset)
     if node.id.lower() in ("nan", "inf", "infinity"):
-        raise expr.error(f"'{node.id}' is not finite", node=node, remedy="give a finite number.")
+        raise expr.error(f"'{node.id}' is not finite", node=node, remedy="use a finite number")
     remedy = nearest(node.id, allowed | set(FUNCTIONS) | set(CONSTANTS))
     if "did you mean" not in remedy:
         remedy = nearest(node.id, allowed)
@@ -167,10 +170,9 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
 
 
 def substitute(expr: Expression, values: Mapping[str, Expression | str | float]) -> Expression:
-    """Put expressions in the place of names, all at once, in the tree (no parentheses can be lost).
+    """Substitute expressions for names simultaneously in the tree, so no parentheses can be lost.
 
-    The result is checked like a text (its bounds are wider, since it was derived and not typed) and keeps the
-    place of ``expr``.
+    The result is checked like a parsed expression, with larger limits of its size, and keeps the place of ``expr``.
     """
     parts = {name: parse(value).tree for name, value in values.items() if name in expr.names}
     if not parts:
@@ -183,35 +185,36 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
         names = check_tree(tree, text, where, columns=False)
     except RecursionError:
         raise expr.error(
-            f"'{_short(expr.text)}' is nested too deeply once its names are put in", remedy="simplify it."
+            f"'{_short(expr.text)}' is nested too deeply after its definitions are inserted",
+            remedy="simplify the expression or its definitions",
         ) from None
     return Expression(text, names, expr.place, tree)
 
 
 def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
-    """A tree of checked parts as an expression; names may be the program's own, which begin with two underscores."""
+    """Return an expression of a checked tree; it may contain internal names with two underscores."""
     words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     return Expression(write(tree), frozenset(words - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
 
 
 def _check_text(text: str, where: Place) -> None:
-    """What can be refused before Python's parser is asked: emptiness, length, characters."""
+    """Reject a text that is empty, too long, or contains invalid characters."""
     if not text:
         raise ExpressionError(
-            "the expression is empty", place=where, remedy="write a number or an expression."
+            "the expression is empty", place=where, remedy="write a number or an expression"
         )
     if len(text) > MAX_LENGTH:
         raise ExpressionError(
-            f"the expression has {len(text)} characters, {MAX_LENGTH} are allowed",
+            f"the expression has {len(text)} characters, but at most {MAX_LENGTH} are allowed",
             place=where.at(_short(text)),
-            remedy="name parts of it in [definitions].",
+            remedy="move parts of it to [definitions]",
         )
     for column, character in enumerate(text):
         if not _ALLOWED.match(character):
             shown = character if character.isprintable() else f"U+{ord(character):04X}"
             printable = "".join(c if c.isprintable() else "?" for c in text)
             advice = _ADVICE.get(
-                character, "names are ASCII letters, digits and _ (Greek is spelled: omega)."
+                character, "use ASCII letters, digits and _ in names (omega for the Greek letter)"
             )
             raise ExpressionError(
                 f"the character '{shown}' is not allowed in an expression",
@@ -221,7 +224,7 @@ def _check_text(text: str, where: Place) -> None:
 
 
 def _as_text(given: object, where: Place) -> str:
-    """Numbers as Python writes them; whatever is neither number nor text is refused."""
+    """Return the text of a number or string, and reject other objects."""
     if isinstance(given, str):
         return given
     if isinstance(given, bool):
@@ -232,12 +235,12 @@ def _as_text(given: object, where: Place) -> str:
     if isinstance(given, Real):
         number = _double(given, where)
         if not math.isfinite(number):
-            raise ExpressionError(f"{number} is not finite", place=where, remedy="give a finite number.")
+            raise ExpressionError(f"{number} is not finite", place=where, remedy="use a finite number")
         return repr(number)
     raise ExpressionError(
-        f"{_short(repr(given))} is no expression",
+        f"{_short(repr(given))} is not an expression",
         place=where,
-        remedy='write a number, or an expression in quotes such as "sqrt(k/m)".',
+        remedy='write a number, or an expression in quotes such as "sqrt(k/m)"',
     )
 
 
@@ -246,7 +249,7 @@ def _double(value: SupportsFloat, where: Place) -> float:
         return float(value)
     except OverflowError:
         raise ExpressionError(
-            "the number is too large for a double", place=where, remedy="give a number below 1.8e308."
+            "the number is too large for a double", place=where, remedy="use a number below 1.8e308"
         ) from None
 
 

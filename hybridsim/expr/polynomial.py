@@ -1,4 +1,4 @@
-"""The polynomial that a checked tree is, over whatever is no sum, product or whole power in it: what equals what."""
+"""Expressions as polynomials with exact coefficients, to find out whether two expressions are equal."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from hybridsim.expr.grammar import FUNCTIONS
 from hybridsim.expr.write import write
 
 Monomial = tuple[tuple[str, int], ...]
-"""Factors with their powers, in order; () is the constant."""
+"""Factors with their powers, sorted; () stands for the constant."""
 Polynomial = Mapping[Monomial, Fraction]
-"""Monomials with their exact coefficients; none is zero."""
+"""Monomials with their exact, nonzero coefficients."""
 
-_MOST_TERMS = 200  # a longer sum counts as a thing of its own
-_HIGHEST = 8  # so does a higher power
+_MOST_TERMS = 200  # a product with more terms is not expanded and counts as one factor
+_HIGHEST = 8  # a higher power is not expanded either
 _DIVISOR = re.compile(r"1/\(1\*([A-Za-z_]\w*)\^1\)")
 _COMPARE = {
     ast.Lt: lambda d: d < 0,
@@ -28,10 +28,9 @@ _COMPARE = {
 
 
 def polynomial(node: ast.expr) -> Polynomial:
-    """The polynomial of a tree; equal polynomials mean equal values (not the other way round).
+    """Return the polynomial of a tree; equal polynomials imply equal values, but not the reverse.
 
-    Decimal numbers count with the exact value of their double. Functions and conditions of numbers that do not depend
-    on any name are worked out.
+    Decimal numbers have the exact value of their double. Functions and conditions of constants are evaluated.
     """
     match node:
         case ast.Constant(value=bool()):
@@ -62,24 +61,24 @@ def polynomial(node: ast.expr) -> Polynomial:
 
 
 def difference(left: ast.expr, right: ast.expr) -> Polynomial:
-    """The polynomial of left - right."""
+    """Return the polynomial of left - right."""
     return _sum(polynomial(left), scaled(polynomial(right), Fraction(-1)))
 
 
 def constant_of(p: Polynomial) -> Fraction | None:
-    """The value of a polynomial that is a number; None for any other."""
+    """Return the value of a constant polynomial, otherwise None."""
     if not p:
         return Fraction(0)
     return p[()] if set(p) == {()} else None
 
 
 def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
-    """A polynomial times a number."""
+    """Return a polynomial times a number."""
     return {m: c * factor for m, c in p.items()} if factor else {}
 
 
 def is_multiple(p: Polynomial, of: Polynomial) -> bool:
-    """Whether a polynomial is another one times a polynomial, by division; denominators that are names are cleared."""
+    """Return whether p is a polynomial multiple of another one, up to denominators that are names."""
     rest, divisor = _cleared(p), _cleared(of)
     if not divisor:
         return False
@@ -103,11 +102,11 @@ def is_multiple(p: Polynomial, of: Polynomial) -> bool:
 
 
 def _cleared(p: Polynomial) -> Polynomial:
-    """A polynomial times those names that it is divided by."""
+    """Return a polynomial multiplied by the names in its denominators."""
     divisors = {factor for monomial in p for factor, _ in monomial if _DIVISOR.fullmatch(factor)}
     for divisor in divisors:
         name = _DIVISOR.fullmatch(divisor)
-        assert name is not None  # as it was found by that
+        assert name is not None  # divisors match this pattern
         highest = max(dict(monomial).get(divisor, 0) for monomial in p)
         made: dict[Monomial, Fraction] = {}
         for monomial, coefficient in p.items():
@@ -121,7 +120,7 @@ def _cleared(p: Polynomial) -> Polynomial:
 
 
 def direction(p: Polynomial) -> tuple[frozenset[tuple[Monomial, Fraction]], int]:
-    """What all positive multiples of p and of -p have in common, and which of the two families p belongs to."""
+    """Return the normalised form that p shares with all its multiples, and the sign of p in it."""
     first = min((m for m in p if m), default=())
     lead = p[first]
     return frozenset(scaled(p, 1 / lead).items()), 1 if lead > 0 else -1
@@ -188,7 +187,7 @@ def _call(name: str, args: list[ast.expr], node: ast.expr) -> Polynomial:
 
 
 def tree_of(p: Polynomial) -> ast.expr:
-    """A tree of a polynomial over names."""
+    """Return the tree of a polynomial of names."""
     total: ast.expr | None = None
     for monomial, coefficient in sorted(p.items()):
         term = number_tree(coefficient)
@@ -200,12 +199,12 @@ def tree_of(p: Polynomial) -> ast.expr:
 
 
 def number_tree(value: Fraction) -> ast.expr:
-    """A fraction as a quotient of integers."""
+    """Return the tree of a fraction as a quotient of integers."""
     number: ast.expr = ast.Constant(abs(value.numerator))
     number = number if value >= 0 else ast.UnaryOp(ast.USub(), number)
     return number if value.denominator == 1 else ast.BinOp(number, ast.Div(), ast.Constant(value.denominator))
 
 
 def text_of(p: Polynomial) -> str:
-    """A text that is the same for equal polynomials."""
+    """Return a text that is the same for equal polynomials."""
     return " + ".join(f"{c}*" + "*".join(f"{f}^{n}" for f, n in m) for m, c in sorted(p.items())) or "0"

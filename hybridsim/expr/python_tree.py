@@ -1,4 +1,4 @@
-"""Python's own parser, one thread at a time and without its warnings."""
+"""Python's parser, used by one thread at a time and without warnings."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _lock = SharedLock()
 
 
 def python_tree(text: str, mode: str = "exec") -> Any:
-    """The syntax tree of a text, as `ast.parse` gives it; ``mode="eval"`` for an expression.
+    """Return the syntax tree of a text like `ast.parse`; ``mode="eval"`` parses an expression.
 
-    Before Python 3.12 the making of the tree counts its depth in a place that all threads share, and ends with a
-    SystemError where two of them are at it (CPython issue 106905). Filters of warnings belong to all threads, too.
+    Before Python 3.12 all threads share one counter of the depth, so that parsing in two threads can raise SystemError
+    (CPython issue 106905). Warning filters are shared by all threads, too.
     """
     with _lock, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # odd spellings such as `1if x else 2` are no news to a model's user
+        warnings.simplefilter("ignore")  # no warnings about spellings such as `1if x else 2`
         return ast.parse(text, mode=mode)

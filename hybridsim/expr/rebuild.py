@@ -1,4 +1,4 @@
-"""A copy of a checked tree in which each part has been exchanged for what a function makes of it."""
+"""Copies of syntax trees with changed parts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Change = Callable[[ast.expr], ast.expr]
 
 
 def rebuilt(node: ast.expr, change: Change) -> ast.expr:
-    """The node with its direct parts changed; a leaf is returned as it is, since nothing ever changes a tree."""
+    """Return a copy of the node with its direct parts changed; a leaf is returned unchanged."""
     match node:
         case ast.UnaryOp(op=op, operand=operand):
             return ast.UnaryOp(op, change(operand))
@@ -28,14 +28,14 @@ def rebuilt(node: ast.expr, change: Change) -> ast.expr:
 
 
 def with_names(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
-    """The tree with names exchanged, all at once."""
+    """Return the tree with names replaced simultaneously."""
     if isinstance(node, ast.Name):
         return parts.get(node.id, node)
     return rebuilt(node, lambda part: with_names(part, parts))
 
 
 def exchanged(node: ast.expr, old: ast.expr, new: ast.expr) -> ast.expr:
-    """The tree with all that reads as one part of it exchanged."""
+    """Return the tree with all occurrences of one part replaced."""
     text = ast.dump(old)
 
     def change(part: ast.expr) -> ast.expr:

@@ -1,4 +1,4 @@
-"""How far rounding may put the value of an expression off, by a walk over its tree."""
+"""Bounds of the rounding error of an expression's value."""
 
 from __future__ import annotations
 
@@ -16,30 +16,32 @@ from hybridsim.expr.walk import NoValue, value_of
 
 _UNIT = 2.0**-53  # unit roundoff of a double
 _EXACT = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
-_WIDER = 2.0**10  # arguments are moved by so much more than their errors, which doubles may not show
-_OF_FUNCTIONS = 2.0  # units of roundoff that the functions of the mathematics library are within
+_WIDER = (
+    2.0**10
+)  # factor on the errors of arguments for a finite difference, since the errors are near roundoff
+_OF_FUNCTIONS = 2.0  # error bound of the functions of the math library, in units of roundoff
 
 
 @lru_cache(maxsize=4096)
 def own_roundoff(number: float) -> float:
-    """How far a number may be from the one that was meant: half of its last place, as no double is 0.1.
+    """Return how far a number may be from the intended decimal number: half a unit in the last place.
 
-    Where its shortest decimal form is the double itself (3, 0.5), that was meant.
+    The error is zero if the shortest decimal form equals the double exactly (3, 0.5).
     """
     is_exact = not math.isfinite(number) or number.is_integer() or Decimal(repr(number)) == Decimal(number)
     return 0.0 if is_exact else 0.5 * math.ulp(number)
 
 
 def rounding_of(expr: Expression, values: Mapping[str, float], exact: Collection[str] = ()) -> float:
-    """Bound of the error of an expression's value: of its evaluation and of the numbers in it.
+    """Return a bound of the rounding error of an expression's value.
 
-    exact: names whose values have no error; any other number has its own roundoff.
+    `exact` lists names whose values have no error. All other numbers have the error of `own_roundoff`.
     """
     return _with_error(expr.tree, values, exact)[1]
 
 
 def has_rounded_number(expr: Expression) -> bool:
-    """Whether an expression has a number written in it that no double is."""
+    """Return whether an expression contains a decimal number that is not exact as a double."""
     numbers = [node.value for node in ast.walk(expr.tree) if isinstance(node, ast.Constant)]
     return any(isinstance(number, float) and own_roundoff(number) > 0.0 for number in numbers)
 
@@ -72,7 +74,7 @@ def _with_error(node: ast.expr, values: Mapping[str, float], exact: Collection[s
 
 
 def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:
-    """The error of a function's value: its own, and what the errors of its arguments make of it."""
+    """Return the error of a function's value: its own, and that from the errors of its arguments."""
     names = [f"a{k}" for k in range(len(arguments))]
     parts: list[ast.expr] = [ast.Name(name) for name in names]
     again = (
@@ -86,5 +88,5 @@ def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], v
         try:
             most = max(most, abs(float(value_of(again, dict(zip(names, moved, strict=True)))) - value))
         except NoValue:
-            continue  # the argument is at the border of the function's domain
+            continue  # the shifted argument is outside the domain of the function
     return most / _WIDER + _OF_FUNCTIONS * _UNIT * abs(value)

@@ -1,7 +1,7 @@
-"""Simplification that soon comes to an end: by identities where little is written, else as quotients of polynomials.
+"""Simplification of SymPy expressions with limited effort.
 
-Products of sums grow when they are written out, functions of sums when they are taken apart, and `sympy.simplify` does
-both: a formula of one line may take it minutes. Its size when written out says beforehand what is worth trying.
+`sympy.simplify` expands products of sums and functions of sums, which may take minutes for a formula of one line. The
+number of terms after expansion therefore decides which simplification is tried.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from typing import Any
 
 import sympy
 
-# Formulas of random sums, products, quotients and functions took sympy.simplify 1 s at most below the first bound, and
-# 10 s or more for some above it; as quotients of polynomials they took 0.25 s at most below the second.
+# For random formulas with at most _FEW_TERMS terms sympy.simplify took at most 1 s, and above this limit sometimes more
+# than 10 s. With at most _MANY_TERMS terms, quotients of polynomials took at most 0.25 s.
 _FEW_TERMS = 16
 _MANY_TERMS = 200
 
 
 def simplified(e: Any) -> Any:
-    """The same value, in a shorter form where one is soon found; zero where that is seen on the way.
+    """Return an equal expression in a shorter form if one is found quickly.
 
-    What functions and roots are of is simplified for itself, and then counts as one name.
+    Arguments of functions and roots are simplified separately and then treated as names.
     """
     names: dict[Any, Any] = {}
     plain = _named(e, names)
@@ -31,13 +31,14 @@ def simplified(e: Any) -> Any:
     else:
         found = sympy.factor(sympy.cancel(sympy.together(plain)))
     found = found.xreplace({name: part for part, name in names.items()})
-    return min(found, e, key=sympy.count_ops)  # written out it may be longer
+    return min(found, e, key=sympy.count_ops)  # the expanded form may be longer
 
 
 def written_out(e: Any) -> Any:
-    """The same value over one denominator, as the sum that it is.
+    """Return an equal expression over one denominator, expanded to a sum.
 
-    Exponentials count as names: exp(-t) would else be a quotient, and all beside it be multiplied by exp(t).
+    Exponentials are treated as names. Otherwise exp(-t) would become a quotient, and all other terms would be
+    multiplied by exp(t).
     """
     names = {part: sympy.Dummy(real=True) for part in e.atoms(sympy.exp)}
     found = sympy.expand(sympy.cancel(sympy.together(e.xreplace(names))))
@@ -45,14 +46,14 @@ def written_out(e: Any) -> Any:
 
 
 def is_short(e: Any) -> bool:
-    """Whether an expression stays so when it is written out, its functions' arguments with it."""
+    """Return whether an expression, including the arguments of its functions, stays short when expanded."""
     return all(
         terms_of(part) <= _MANY_TERMS for part in (e, *(a for f in e.atoms(sympy.Function) for a in f.args))
     )
 
 
 def terms_of(e: Any) -> int:
-    """How many terms a sum has, at most, when all products in it are written out."""
+    """Return an upper bound of the number of terms after expansion of all products."""
     if e.is_Add:
         return sum(map(terms_of, e.args))
     if e.is_Mul:
@@ -66,7 +67,7 @@ def terms_of(e: Any) -> int:
 
 
 def _named(e: Any, names: dict[Any, Any]) -> Any:
-    """An expression with names for what functions and roots are of, and for what is no sum, product or power."""
+    """Return an expression in which arguments and non-polynomial parts are replaced by names."""
     if e.is_Symbol or e.is_number:
         return e
     if e.is_Pow and not e.exp.is_Integer:

@@ -1,4 +1,4 @@
-"""The partial derivative of an expression, as an expression again."""
+"""The partial derivative of an expression, as an expression."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from hybridsim.expr.parse import Expression, parse
 
 
 def slope(expr: Expression, name: str) -> Expression:
-    """d(expr)/d(name) with everything else held.
+    """Return the partial derivative d(expr)/d(name).
 
     Raises
     ------
     ExpressionError
-        Where the derivative cannot be written with the functions that expressions have.
+        If the derivative cannot be written with the functions of expressions.
     """
     if name not in expr.names:
         return parse(0, expr.place)
@@ -30,7 +30,7 @@ def _printer() -> Any:
     from sympy.printing.pycode import PythonCodePrinter
 
     class Printer(PythonCodePrinter):
-        """The functions of expressions by their own names, numbers to the last digit."""
+        """A printer that uses the function names of expressions and prints all digits."""
 
         def __init__(self) -> None:
             super().__init__({"fully_qualified_modules": False, "standard": "python3"})

@@ -1,4 +1,4 @@
-"""A checked expression as a SymPy object."""
+"""Convert a checked expression to SymPy."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from hybridsim.expr.parse import Expression, require_names
 
 
 def _absolute(u: Any) -> Any:
-    """|u|; SymPy would split what may be complex to it, a root or a logarithm, into real and imaginary parts."""
+    """Return |u|, without SymPy's split of possibly complex terms into real and imaginary parts."""
     return sympy.Abs(u) if u.is_extended_real else sympy.Max(u, -u)
 
 
-class exp(sympy.exp):  # named as what SymPy's printers know
-    """exp(u) whose sum u stays whole: SymPy makes exp(2000)*exp(-1000*v) of exp(2000 - 1000*v), which is no double."""
+class exp(sympy.exp):  # SymPy's printers use the name of the class
+    """The exponential of a sum without SymPy's split into a product, whose factors may overflow."""
 
     def __new__(cls, arg: Any, **options: Any) -> Any:
-        """Simplified, but for sums."""
+        """Create the exponential; only arguments that are sums are not simplified."""
         return super().__new__(cls, arg, **(options | {"evaluate": False} if arg.is_Add else options))
 
     def as_base_exp(self) -> tuple[Any, Any]:
-        """Itself, so that a product merges it with its equals alone."""
+        """Return itself as base, so that a product merges it only with equal factors."""
         return self, sympy.Integer(1)
 
     def _eval_power(self, other: Any) -> Any:
@@ -62,37 +62,36 @@ _RELATIONS: dict[type[ast.cmpop], Any] = {
 
 
 def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
-    """SymPy form of an expression (an Expr, or a Boolean for a condition).
+    """Convert an expression to SymPy (an Expr, or a Boolean for a condition).
 
-    Whole numbers are exact, decimal numbers are the double itself with all its 53 bits; a conditional becomes
-    a Piecewise, abs/min/max/sign stay what they are.
+    Integers are exact, and decimal numbers have the 53 bits of their double. A conditional becomes a Piecewise;
+    abs, min, max and sign are kept.
 
     Parameters
     ----------
-    symbols : a SymPy object for every name of the expression, real symbols as a rule (``t`` among them if
-        used).
+    symbols : a SymPy object, usually a real symbol, for every name of the expression, including ``t``.
 
     Raises
     ------
     ExpressionError
-        For a name without a symbol, or a comparison of what is not real.
+        For a name without a symbol, or a comparison of complex values.
     """
     require_names(expr, symbols)
     try:
         return _convert(expr.tree, symbols)
     except (TypeError, ValueError, OverflowError) as fault:
         raise expr.error(
-            f"'{expr.text}' has no symbolic form: {fault}", remedy="write it otherwise."
+            f"'{expr.text}' has no symbolic form: {fault}", remedy="write the expression in another form"
         ) from None
 
 
 def derivative(e: Any, symbol: Any) -> Any:
-    """de/d(symbol) where it exists; at the corner of an absolute value, minimum or step the side of zero's right."""
+    """Return de/d(symbol); at a corner of abs, min or max it is the derivative from the right."""
     return without_distributions(sympy.diff(e, symbol))
 
 
 def without_distributions(e: Any) -> Any:
-    """An expression with what SymPy makes of the derivatives of corners and jumps as a step, or as zero."""
+    """Replace the delta and step functions in SymPy's derivatives of corners and jumps."""
     if not e.has(sympy.DiracDelta, sympy.Heaviside):
         return e
     plain = e.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
@@ -148,6 +147,6 @@ def _binary(op: ast.operator, left: Any, right: Any) -> Any:
     if right.is_Float and float(right).is_integer():
         right = sympy.Integer(int(right))  # x**2.0 differentiates like x**2
     if left.is_Rational and right.is_Rational and not (left.is_Integer and right.is_Integer and right >= 0):
-        # Exact powers of fractions can be made to grow without bound; a double cannot.
+        # exact powers of fractions could become arbitrarily long
         return sympy.Float(float(left) ** float(right), precision=53)
     return left**right

@@ -1,4 +1,4 @@
-"""The value of a checked tree in double precision: a plain walk, no code is made."""
+"""Evaluate a checked tree in double precision by a recursive walk."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 
 
 class NoValue(Exception):
-    """A node that has no finite real value, and why."""
+    """A node that has no finite real value, with the reason."""
 
     def __init__(self, node: ast.expr, reason: str) -> None:
         super().__init__(reason)
@@ -36,7 +36,7 @@ class NoValue(Exception):
 
 
 def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
-    """Value of a checked node; `NoValue` where it is no finite real number, KeyError without a name."""
+    """Return the value of a checked node, or raise `NoValue` (no finite real value) or KeyError."""
     match node:
         case ast.Constant(value=bool() as truth):
             return truth
@@ -64,7 +64,7 @@ def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
             return value_of(body if value_of(test, values) else orelse, values)
         case ast.Call(func=ast.Name(id=name), args=args):
             return _finite(node, FUNCTIONS[name].value, *(value_of(arg, values) for arg in args))
-    raise TypeError(f"an unchecked node reached the evaluation: {ast.dump(node)}")
+    raise TypeError(f"unchecked node in the evaluation: {ast.dump(node)}")
 
 
 def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -> float:

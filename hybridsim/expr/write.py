@@ -1,4 +1,4 @@
-"""A checked tree back to text, with as few parentheses as precedence needs."""
+"""Convert a checked tree to text with as few parentheses as precedence allows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 
 from hybridsim.expr.grammar import BINARY, COMPARISONS
 
-# Precedence as in Python, loosest first.
+# Levels of precedence as in Python, from low to high.
 _CONDITIONAL, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _UNARY, _POWER, _ATOM = range(10)
 _LEVEL: dict[type[ast.operator], int] = {
     ast.Add: _SUM,
@@ -18,7 +18,7 @@ _LEVEL: dict[type[ast.operator], int] = {
 
 
 def write(node: ast.expr, least: int = _CONDITIONAL) -> str:
-    """Text of a checked tree; parenthesised where it binds looser than ``least``."""
+    """Return the text of a checked tree, in parentheses if its precedence is below ``least``."""
     text, level = _text(node)
     return f"({text})" if level < least else text
 
@@ -53,9 +53,9 @@ def _text(node: ast.expr) -> tuple[str, int]:
             return text, _CONDITIONAL
         case ast.Call(func=ast.Name(id=name), args=args):
             return f"{name}({', '.join(write(arg) for arg in args)})", _ATOM
-    raise TypeError(f"an unchecked node reached the writer: {ast.dump(node)}")
+    raise TypeError(f"unchecked node in the writer: {ast.dump(node)}")
 
 
 def _unsigned(text: str) -> str:
-    """A text that may follow an operator: one that begins with a sign is put in parentheses."""
+    """Put a text that starts with a sign in parentheses, so that it can follow an operator."""
     return f"({text})" if text.startswith(("-", "+")) else text

@@ -1,4 +1,4 @@
-"""What a system is: models and their parts, read from TOML or built in Python. Knows no numerics."""
+"""Model declarations: models and their parts, read from TOML or built in Python, without numerics."""
 
 from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.contact import Contact

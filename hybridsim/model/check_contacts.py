@@ -1,4 +1,4 @@
-"""Checks of contacts and of the laws they use."""
+"""Check contacts and their friction laws."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from hybridsim.model.contact import Contact
 from hybridsim.model.law import FORCE, INDEX, LOAD_RATE, NORMAL, SPEED, FrictionLaw
 from hybridsim.model.scope import Scope
 
-# Keys of a law in TOML, which parameters of a law cannot be told from.
+# Keys of a law in TOML, which a parameter of a law cannot be called.
 _KEYS = (
     "name", "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial",
     "copies", "tables", "parameters", "title", "source",
@@ -22,7 +22,7 @@ _AT_REST = ("stick", "stick_backward")
 
 
 def check_contacts(scope: Scope) -> None:
-    """Report laws that use what they do not have, and contacts that cannot hold anything."""
+    """Report invalid friction laws, and contacts whose velocity contains no state."""
     checked: list[FrictionLaw] = []
     for contact in scope.model.contacts:
         _contact(scope, contact)
@@ -32,7 +32,7 @@ def check_contacts(scope: Scope) -> None:
 
 
 def check_law(scope: Scope, law: FrictionLaw) -> None:
-    """Report a law that uses other names than v, N, dN and its own."""
+    """Report names in a law other than v, N, dN and the names that it declares."""
     what = f"law {law.name}"
     names = _own_names(scope, law)
     known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
@@ -42,7 +42,7 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
     for field, expr in law.expressions():
         used |= expr.names
         if field.endswith(", when"):
-            continue  # a condition; the contact's automaton is checked for it
+            continue  # a condition, which is checked with the automaton of the contact
         if field in _AT_REST:
             allowed = parameters | at_rest | {NORMAL}
         elif field.startswith("slip"):
@@ -59,13 +59,13 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
             scope.need_own(value, f"{what}, parameter {name}", parameters)
             used |= value.names
     for name in sorted(parameters - used - {law.copies}):
-        where = "in neither slip nor stick" if law.is_set_valued else "nowhere in the law"
-        scope.fail(law, f"{what}: the parameter '{name}' is used {where}", "use it or leave it out.")
+        where = "neither in slip nor in stick" if law.is_set_valued else "nowhere in the law"
+        scope.fail(law, f"{what}: the parameter '{name}' is used {where}", "use it or remove it")
     _form(scope, law, what)
 
 
 def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
-    """Parameters, definitions, tables and states; reports names that cannot be, and those that mean two things."""
+    """Return the names that the law declares, and report invalid and duplicate ones."""
     seen: dict[str, str] = {}
     named = [("parameter", name) for name in law.parameters]
     named += [("definition", name) for name in law.definitions]
@@ -75,27 +75,29 @@ def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
         if not check_identifier(scope, law, f"{what}, {kind}", name):
             continue
         if name in _TAKEN:
-            scope.fail(law, f"{what}: the {kind} '{name}' is already {_TAKEN[name]}", "rename it.")
+            scope.fail(law, f"{what}: the {kind} '{name}' has the name of {_TAKEN[name]}", "rename it")
         elif name in seen:
-            scope.fail(law, f"{what}: '{name}' is both a {seen[name]} and a {kind}", "rename one of them.")
+            scope.fail(law, f"{what}: '{name}' is both a {seen[name]} and a {kind}", "rename one of them")
         seen.setdefault(name, kind)
     return frozenset(seen)
 
 
 def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
-    """Report parts that the form of the law has no use for, and modes that change what is not the law's."""
+    """Report fields that this form of law cannot have, and modes that change foreign quantities."""
     if law.is_set_valued:
         for table in law.tables:
             if table.over.text == SPEED and table.at[0] < 0.0:
                 scope.fail(
                     table,
-                    f"{what}, table {table.name}: the argument {table.at[0]:g} is negative, and v is a magnitude",
-                    "begin at 0; what differs by direction goes into slip_backward, with a table of its own.",
+                    f"{what}, table {table.name}: the point {table.at[0]:g} is negative, but v is the absolute speed",
+                    "start the table at 0; for a law that depends on the direction add slip_backward with a table",
                 )
         for field in ("states", "definitions", "modes", "copies"):
             if getattr(law, field):
                 scope.fail(
-                    law, f"{what}: slip and stick have no {field}", "give the law a force instead of the two."
+                    law,
+                    f"{what}: a law with slip and stick has no {field}",
+                    "write force instead of slip and stick",
                 )
         return
     states = [state.name for state in law.states]
@@ -107,12 +109,12 @@ def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
         for name in mode.set:
             if name != FORCE:
                 message = f"{what}, mode {mode.name} sets '{name}'"
-                scope.fail(law, message, "a mode of a law can set its force, and nothing else.")
+                scope.fail(law, message, "a mode of a law can only set the force")
     if law.copies is not None and law.copies not in law.parameters:
         scope.fail(
             law,
-            f"{what}: copies is '{law.copies}', which is no parameter",
-            f'write parameters = ["{law.copies}", ...], so that a contact says how many.',
+            f"{what}: copies is '{law.copies}', which is not a parameter",
+            f'write parameters = ["{law.copies}", ...]; the contact then sets the number of copies',
         )
 
 
@@ -134,7 +136,7 @@ def _contact(scope: Scope, contact: Contact) -> None:
     forces = sorted(name for name in reached if scope.is_switched(name))
     if forces:
         message = f"{what}: the velocity depends on '{forces[0]}', which depends on a mode"
-        scope.fail(contact, message, "write it over states, inputs, parameters and t.")
+        scope.fail(contact, message, "use only states, inputs, parameters and t")
     elif not any(scope.kinds.get(name) == "state" for name in reached):
-        message = f"{what}: the velocity '{contact.velocity.text}' contains no state to hold"
-        scope.fail(contact, message, "write the relative velocity, e.g. 'v - v_belt'.")
+        message = f"{what}: the velocity '{contact.velocity.text}' contains no state"
+        scope.fail(contact, message, "write the relative velocity, e.g. 'v - v_belt'")

@@ -1,4 +1,4 @@
-"""Checks of every expression: known names, numbers and conditions in place, no circles, bounded size."""
+"""Check all expressions: names, kinds of values, cyclic definitions, size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Item = tuple[str, Expression, bool]
 
 
 def check_expressions(scope: Scope) -> None:
-    """Report unknown names, wrong kinds, circles, and definitions that grow beyond bounds when put in."""
+    """Report unknown names, wrong kinds, cyclic definitions, and definitions that become too large."""
     check_given(scope)
     items = list(_of_everything(scope))
     for what, expr, boolean in items:
@@ -28,14 +28,14 @@ def check_expressions(scope: Scope) -> None:
 
 
 def check_given(scope: Scope) -> None:
-    """Report what is wrong with the expressions that are fixed before a run begins."""
+    """Report errors in expressions that are evaluated before a run."""
     for what, expr in _of_parameters(scope):
-        if expr.names or expr.is_boolean:  # any other is a number
+        if expr.names or expr.is_boolean:  # all others are numbers
             scope.need(expr, what, scope.parameters)
 
 
 def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:
-    """What is fixed before a run begins."""
+    """Yield the expressions that are evaluated before a run and may use only parameters."""
     model = scope.model
     for parameter in model.parameters:
         yield f"parameter {parameter.name}", parameter.value
@@ -57,7 +57,7 @@ def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:
 
 
 def _of_everything(scope: Scope) -> Iterator[Item]:
-    """What may use all the names of the model."""
+    """Yield the expressions that may use all names of the model."""
     model = scope.model
     for state in model.states:
         yield f"state {state.name}, der", state.der, False
@@ -103,7 +103,7 @@ def _of_component(component: Component) -> Iterator[Item]:
 
 
 def _circles(scope: Scope) -> None:
-    """Definitions and variables must not depend on themselves, in whatever modes."""
+    """Report definitions and variables that depend on themselves in any mode, or become too large."""
     model = scope.model
     edges: dict[str, list[Expression]] = {name: [expr] for name, expr in model.definitions}
     for component in scope.components:
@@ -120,14 +120,14 @@ def _circles(scope: Scope) -> None:
     for name in order:
         sizes[name] = max(_size(expr, sizes) for expr in edges[name])
         if sizes[name] > MAX_DERIVED_NODES:
-            message = f"'{name}' has {sizes[name]} parts with its definitions put in"
-            remedy = f"{MAX_DERIVED_NODES} are allowed; let definitions use one another less."
+            message = f"'{name}' has {sizes[name]} terms after its definitions are inserted"
+            remedy = f"at most {MAX_DERIVED_NODES} are allowed; nest the definitions less"
             scope.errors.append(edges[name][0].error(message, remedy=remedy))
             return
 
 
 def _merged(exprs: list[Expression]) -> Expression:
-    """One expression that stands for the dependencies of all modes."""
+    """Return an expression with the dependencies of all modes."""
     first = exprs[0]
     return Expression(first.text, frozenset().union(*(expr.names for expr in exprs)), first.place, first.tree)
 
@@ -141,7 +141,7 @@ def _size(expr: Expression, sizes: dict[str, int]) -> int:
 
 
 def _constants(scope: Scope, items: list[Item]) -> None:
-    """Constant definitions are put in, so that no bound (on powers above all) is passed piece by piece."""
+    """Report expressions that exceed a limit, such as that of powers, once constants are inserted."""
     known: dict[str, Expression | str | float] = {}
     definitions = dict(scope.model.definitions)
     for name in dependency_order(definitions, "definitions"):

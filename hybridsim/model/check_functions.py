@@ -1,4 +1,4 @@
-"""Checks of Python functions in a model: all or none, and nothing beside them that needs expressions."""
+"""Check models with Python functions: functions and expressions must not be mixed."""
 
 from __future__ import annotations
 
@@ -14,48 +14,52 @@ _NEED_EXPRESSIONS = ("contacts", "surfaces", "impacts", "inputs", "discrete", "d
 
 
 def check_functions(scope: Scope) -> None:
-    """Report functions in a model of expressions, and what a model of functions cannot have."""
+    """Report functions in a model with expressions, and unsupported parts in a model with functions."""
     model = scope.model
     modes = [(c, mode) for c in model.components for mode in c.modes]
     if model.flow is None:
         for part, what, expr in _uses(scope):
             if isinstance(expr, FunctionExpression):
-                remedy = "write it as an expression, or give the rates as a function too: Model(flow=...)."
+                remedy = "write it as an expression, or define the rates by a function too: Model(flow=...)"
                 scope.fail(
-                    part, f"{what} is the Python function {expr}, and the rates are expressions", remedy
+                    part, f"{what} is the Python function {expr}, but the rates are expressions", remedy
                 )
         for component, mode in modes:
             if mode.flow is not None:
-                message = f"mode {component.name}.{mode.name} has a flow, and the model has none"
-                scope.fail(mode, message, "give the model a flow, or write the mode's rates as der = {...}.")
+                message = f"mode {component.name}.{mode.name} has a flow, but the model has none"
+                scope.fail(
+                    mode, message, "add a flow to the model, or write the rates of the mode as der = {...}"
+                )
         return
     for field in _NEED_EXPRESSIONS:
         if getattr(model, field):
-            message = f"the rates are a Python function, and the model has {field}"
-            scope.fail(Declared(), message, f"{field} need rates by expressions: give each state its der.")
+            message = f"a model whose rates are a Python function cannot have {field}"
+            scope.fail(
+                Declared(), message, f"for {field}, write the rate of each state as an expression (der)"
+            )
     for state in model.states:
         if state.der.text not in ("0", "0.0"):
-            message = f"state {state.name} has der = '{state.der}', and the rates are the function flow"
-            scope.fail(state, message, "leave it at 0.")
+            message = f"state {state.name} has der = '{state.der}', but the function flow defines the rates"
+            scope.fail(state, message, "remove der, or remove flow")
     for component, mode in modes:
         if mode.der or mode.set or component.surface:
-            message = f"component {component.name}: 'der', 'set' and surfaces need rates by expressions"
-            scope.fail(mode, message, "give the mode a flow.")
+            message = f"component {component.name}: 'der', 'set' and surfaces need rates that are expressions"
+            scope.fail(mode, message, "define the rates of the mode by flow")
     if len({component.name for component, mode in modes if mode.flow is not None}) > 1:
-        message = "modes of several components have a flow: which holds?"
-        scope.fail(Declared(), message, "let the modes of one component have it.")
+        message = "modes of several components have a flow, so the rates are ambiguous"
+        scope.fail(Declared(), message, "define flow in the modes of one component only")
     for part, what, expr in _uses(scope):
         if not isinstance(expr, FunctionExpression) and not expr.is_constant:
-            message = f"{what} is the expression '{expr}', and the rates are a Python function"
-            scope.fail(part, message, "give a function of (t, x, p) there too, or a number.")
+            message = f"{what} is the expression '{expr}', but the rates are a Python function"
+            scope.fail(part, message, "use a function of (t, x, p) or a number")
     for output in model.outputs:
         if output.modes:
-            message = f"output {output.name}: forms by mode need expressions"
-            scope.fail(output, message, "let it be one function.")
+            message = f"output {output.name} depends on the mode, which needs expressions"
+            scope.fail(output, message, "use one function for all modes")
 
 
 def _uses(scope: Scope) -> Iterator[tuple[Declared, str, Expression]]:
-    """Every place where a function may stand: the part, the place in words, what stands there."""
+    """Yield each possible place of a function: the part, a description of the place, and the expression."""
     model = scope.model
     for component in model.components:
         if component.limit is not None:

@@ -1,4 +1,4 @@
-"""Checks of unilateral contacts: what their gap and their restitution may use."""
+"""Check impacts: gap and restitution."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from hybridsim.model.impact import ROUNDING, SPEED, Impact
 from hybridsim.model.scope import Scope
 
 _REMEDIES = Remedies(
-    switched="write it over states, parameters and t.",
-    not_smooth="write one impact for each smooth piece of it.",
-    no_state="write the distance between the bodies, e.g. 'h' or 'x2 - x1 - d'.",
+    switched="use only states, parameters and t",
+    not_smooth="declare one impact for each smooth piece",
+    no_state="write the distance between the bodies, e.g. 'h' or 'x2 - x1 - d'",
 )
 
 
 def check_impacts(scope: Scope) -> None:
-    """Report gaps that depend on a mode or on no state or have corners, and restitutions over unknown names."""
+    """Report gaps that depend on a mode, contain no state or have corners, and invalid restitutions."""
     for impact in scope.model.impacts:
         _impact(scope, impact)
 
@@ -28,19 +28,21 @@ def _impact(scope: Scope, impact: Impact) -> None:
     names = (scope.all_names - {impact.name}) | {SPEED}
     scope.need(impact.restitution, f"{what}, restitution", names)
     if SPEED in scope.kinds and SPEED in impact.restitution.names:
-        message = f"{what}, restitution: '{SPEED}' is the speed of approach here and a {scope.kinds[SPEED]} elsewhere"
-        scope.fail(impact, message, f"rename the {scope.kinds[SPEED]}.")
+        message = (
+            f"{what}, restitution: '{SPEED}' is the approach speed here, but also a {scope.kinds[SPEED]}"
+        )
+        scope.fail(impact, message, f"rename the {scope.kinds[SPEED]}")
     switched = sorted(filter(scope.is_switched, scope.reached(impact.restitution) & scope.all_names))
     if switched:
         message = f"{what}: the restitution depends on '{switched[0]}', which depends on a mode"
-        scope.fail(impact, message, f"write it over {SPEED}, states and parameters.")
+        scope.fail(impact, message, f"use only {SPEED}, states and parameters")
     need_smooth(scope, impact, f"{what}: the gap", impact.gap, _REMEDIES)
 
 
 def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float]) -> None:
-    """Report a restitution that is a number and not one of an impact that loses energy."""
+    """Report a constant restitution outside 0 to 1."""
     if impact.restitution.names <= values.keys():
         e = evaluate(impact.restitution, values)
         if not -ROUNDING <= e <= 1.0 + ROUNDING:
             message = f"impact {impact.name}: the restitution '{impact.restitution.text}' is {e!r}"
-            scope.fail(impact, message, "give a number from 0 (no rebound) to 1 (no loss).")
+            scope.fail(impact, message, "use a number from 0 (no rebound) to 1 (no energy loss)")

@@ -1,4 +1,4 @@
-"""What is zero on a surface, of a gap and of a switching function alike: smooth, of states, and entered by no mode."""
+"""Check gaps and switching functions: smooth, with a state, and independent of modes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.model.scope import Scope
 
 
 class Remedies(NamedTuple):
-    """What to do about a function with a fault."""
+    """The remedies for the three possible errors of a function."""
 
     switched: str
     not_smooth: str
@@ -22,7 +22,7 @@ class Remedies(NamedTuple):
 
 
 def need_smooth(scope: Scope, part: Declared, what: str, expr: Expression, remedies: Remedies) -> None:
-    """Report the expression of a part if it depends on a mode, has corners, or contains no state."""
+    """Report the expression if it depends on a mode, has corners, or contains no state."""
     reached = scope.reached(expr)
     if not reached <= scope.all_names:
         return
@@ -37,7 +37,7 @@ def need_smooth(scope: Scope, part: Declared, what: str, expr: Expression, remed
 
 
 def _is_rough(scope: Scope, expr: Expression) -> bool:
-    """Whether an expression has a corner or a jump; conditions on time alone are signals and do not count."""
+    """Return whether an expression has a corner or jump; conditions on time alone do not count."""
     if not has_word(expr):
         return False
     known = scope.model.constant_names() | {TIME}

@@ -1,4 +1,4 @@
-"""Checks of switching surfaces: what their function and their variables may use."""
+"""Check switching surfaces: switching function and variables."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from hybridsim.model.scope import Scope
 from hybridsim.model.switching import SwitchingSurface
 
 _REMEDIES = Remedies(
-    switched="write it over states, discrete states, parameters and t.",
-    not_smooth="write one without abs, min, max, sign and conditions, or modes with guards.",
-    no_state="write what is zero on the surface, e.g. 'x'; an input switches by itself.",
+    switched="use only states, discrete states, parameters and t",
+    not_smooth="write it without abs, min, max, sign and conditions, or use modes with guards",
+    no_state="write the function that is zero on the surface, e.g. 'x'; inputs need no surface",
 )
 
 
 def check_surfaces(scope: Scope) -> None:
-    """Report switching functions that depend on a mode or on no state, and variables over unknown names."""
+    """Report invalid switching functions, and unknown names in the variables of the sides."""
     for surface in scope.model.surfaces:
         _surface(scope, surface)
 

@@ -1,4 +1,4 @@
-"""Checks of numbers at the parameters as given: finite, periods above zero, loads and limits not negative."""
+"""Check values for the current parameters: finite numbers, positive periods, nonnegative loads and limits."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from hybridsim.model.law import SPEED
 from hybridsim.model.model import Model
 from hybridsim.model.scope import Scope
 
-# A limit below the force at the onset of slip by less than this share is rounding in a law such as
-# Stribeck's, whose two coefficients were set equal: a few operations, each off by 1e-16.
+# Relative difference between the stick limit and the slip force at v = 0 that counts as rounding. It occurs in
+# laws such as Stribeck's if both coefficients are equal; each of the few operations has an error of 1e-16.
 ROUNDING = 1e-12
 
 
 def check_values(scope: Scope) -> None:
-    """Report parameters that have no value, and values that mean nothing."""
+    """Report parameters without a value, and values outside their valid range."""
     model = scope.model
     try:
         values = model.parameter_values()
@@ -50,7 +50,7 @@ def check_values(scope: Scope) -> None:
 
 
 def checked_names(model: Model) -> frozenset[str]:
-    """Names of parameters that these checks look at, directly or through others: the rest may have any finite value."""
+    """Return the parameters that these checks depend on; all others may have any finite value."""
     used: set[str] = set() if model.duration is None else set(model.duration.names)
     for start in (*(d.start for d in model.discrete), *(s.start for s in model.states)):
         used |= start.names
@@ -76,7 +76,7 @@ def checked_names(model: Model) -> frozenset[str]:
 
 
 def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:
-    """Value of an expression; None, reported, where it has none."""
+    """Return the value of an expression; if it has none, report the error and return None."""
     try:
         return evaluate(expr, values)
     except ModelError as fault:
@@ -85,9 +85,9 @@ def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | 
 
 
 def _size(scope: Scope, part: Declared, what: str, size: float | None) -> None:
-    """Report a typical size that is not above zero and finite."""
+    """Report a nominal size that is not positive and finite."""
     if size is not None and not 0 < size < math.inf:
-        scope.fail(part, f"{what} is {size!r}", "give a size above zero.")
+        scope.fail(part, f"{what} is {size!r}", "use a finite number above zero")
 
 
 def _positive(
@@ -96,7 +96,7 @@ def _positive(
     value = None if expr is None else _value(scope, expr, values)
     if expr is not None and value is not None and value <= 0:
         shown = "" if expr.is_constant else f" ({expr.text})"
-        scope.fail(part, f"{what}: {field} is {value:g}{shown}", "it must be above zero.")
+        scope.fail(part, f"{what}: {field} is {value:g}{shown}", "it must be above zero")
 
 
 def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
@@ -107,11 +107,11 @@ def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
             continue
         value = _value(scope, expr, values)
         if field == "duty" and value is not None and not 0 < value < 1:
-            scope.fail(signal, f"{what}: duty is {value:g}", "it must lie between 0 and 1.")
+            scope.fail(signal, f"{what}: duty is {value:g}", "it must be between 0 and 1")
 
 
 def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, float]:
-    """Parameters and definitions over them, with values; the latter only as far as they have one."""
+    """Return the values of the parameters and of the definitions that depend only on them."""
     found = dict(values)
     definitions = dict(scope.model.definitions)
     for name in dependency_order(definitions, "definitions"):
@@ -123,7 +123,7 @@ def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, f
 
 
 def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
-    """Loads, and forces at the onset of slip, as far as they are constant."""
+    """Check constant loads and constant friction forces of a contact."""
     what = f"contact {contact.name}"
     for name, size in contact.nominal.items():
         _size(scope, contact, f"{what}: nominal of {name}", size)
@@ -131,7 +131,7 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
         load = _value(scope, contact.normal, values)
         if load is not None and load < 0:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
-            scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative.")
+            scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative")
             return
     if not contact.law.is_set_valued:
         return
@@ -141,7 +141,7 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
 
 
 def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
-    """The limit of stick beside the slip force from which it is left, in one direction."""
+    """Check that the stick limit is at least the slip force at v = 0, in one direction."""
     what = f"contact {contact.name}"
     if backward and contact.law.slip_backward is None and contact.law.stick_backward is None:
         return
@@ -151,17 +151,17 @@ def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: b
     limit, onset = (_value(scope, force, values) for force in forces)
     if limit is None or onset is None:
         return
-    for name, force in (("limit of stick", limit), ("slip force at v = 0", onset)):
+    for name, force in (("stick limit", limit), ("slip force at v = 0", onset)):
         if force < 0:
-            scope.fail(contact, f"{what}: the {name} is {force:g}", "a friction force must not be negative.")
+            scope.fail(contact, f"{what}: the {name} is {force:g}", "a friction force must not be negative")
             return
     if onset - limit > ROUNDING * onset:
-        message = f"{what}: the limit of stick {limit:g} is below the slip force at v = 0, {onset:g}"
-        scope.fail(contact, message, "static friction is at least kinetic friction: mu_s >= mu_k.")
+        message = f"{what}: the stick limit {limit:g} is below the slip force {onset:g} at v = 0"
+        scope.fail(contact, message, "static friction must be at least kinetic friction (mu_s >= mu_k)")
 
 
 def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
-    """The slip force at the speeds of the points of tables, in one direction."""
+    """Check that the slip force is not negative at the points of tables, in one direction."""
     if backward and contact.law.slip_backward is None:
         return
     speeds = {speed for table in contact.law.tables if table.over.text == SPEED for speed in table.at}
@@ -170,5 +170,5 @@ def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], ba
         value = _value(scope, force, values) if force.names <= values.keys() else None
         if value is not None and value < 0:
             message = f"contact {contact.name}: the slip force at v = {speed:g} is {value:g}"
-            scope.fail(contact, message, "a friction force must not be negative.")
+            scope.fail(contact, message, "a friction force must not be negative")
             return

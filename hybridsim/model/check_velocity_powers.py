@@ -1,4 +1,4 @@
-"""Checks that a flow has a value while a contact slips either way: no fractional power of its velocity itself."""
+"""Check that no fractional power of a contact velocity is undefined in a slip mode."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from hybridsim.model.velocity_powers import velocity_powers
 
 
 def check_velocity_powers(scope: Scope) -> None:
-    """Report powers such as v**1.5 of a velocity that is of either sign, in the modes slip+ and slip-."""
+    """Report powers such as v**1.5 of a velocity that can be negative."""
     try:
         found = velocity_powers(scope.model)
     except ModelError:
-        return  # a parameter without a value, which the check of values reports
+        return  # a parameter has no value; check_values reports it
     for power in found:
         if power.is_signed:
             message = (
-                f"'{power.text}' in {power.where} has no value in one direction of slip: it is a fractional power of "
-                f"the velocity of contact {power.contact}, which is of either sign"
+                f"'{power.text}' in {power.where} is undefined for negative velocity of contact {power.contact}, "
+                "because its exponent is not a whole number"
             )
-            scope.errors.append(ModelError(message, place=power.place, remedy=f"{power.remedy}."))
+            scope.errors.append(ModelError(message, place=power.place, remedy=power.remedy))

@@ -1,4 +1,4 @@
-"""A small automaton: modes with flows, guards that stay >= 0 while they last, choices of what comes next."""
+"""Hybrid automata: components with modes, guards, choices of the next mode, and surfaces."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from hybridsim.model.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Choice(Declared):
-    """One way on from a guard: to mode ``to`` if ``when`` holds, after ``reset``; both taken at x-.
+    """A transition of a guard: to mode ``to`` if ``when`` is true, after ``reset``; both evaluated at x-.
 
     Parameters
     ----------
     to : str
-        Name of the mode that follows.
+        Name of the next mode.
     when : str or float, optional
-        Condition, an expression; None always holds.
+        Condition, an expression; None is always true.
     reset : mapping of str to str or float, optional
-        State or discrete state to the expression that gives its new value, or to ``"+= amount"``, which adds:
-        amounts of one instant are summed in any order.
+        New value of each changed state or discrete state, as an expression, or ``"+= amount"``. Amounts added at
+        the same instant are summed.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -46,22 +46,22 @@ class Choice(Declared):
 
 @dataclass(frozen=True)
 class Guard(Declared):
-    """A scalar that must stay >= 0 while its mode lasts.
+    """A scalar that stays >= 0 while its mode lasts.
 
     Parameters
     ----------
     name : str
-        What the guard is called in events.
+        Name of the guard in events.
     expr : str or float
         The scalar, smooth in its mode.
     then : str, Choice or sequence of these, optional
-        Choices in order, the first whose condition holds is taken; a text is the mode to go to. Empty where a
-        surface decides.
+        Choices in order of priority; the first one with a true condition is used. A string is the name of the
+        next mode. Empty if the component has a surface.
     fatal : str, optional
-        A message instead of choices: the run ends with status ``inconsistent`` where the guard would go
+        A message instead of choices: the run ends with status ``inconsistent`` when the guard would become
         negative.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -89,22 +89,22 @@ class Guard(Declared):
 
 @dataclass(frozen=True)
 class Mode(Declared):
-    """A flow and its domain: ``der`` replaces rates of states, ``set`` gives the component's variables.
+    """A mode of a component: ``der`` replaces rates of states, ``set`` defines the component's variables.
 
     Parameters
     ----------
     name : str
-        What the mode is called in its component.
+        Name of the mode in its component.
     guards : sequence of Guard, optional
-        What must stay >= 0 while it lasts.
+        Guards, which stay >= 0 while the mode lasts.
     der : mapping of str to str or float, optional
-        State to the rate that replaces its own.
+        Rates that replace those of the states, by state.
     set : mapping of str to str or float, optional
-        Variable to its expression in this mode.
+        Expressions of the component's variables in this mode.
     flow : callable, optional
         Function (t, x, p) that replaces all rates in a model whose rates are a Python function (see `Model`).
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -128,27 +128,28 @@ class Mode(Declared):
 
 @dataclass(frozen=True)
 class Surface(Declared):
-    """A scalar s(t, x) with a mode on either side and one that holds s = 0.
+    """A surface s(t, x) = 0 with a mode on each side and a mode that holds s = 0.
 
     Parameters
     ----------
     function : str or float
-        S.
+        The function s(t, x).
     unknown : str
-        The variable that holds it, solved for from ds/dt = 0, in which it must be linear.
+        The variable that holds s = 0. It is computed from ds/dt = 0, in which it must be linear.
     above, below, hold : str
-        Mode for s > 0, for s < 0, and on s = 0. Without one below, s cannot become negative: where it comes
-        to zero there is an impact, and ``hold`` keeps s and ds/dt at zero, solved for from d2s/dt2 = 0.
+        Modes for s > 0, s < 0 and s = 0. Without a mode below, s cannot become negative: there is an impact when
+        it reaches zero, and in ``hold`` the unknown is computed from d2s/dt2 = 0.
     jump_above, jump_below : str or float
-        Value of ``unknown`` at the limit of holding minus its value in ``above`` at s = 0+ (in ``below`` at s
-        = 0-). Identically zero where nothing jumps at a release (mu_s = mu_k).
+        Value of ``unknown`` at the limit of ``hold`` minus its value in ``above`` at s = 0+ (in ``below`` at s =
+        0-). Identically zero if the force does not jump at release (mu_s = mu_k).
     unique : bool, optional
-        The motion must be the only admissible one. Otherwise what holds comes first, as static friction does,
-        and the unknown has to oppose s; without a mode below it has to push s up.
+        If True, the run continues only if exactly one motion is admissible. If False, ``hold`` has priority, as in
+        static friction, and the unknown must oppose s; without a mode below it must push s up.
     restitution : str or float, optional
-        Of impacts, where there is no mode below; over the model's names and ``speed``, that of approach.
+        Coefficient of restitution, only without a mode below; it may use the names of the model and ``speed``, the
+        approach speed.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -176,40 +177,40 @@ class Surface(Declared):
         if (self.below is None) == (self.restitution is None):
             raise self._fault(
                 f"below is {self.below!r} and restitution {self.restitution!r}",
-                "a surface has a mode below, or a restitution of its impacts",
+                "set either below or restitution",
             )
 
     @property
     def is_unilateral(self) -> bool:
-        """Whether its function cannot become negative."""
+        """Whether the function cannot become negative."""
         return self.below is None
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The modes that it decides between."""
+        """The modes that the surface selects from."""
         return (self.above, self.hold) if self.below is None else (self.above, self.below, self.hold)
 
 
 @dataclass(frozen=True)
 class Component(Declared):
-    """An automaton of its own: one of its modes is active at any time.
+    """A hybrid automaton; exactly one of its modes is active at any time.
 
     Parameters
     ----------
     name : str
-        What the component is called; its modes are named ``name.mode``.
+        Name of the component; its modes are named ``name.mode``.
     modes : sequence of Mode
-        The modes, of which there is at least one.
+        The modes, at least one.
     initial : str, optional
-        Mode at t0; None where a surface decides it from x0. With a single mode it is that one.
+        Mode at t0. None is allowed with a single mode, and with a surface, which selects the mode from x0.
     surface : Surface, optional
-        Given, the guards have no choices: the decisions go by admissibility.
+        Surface that selects the next mode by admissibility; the guards then have no choices.
     limit : str or Choice, optional
-        Where to go, after which reset, where infinitely many of its transitions follow each other in a finite time: a
-        ball that bounces ever lower, a hose between two tanks that run dry. The time is that to which their
-        intervals add up. Without it the run ends there with status ``accumulation``.
+        Next mode, with an optional reset, at a point where infinitely many transitions accumulate in finite time (a
+        Zeno point), such as a ball that comes to rest by bouncing. The time is the sum of the intervals. Without a
+        limit the run ends there with status ``accumulation``.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -228,8 +229,8 @@ class Component(Declared):
 
     def __post_init__(self) -> None:
         given: object = self.initial
-        if isinstance(given, Mode):  # where the name of the first mode goes
-            remedy = "give several modes as a list, [hs.Mode(...), hs.Mode(...)]"
+        if isinstance(given, Mode):  # a second mode passed instead of a list
+            remedy = "pass several modes as a list, [hs.Mode(...), hs.Mode(...)]"
             raise self._fault(f"initial is the mode {given.name!r}", remedy)
         self._texts("name", "initial")
         self._parts("modes", Mode)
@@ -237,20 +238,20 @@ class Component(Declared):
         if isinstance(limit, str):
             object.__setattr__(self, "limit", Choice(limit, place=self.place))
         elif not (limit is None or isinstance(limit, Choice)):
-            raise self._fault(f"limit is {limit!r}", "give the name of a mode, or hs.Choice(...)")
+            raise self._fault(f"limit is {limit!r}", "use the name of a mode, or hs.Choice(...)")
         if not (self.surface is None or isinstance(self.surface, Surface)):
-            raise self._fault(f"surface is {self.surface!r}", "give hs.Surface(...)")
+            raise self._fault(f"surface is {self.surface!r}", "use hs.Surface(...)")
         if self.initial is None and self.surface is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """The names that its modes set, in order of appearance, the surface's unknown first."""
+        """The variables that the modes set, in order of appearance, the unknown of the surface first."""
         unknown = [self.surface.unknown] if self.surface else []
         return tuple(dict.fromkeys(unknown + [name for mode in self.modes for name in mode.set]))
 
     def mode(self, name: str) -> Mode:
-        """The mode of that name; KeyError if there is none."""
+        """Return the mode with this name, or raise KeyError."""
         for mode in self.modes:
             if mode.name == name:
                 return mode
@@ -259,13 +260,13 @@ class Component(Declared):
 
 @dataclass(frozen=True)
 class Corner(Component):
-    """A component that the program makes of a corner such as ``abs(v)``; its two modes, ``+`` and ``-``, agree at zero.
+    """A component made for a corner such as ``abs(v)``; its two modes, ``+`` and ``-``, agree at zero.
 
-    Or of a jump in time alone, such as ``sign(t - 1)``. It is decided as any other. A run keeps it apart from what the
-    model declares (`hybridsim.model.smoothing`).
+    A jump that depends on time alone, such as ``sign(t - 1)``, is treated likewise. Its mode is selected as that of any
+    other component, but results list it separately from the declared components (`hybridsim.model.smoothing`).
     """
 
 
 @dataclass(frozen=True)
 class LoadAutomaton(Component):
-    """The automaton of the load of a contact that opens: its mode is that of the load's sign."""
+    """The automaton of a contact that can lift off; its mode follows the sign of the load."""

@@ -1,4 +1,4 @@
-"""A frictional contact: relative velocity, normal load and a law become automata, and the states of the law."""
+"""Frictional contacts, which expand to automata and to the states of their friction law."""
 
 from __future__ import annotations
 
@@ -24,28 +24,29 @@ class Contact(Declared):
     """Dry friction between two bodies; its name is the friction force, which opposes the relative velocity.
 
     A positive force opposes a positive relative velocity: a body that slides with v has ``- f`` in its
-    equation.
+    equation of motion.
 
     Parameters
     ----------
     name : str
-        Of the friction force, which other expressions use by it.
+        Name of the friction force, which other expressions use.
     velocity : str or float
         Relative velocity, an expression of states, inputs, parameters and t.
     normal : str or float
-        Normal load, >= 0. Where it can vary, a guard ends the run should it become negative.
+        Normal load, >= 0. A guard ends the run if a varying load becomes negative.
     law : FrictionLaw or str
-        A `FrictionLaw`, or the name of one that comes with the package.
+        A `FrictionLaw`, or the name of a packaged law.
     arguments : mapping of str to str or float, optional
-        Law parameter to number or expression over the model's names; what is not given has the law's default.
+        Values of the law's parameters, numbers or expressions of the model's names. Missing ones have the defaults of
+        the law.
     opens : bool, optional
-        The contact lifts off where the load would become negative: there is no force until it is back. An
-        automaton of the modes ``closed`` and ``open``, named ``f_N`` in a contact f, as is the load that it
-        leaves.
+        If True, the contact lifts off when the load would become negative, and has no force until the load is
+        positive again. A contact f then has an automaton ``f_N`` with the modes ``closed`` and ``open``; ``f_N`` is
+        also the name of the load.
     start, nominal : mapping of str to float, optional
-        Of states of the law, by their names there, instead of what the law says.
+        Start values and nominal sizes of the law's states, by their names in the law; they replace those of the law.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -76,38 +77,37 @@ class Contact(Declared):
 
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"law is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
 
     def component(self, constants: Collection[str] = ()) -> Component:
-        """The automaton of the contact's own name; with a set-valued law three modes on the surface velocity = 0.
+        """Return the automaton with the contact's name; for a set-valued law it has three modes.
 
         ::
 
             slip+ : velocity >= 0,  f = +slip(v = velocity)
             slip- : velocity <= 0,  f = -slip_backward(v = -velocity)
-            stick : velocity = 0,   -stick_backward <= f <= stick,  f solved for
+            stick : velocity = 0,   -stick_backward <= f <= stick,  f from d(velocity)/dt = 0
 
         Parameters
         ----------
         constants : collection of str, optional
-            Names known to be constant (the model's parameters); a normal load that uses any other name gets a
-            guard in every mode.
+            Constant names (the parameters of the model). A normal load with any other name has a guard in every mode.
 
         Raises
         ------
         ModelError
-            For an argument that the law does not have, or one that is missing.
+            For an unknown or a missing argument of the law.
         """
         return next(part for part in self.components(constants) if part.name == self.name)
 
     def components(
         self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
     ) -> tuple[Component, ...]:
-        """All the automata that the contact becomes: its own, those of copies, of lift-off and of tables.
+        """Return all automata of the contact: its own and those of copies, lift-off and tables.
 
         Parameters
         ----------
-        load_rate : gives the rate of a load that varies, for a law that asks for it.
+        load_rate : returns the rate of a varying load, for laws that use it.
         """
         varies = self._varies(constants)
         if varies not in self._expanded:
@@ -117,7 +117,7 @@ class Contact(Declared):
     def states(
         self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
     ) -> tuple[State, ...]:
-        """The states that the law brings into the model."""
+        """Return the states that the friction law adds to the model."""
         from hybridsim.model.law_with_states import states_of
 
         return states_of(self, self.values(self._varies(constants), load_rate)) if self.law.states else ()
@@ -127,7 +127,7 @@ class Contact(Declared):
 
     @cached_property
     def _expanded(self) -> dict[bool, tuple[Component, ...]]:
-        """What `components` has found: copies of a model with other values have the same contacts."""
+        """Cache of `components`, shared by copies of a model with other values."""
         return {}
 
     def _components(self, varies: bool, load_rate: Callable[[], Expression] | None) -> Iterator[Component]:
@@ -137,8 +137,8 @@ class Contact(Declared):
         loaded: tuple[Guard, ...] = ()
         if varies and not self.opens:
             message = (
-                f"normal load of contact {self.name} became negative: {self.normal.text} < 0; if the contact may "
-                "lift off, say opens = true there, else correct the sign of the load"
+                f"normal load of contact {self.name} became negative: {self.normal.text} < 0; if the contact can lift "
+                "off, set opens = true, otherwise correct the sign of the load"
             )
             loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
         if self.law.is_set_valued:
@@ -153,21 +153,21 @@ class Contact(Declared):
             yield table.component(self.variable(table.name), argument, from_zero)
 
     def variable(self, name: str) -> str:
-        """Name in the model of what the law calls so: of a state, of a table, of the load that lift-off leaves."""
+        """Return the name in the model of a state, table or load of the friction law."""
         return f"{self.name}_{name}"
 
     @property
     def table_speed(self) -> str | None:
-        """The variable that holds the speed for tables over it, which each mode sets; None where no table asks."""
+        """The variable that contains the speed for tables over it, or None without such tables."""
         asked = any(SPEED in table.over.names for table in self.law.tables)
         return self.variable(SPEED) if asked and self.law.is_set_valued else None
 
     def _argument_speed(self) -> Expression:
-        """What a table is read at: the speed, as the modes of a set-valued law give it, or the velocity."""
+        """Return the argument of tables: the speed for a set-valued law, otherwise the velocity."""
         return parse(self.variable(SPEED)) if self.law.is_set_valued else self.velocity
 
     def _lifting(self, values: Mapping[str, Expression]) -> Component:
-        """Two modes that set the load: as it is, and none."""
+        """Return the lift-off automaton, whose two modes set the load to its expression or to zero."""
         name, place = self.variable(NORMAL), self.place
         away = Guard("load", self.normal, (Choice("open"),), place=place)
         back = Guard("load", self._form("-load", load=self.normal), (Choice("closed"),), place=place)
@@ -208,30 +208,30 @@ class Contact(Declared):
         return Component(self.name, modes, surface=surface, place=self.place)
 
     def onset_force(self, backward: bool = False) -> Expression:
-        """Magnitude of the force at the onset of slip, over the model's names."""
+        """Return the magnitude of the force at the onset of slip, in the names of the model."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         return self._at_rest(f"onset{backward}", slip, {SPEED: parse(0)})
 
     def slip_force(self, speed: Expression, *, backward: bool = False) -> Expression:
-        """Magnitude of the force when sliding at a speed >= 0, over the model's names."""
+        """Return the magnitude of the slip force at a speed >= 0, in the names of the model."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
-        assert slip is not None  # a set-valued law has it
+        assert slip is not None  # always set in a set-valued law
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
-        """Magnitude of the force when sliding at a speed that is a number, which tables over it have a value for."""
+        """Return the magnitude of the slip force at a numeric speed, where tables over it have a value."""
         names = {t.name: parse(t.value(speed)) for t in self.law.tables if t.over.text == SPEED}
         slip = (self.law.slip_backward if backward else None) or self.law.slip
-        assert slip is not None  # a set-valued law has it
+        assert slip is not None  # always set in a set-valued law
         return substitute(self._form("slip", slip=slip), {SPEED: parse(speed), **self.values(), **names})
 
     def limit_force(self, backward: bool = False) -> Expression:
-        """The most that stick can carry, over the model's names."""
+        """Return the largest force in stick, in the names of the model."""
         stick = (self.law.stick_backward if backward else None) or self.law.stick
         return self._at_rest(f"limit{backward}", stick, {})
 
     def _at_rest(self, which: str, force: Expression | None, names: dict[str, Expression]) -> Expression:
-        """A force of a set-valued law where the speed is zero and tables over it have a number; worked out once."""
+        """Return a force of a set-valued law at zero speed; it is computed once."""
         assert force is not None
         if which not in self._forces:
             names |= self.values()
@@ -246,13 +246,13 @@ class Contact(Declared):
         return {}
 
     def _form(self, template: str, **parts: Expression) -> Expression:
-        """An expression built from parts, placed where the contact stands."""
+        """Return an expression built from parts, with the place of the contact."""
         return substitute(parse(template, self.velocity.place or self.place), parts)
 
     def values(
         self, varies: bool = True, load_rate: Callable[[], Expression] | None = None
     ) -> dict[str, Expression]:
-        """What the law's names stand for, the speed and its states left out, as expressions over the model's."""
+        """Return the expressions for the names of the law, except the speed and its states."""
         law = self.law
         for name, value in self.arguments.items():
             if name not in law.parameters:
@@ -266,7 +266,7 @@ class Contact(Declared):
         if missing:
             raise self.error(
                 f"contact {self.name}: the law '{law.name}' needs a value for '{missing[0]}'",
-                f'write law = {{ name = "{law.name}", {missing[0]} = ... }}.',
+                f'write law = {{ name = "{law.name}", {missing[0]} = ... }}',
             )
         defaults = {
             name: value for name, value in law.parameters.items() if name not in self.arguments and value

@@ -1,4 +1,4 @@
-"""Denominators of rates: where one passes zero, a rate has a pole, or is 0/0, and a run that goes on is wrong."""
+"""Denominators of rates, whose zeros are poles or 0/0 that an integration step can miss."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Denominator:
-    """What a rate is divided by, with definitions as they stand.
+    """A denominator in a rate, with the definitions that it uses.
 
     Parameters
     ----------
-    tree : the expression.
-    definitions : trees of the definitions that it needs, each after those that it depends on.
-    state : whose rate it is in.
+    tree : the denominator.
+    definitions : trees of the definitions that it uses, in order of dependency.
+    state : the state whose rate contains it.
     """
 
     tree: ast.expr
@@ -33,11 +33,11 @@ class Denominator:
 
     @property
     def text(self) -> str:
-        """As it is written."""
+        """The source text."""
         return ast.unparse(self.tree)
 
     def sign(self, values: Mapping[str, float]) -> int:
-        """Its sign at given parameters, states and time; 0 where it is zero or has no value."""
+        """Return the sign for given parameters, states and time, or 0 if the value is zero or undefined."""
         known = dict(values)
         try:
             for name, tree in self.definitions.items():
@@ -49,10 +49,10 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Denominators of the states' own rates that can pass zero, as far as states, parameters and t decide them.
+    """Return the denominators of rates, of states, parameters and t only, that can change their sign.
 
-    Left out are those inside of a condition, which may keep away from the zero, and those whose form shows that they
-    are never negative.
+    Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
+    negative by their form are omitted too.
     """
     found: tuple[Denominator, ...] = model.once("denominators", lambda: tuple(_denominators(model)))
     return found
@@ -77,7 +77,7 @@ def _denominators(model: Model) -> Iterator[Denominator]:
 
 
 def _divisors(node: ast.expr) -> Iterator[ast.expr]:
-    """Right sides of divisions and bases of negative powers, outside of conditions."""
+    """Yield the divisors and the bases of negative powers outside conditions."""
     match node:
         case ast.IfExp():
             return
@@ -91,7 +91,7 @@ def _divisors(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def _in_order(node: ast.expr, meanings: Meanings) -> dict[str, ast.expr]:
-    """The definitions behind an expression, each after those that it depends on."""
+    """Return the definitions that an expression uses, in order of dependency."""
     found: dict[str, ast.expr] = {}
 
     def visit(tree: ast.expr) -> None:

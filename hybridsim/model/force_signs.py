@@ -1,4 +1,4 @@
-"""Loads and friction forces whose sign is wrong where that shows: at the start, at a usual speed, or at all speeds."""
+"""Warnings about loads and friction forces of the wrong sign at the start or at nominal speed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridsim.model.one_sided import number_of
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
-# in units of a usual one: a sign that is wrong at all of these is no detail
+# test speeds relative to the nominal velocity; a warning requires a wrong sign at all of them
 _SPEEDS = (
     1e-3,
     1e-2,
@@ -27,9 +27,9 @@ _FRICTION = "a friction force must not be negative: correct the sign"
 
 
 def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
-    """Contacts, with what is wrong and what to do; what is wrong for constant values is an error already.
+    """Yield contacts with a wrong sign, a message and a remedy; constant values are errors elsewhere.
 
-    Values are those of a start at t = 0; nothing is said of what depends on an input or on a mode.
+    Expressions are evaluated at the start, t = 0. Those that depend on an input or a mode are not checked.
     """
     numbers = model.parameter_values() | model.start_values() | model.discrete_values() | {TIME: 0.0}
     trees = {name: expr.tree for name, expr in model.definitions}
@@ -49,7 +49,7 @@ def _of_contact(
     if load is not None and load < 0.0:
         if contact.opens:
             return None
-        remedy = "it must not be negative: correct its sign, or let the contact open (opens = true)"
+        remedy = "correct the sign of the load, or let the contact lift off (opens = true)"
         return f"the normal load '{contact.normal.text}' is {load:.6g} at the start", remedy
     sizes = [
         state.nominal for state in model.states if state.name in contact.velocity.names and state.nominal
@@ -57,15 +57,15 @@ def _of_contact(
     if not contact.law.is_set_valued:
         return _driving(contact, value, load, max(sizes, default=1.0))
     if contact.law.tables or contact.opens:
-        return None  # its force is over what modes set
+        return None  # the force depends on variables that modes set
     for backward in (False, True):
         forces = {
-            "the limit of stick is {:.6g} at the start": contact.limit_force(backward),
+            "the stick limit is {:.6g} at the start": contact.limit_force(backward),
             "the slip force at v = 0 is {:.6g} at the start": contact.onset_force(backward),
         }
         if sizes:
             usual = contact.slip_force(parse(max(sizes)), backward=backward)
-            forces[f"the slip force is {{:.6g}} at v = {max(sizes):g}, a usual speed (nominal)"] = usual
+            forces[f"the slip force is {{:.6g}} at the nominal speed v = {max(sizes):g}"] = usual
         for words, force in forces.items():
             found = value(force)
             if found is not None and found < 0.0:
@@ -76,7 +76,7 @@ def _of_contact(
 def _driving(
     contact: Contact, value: Callable[[Expression], float | None], load: float | None, size: float
 ) -> tuple[str, str] | None:
-    """A single-valued force along the velocity at all speeds; a law that remembers is not looked at."""
+    """Report a single-valued force that acts along the velocity; laws with states are not checked."""
     law = contact.law
     if law.states or law.modes or law.tables or law.copies or law.force is None:
         return None
@@ -89,6 +89,6 @@ def _driving(
         if force is None or not force * speed < 0.0:
             return None
     return (
-        f"the force of the law '{law.name}' acts along the velocity at all speeds: it drives the motion",
-        "a force that opposes the motion has the sign of v: correct its sign, unless it is meant to drive",
+        f"the force of the law '{law.name}' acts in the direction of the velocity, so it drives the motion",
+        "a force that opposes the motion has the sign of v; correct its sign unless it is intended",
     )

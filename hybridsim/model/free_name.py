@@ -1,4 +1,4 @@
-"""Names for what the program adds to a model: none of them meets a name that the model has."""
+"""Unused names for quantities that the program adds to a model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def free_name(taken: Iterable[str], wish: str) -> str:
-    """The wish, or the wish with as many underscores after it as make it differ from all that are taken."""
+    """Return the wished name, with underscores appended until it differs from all taken names."""
     names = frozenset(taken)
     while wish in names:
         wish += "_"
@@ -18,7 +18,7 @@ def free_name(taken: Iterable[str], wish: str) -> str:
 
 
 def names_of_model(model: Model) -> frozenset[str]:
-    """Every name that a model declares, or that its contacts make: of quantities, components, events, outputs."""
+    """Return all names of a model, including those that its contacts create."""
     parts = (
         model.parameters, model.states, model.discrete, model.inputs, model.contacts, model.surfaces, model.impacts,
         model.monitors, model.schedules, model.outputs, model.all_components(),

@@ -1,4 +1,4 @@
-"""A mapping that never changes, can be hashed, compared and pickled: the form in which models keep theirs."""
+"""An immutable mapping that can be hashed, compared and pickled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Value = TypeVar("Value")
 
 
 class FrozenMap(Mapping[str, Value]):
-    """A read-only mapping from names; order is kept for iteration and does not count in comparisons."""
+    """A read-only mapping from names; comparisons ignore the order."""
 
     __slots__ = ("_items",)
 

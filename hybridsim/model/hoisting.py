@@ -1,7 +1,7 @@
-"""Jumps inside of what is not linear in them: the whole expression jumps there, between its values on the two sides.
+"""Jumps inside nonlinear expressions: the value of the whole expression jumps between its two sides.
 
-`exp(sign(x))` is `exp(1)` above and `exp(-1)` below. What a motion that slides along x = 0 gets of it is between these
-two values, by the convention for rates, and not a value of the exponential in between.
+`exp(sign(x))` is `exp(1)` above and `exp(-1)` below x = 0. While a motion slides along x = 0, the term is a convex
+combination of these two values, by Filippov's convention, and not the exponential of an intermediate value.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
-    """The border of a jump that does not enter a node linearly; None where all do.
+    """Return the argument of a jump that enters a node nonlinearly, or None if all enter linearly.
 
-    Jumps in time alone are left out: the modes, or signals, that stand for them have only two values.
+    Jumps that depend on time alone are excluded, because the modes or signals for them have only two values.
     """
     match node:
         case ast.Call(args=args):
@@ -42,7 +42,7 @@ def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
 
 
 def open_jumps(work: Rewriting, node: ast.expr, here: Here) -> Mapping[Family, ast.expr]:
-    """The borders at which a tree jumps in a way that surfaces stand for, by family."""
+    """Return by family the arguments at which a tree has a jump that a switching surface can replace."""
     if not work.has_jumps:
         return {}
     found: dict[Family, ast.expr] = {}
@@ -59,7 +59,7 @@ def open_jumps(work: Rewriting, node: ast.expr, here: Here) -> Mapping[Family, a
 
 
 def _parts(meanings: Meanings, tree: ast.expr) -> Iterator[ast.expr]:
-    """All parts of a tree that may not be smooth, conditions taken apart."""
+    """Yield all parts of a tree that may be non-smooth, with conditions split into single comparisons."""
     for part in ast.walk(tree):
         if isinstance(part, ast.IfExp) and meanings.moves(part.test):
             try:
@@ -75,7 +75,7 @@ def _parts(meanings: Meanings, tree: ast.expr) -> Iterator[ast.expr]:
 
 
 def resolved(meanings: Meanings, node: ast.expr, signs: Mapping[Family, int]) -> ast.expr:
-    """A tree, its definitions put in, where signs are known: what hangs on them has the side that holds."""
+    """Return a tree with inserted definitions, in which known signs select the active sides."""
 
     def side(part: ast.expr) -> ast.expr:
         sides = sides_of(part)

@@ -1,4 +1,4 @@
-"""What a model may say and hardly means: guards that cannot fire, pulses and jumps in a flow, missing units."""
+"""Warnings about valid models: guards that cannot fire, pulses and jumps in a flow, missing units."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Caution:
-    """A remark on a valid model: what is odd, where it is written, what to do about it."""
+    """A warning about a valid model: message, place and remedy."""
 
     message: str
     place: Place | None
@@ -37,13 +37,13 @@ class Caution:
 
     @property
     def sentence(self) -> str:
-        """The same in one line, with the file and the line but without what stands there."""
+        """The same in one line, with file and line number but without the source text."""
         where = self.place.prefix if self.place else ""
         return f"{where}{self.message}: {self.remedy.rstrip('.')}"
 
 
 def warnings_of(model: Model) -> tuple[Caution, ...]:
-    """Cautions about a valid model, those about guards first.
+    """Return the warnings about a valid model; those about guards come first.
 
     A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
     lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode; a
@@ -62,27 +62,27 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
 
 
 def forces_of(model: Model) -> tuple[Caution, ...]:
-    """Loads and friction forces of the wrong sign."""
+    """Return warnings about loads and friction forces of the wrong sign."""
     return tuple(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_signs(model))
 
 
 def _of_powers(model: Model) -> Iterator[Caution]:
     for power in velocity_powers(model):
         message = (
-            f"'{power.text}' in {power.where} has no series where contact {power.contact} sticks: every integrator "
-            "that locates events refuses it"
+            f"'{power.text}' in {power.where} has no Taylor series at zero velocity of contact {power.contact}; only "
+            "integrators that do not locate events support it"
         )
-        yield Caution(message, power.place, f"{power.remedy}; or run it by moreau")
+        yield Caution(message, power.place, f"{power.remedy}, or use integrator='moreau'")
 
 
 def jumps_of(model: Model) -> tuple[Caution, ...]:
-    """Jumps inside a mode where a state changes its sign, along which a motion cannot slide; runs tell of them, too."""
+    """Return warnings about jumps that are not treated as switching surfaces; runs report them too."""
     found: tuple[Caution, ...] = model.once("jumps", lambda: tuple(_of_jumps(model)))
     return found
 
 
 class _Reading:
-    """What names stand for while a component is in a mode, and what can change meanwhile."""
+    """The meaning of names in one mode of a component, and the set of varying quantities."""
 
     def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
         self.numbers = model.parameter_values()
@@ -101,11 +101,11 @@ class _Reading:
                 self._moving.add(state.name)
 
     def lookup(self, name: str) -> ast.expr | None:
-        """The tree behind a name."""
+        """Return the tree of a definition or variable, or None."""
         return self._trees.get(name)
 
     def changes(self, expr: Expression) -> bool:
-        """Whether anything that an expression depends on can change while the mode lasts."""
+        """Return whether the value of an expression can change while the mode is active."""
         open_, seen = set(names_of(expr.tree)), set()
         while open_:
             name = open_.pop()
@@ -118,7 +118,7 @@ class _Reading:
         return False
 
     def one_sided(self, expr: Expression) -> tuple[str, str] | None:
-        """("negative" or "positive", the reason) for an expression that is never so; None where that does not show."""
+        """Return the sign that an expression cannot have ("negative" or "positive") and the reason."""
         reason = never_negative(expr.tree, self.numbers, self.lookup)
         if reason:
             return "negative", reason
@@ -128,7 +128,7 @@ class _Reading:
 
 
 def _reset_names(model: Model, own: Component | None) -> set[str]:
-    """States and discrete states that resets change, those of a component's own choices left out: they end its mode."""
+    """Return the states that resets change, except resets that end the component's own mode."""
     resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
     for component in model.components:
         if component is not own:
@@ -139,7 +139,7 @@ def _reset_names(model: Model, own: Component | None) -> set[str]:
 
 @dataclass(frozen=True)
 class _Watched:
-    """A guard or a monitor: what to call it, its expression and place, what its names stand for."""
+    """A guard or a monitor: its description, expression and place, and the meaning of its names."""
 
     what: str
     expr: Expression
@@ -164,22 +164,22 @@ def _watched(model: Model) -> Iterator[_Watched]:
 
 
 def _of_signs(model: Model) -> Iterator[Caution]:
-    """Guards and monitors that are constant, or of one sign."""
+    """Yield warnings about guards and monitors that are constant or of one sign."""
     for item in _watched(model):
-        meant = "where the mode is to end" if item.is_guard else "where the monitor is to fire"
-        remedy = f"write a quantity that changes its sign {meant}."
+        meant = "at the end of the mode" if item.is_guard else "at the event"
+        remedy = f"write an expression that changes its sign {meant}"
         if not item.reading.changes(item.expr):
-            so = "while the mode lasts: it fires at once or never" if item.is_guard else "and never fires"
+            so = "in this mode, so it fires immediately or never" if item.is_guard else "and never fires"
             yield Caution(f"{item.what} is constant {so}", item.place, remedy)
         elif found := item.reading.one_sided(item.expr):
             sign, reason = found
-            fires = "never fires" if item.is_guard else "never fires unless it stays at zero"
+            fires = "never fires" if item.is_guard else "fires only if it remains at zero"
             fires = "fires as soon as it is not zero" if item.is_guard and sign == "positive" else fires
             yield Caution(f"{item.what} is {reason}, never {sign}, so it {fires}", item.place, remedy)
 
 
 def _of_units(model: Model) -> Iterator[Caution]:
-    """Guards and monitors whose quantities have no units, where those of the others, and all other states, have.
+    """Yield warnings about guards and monitors of quantities without units, if all other states have units.
 
     Discrete states are left out: they count, as often as not.
     """
@@ -196,14 +196,14 @@ def _of_units(model: Model) -> Iterator[Caution]:
     for item, names in bare:
         listed = ", ".join(sorted(names))
         yield Caution(
-            f"{item.what} has no units ({listed}), unlike everything else that moves or is watched",
+            f"{item.what} depends on quantities without units ({listed}), but all other states have units",
             item.place,
-            f'give {listed} a unit (unit = "1" where it has none), or correct the names.',
+            f'declare a unit for {listed} (unit = "1" for pure numbers), or correct the names',
         )
 
 
 def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -> set[str]:
-    """States, discrete states and parameters that an expression depends on, as far as it names them."""
+    """Return the states, discrete states and parameters that an expression depends on."""
     open_, seen = set(names_of(expr.tree)), set()
     while open_:
         name = open_.pop()
@@ -223,14 +223,14 @@ def _of_pulses(model: Model) -> Iterator[Caution]:
             continue
         found.add(text)
         yield Caution(
-            f"{what}: '{text}' is a pulse or a step in plain t, which an integrator's step may pass over",
+            f"{what}: '{text}' is a pulse or step in t, which an integration step may miss",
             expr.place,
-            "give it as an input (a table or a wave, whose knots are stepped to), or run with max_step at its width.",
+            "declare it as an input (table or wave), whose knots are hit exactly, or set max_step to its width",
         )
 
 
 def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
-    """Every expression that is integrated or watched."""
+    """Yield every expression that is integrated or monitored, with its place."""
     for state in model.states:
         yield f"state {state.name}", state.der
     for contact in model.contacts:
@@ -263,16 +263,16 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
         is_watched = all(where.startswith(("monitor ", "guard ")) for where in one.where)
         if names & states and not is_watched:
             yield Caution(
-                f"{what} jumps inside a mode ({reason}): it is integrated as it stands, and a "
-                "motion that both sides drive back into the jump crawls",
+                f"{what} is not treated as a switching surface ({reason}), so a run that slides along the jump "
+                "becomes extremely slow",
                 one.place,
-                "write a sum of signs times what does not jump, or declare the surface with the fields on its sides "
-                '([surfaces.NAME] expr = "what changes its sign"), a dry friction as a contact ([contacts.NAME]).',
+                "write the rate as a sum of terms with one sign() each, or declare a switching surface "
+                "([surfaces.NAME]) or, for dry friction, a contact ([contacts.NAME])",
             )
         elif names & (states | known):
             yield Caution(
-                f"{what} jumps inside a mode ({reason}): it is taken as it stands, and a step may pass over it",
+                f"{what} is not treated as a switching surface ({reason}), so an integration step may miss the jump",
                 one.place,
-                "give what decides as an input (a table or a wave, whose knots are stepped to) or as modes with "
-                "guards, or run with max_step at its width.",
+                "declare the switching quantity as an input (table or wave), use modes with guards, or set max_step "
+                "to the width of the jump",
             )

@@ -1,4 +1,4 @@
-"""A unilateral contact: a gap that cannot become negative, the force that sees to it, and impacts with restitution."""
+"""Unilateral contacts: a gap that cannot become negative, its normal force, and impacts with restitution."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from hybridsim.model.component import Component, Guard, Mode, Surface
 from hybridsim.model.declared import Declared
 
 OPEN, CLOSED = "open", "closed"
-SPEED = "speed"  # what a restitution calls the speed of approach
-# How far from [0, 1] rounding may carry a restitution that is computed: some operations on numbers of size one.
+SPEED = "speed"  # the name of the approach speed in a restitution
+# Largest rounding error of a computed restitution outside [0, 1]: a few operations on numbers of size one.
 ROUNDING = 8.0 * 2.0**-52
 
 
@@ -22,36 +22,35 @@ class Impact(Declared):
     ::
 
         open   : gap >= 0,                     p = 0
-        closed : gap = 0, d(gap)/dt = 0,       p >= 0, solved for from d2(gap)/dt2 = 0
+        closed : gap = 0, d(gap)/dt = 0,       p >= 0, computed from d2(gap)/dt2 = 0
         impact : gap = 0, d(gap)/dt < 0,       an impulse P >= 0 changes the states by (d(rates)/dp) P
 
-    Newton's law gives the speed of separation, e times that of approach. All contacts whose gaps are zero take part in
-    one complementarity problem, 0 <= P, u+ + e u- >= 0, P (u+ + e u-) = 0 with u = d(gap)/dt, u- counted as zero where
-    it is positive; a frictional contact with a load of p takes part with an impulse of Coulomb's law, up to mu P.
+    By Newton's impact law the separation speed is e times the approach speed. All contacts with zero gap form one
+    complementarity problem, 0 <= P, u+ + e u- >= 0, P (u+ + e u-) = 0, with u = d(gap)/dt and u- = 0 if it is positive.
+    A frictional contact with the load p takes part with a Coulomb impulse of at most mu P.
 
     Parameters
     ----------
     name : str
-        Of the normal force p.
+        Name of the normal force p.
     gap : str or float
-        Gap function g(t, x) >= 0, a smooth expression of positions: p enters its second derivative and not its first. p
-        has to do work along the gap, so that a mass m at height h with gap h has + p/m in its acceleration.
+        Gap function g(t, x) >= 0, a smooth expression of positions: p enters its second derivative but not its first.
+        p must do work along the gap: a mass m at height h with gap h has + p/m in its acceleration.
     restitution : str or float
-        Coefficient e, from 0 (no rebound) to 1 (no loss); it may use the speed of approach, above zero, by the name
-        ``speed``.
+        Coefficient e, from 0 (no rebound) to 1 (no energy loss). It may use ``speed``, the positive approach speed.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Raises
     ------
     ModelError
-        When the model is checked or compiled, for a gap without a state, one whose first derivative has p,
-        and for a restitution outside of [0, 1] that is a number.
+        When the model is checked or compiled: for a gap without a state, for a gap whose first derivative contains p,
+        and for a constant restitution outside [0, 1].
 
     Notes
     -----
-    For stops, floors, clearances. A `Component` with a guard and a reset is the general form, for rules that
-    are not Newton's.
+    Use it for stops, floors and clearances. For other impact laws than Newton's use a `Component` with a guard and a
+    reset.
 
     References
     ----------
@@ -74,7 +73,7 @@ class Impact(Declared):
         self._expressions("gap", "restitution")
 
     def component(self) -> Component:
-        """Its automaton, of the modes ``open`` and ``closed``."""
+        """Return the automaton, with the modes ``open`` and ``closed``."""
         return self._component
 
     @cached_property

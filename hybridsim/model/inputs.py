@@ -1,4 +1,4 @@
-"""A known signal: a table over time, a periodic wave or a chirp; its jumps and knots are scheduled events."""
+"""Known signals: tables over time, periodic waves and chirps, whose jumps and knots are scheduled events."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridsim.model.declared import Declared
 KINDS = ("table", "wave", "chirp")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
 INTERPOLATIONS = ("linear", "cubic")
-# The fields that each kind has; the first group must be given, the second has defaults.
+# Required fields of each kind (NEEDED), and fields with defaults (OPTIONAL).
 NEEDED = {"table": ("times", "values"), "wave": ("shape", "period"), "chirp": ("f0", "f1", "duration")}
 OPTIONAL = {
     "table": ("interpolation",),
@@ -26,11 +26,11 @@ _DEFAULTS: dict[str, dict[str, object]] = {
 
 @dataclass(frozen=True)
 class Input(Declared):
-    """A function of time under a name.
+    """A named function of time.
 
     table
-        Values at increasing times, between them linear or (natural) cubic; before the first and after the last the end
-        values hold. Two equal times are a jump (linear only).
+        Values at increasing times with linear or natural cubic interpolation, and constant beyond both ends. Two equal
+        times make a jump (linear only).
     wave
         offset + amplitude s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
         square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1 at 1/4, -1 at
@@ -42,19 +42,19 @@ class Input(Declared):
     Parameters
     ----------
     name : str
-        What other expressions call it.
+        Name of the input in expressions.
     kind : str
         "table", "wave" or "chirp".
     times, values : sequence of float, optional
-        Numbers (k,) of a table.
+        Times and values (k,) of a table.
     interpolation : str, optional
-        Of a table: "linear" or "cubic".
+        Interpolation of a table, "linear" or "cubic".
     shape : str, optional
-        Of a wave: "square", "sine", "triangle" or "sawtooth".
+        Shape of a wave, "square", "sine", "triangle" or "sawtooth".
     amplitude, period, phase, offset, duty, f0, f1, duration : str or float, optional
         Expressions of parameters.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -91,11 +91,11 @@ class Input(Declared):
 
     @property
     def subject(self) -> str:
-        """What messages call it."""
+        """The name of the input in messages."""
         return f"input {self.name}"
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """Its expressions of parameters by field name."""
+        """The expressions of parameters by field name."""
         fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}

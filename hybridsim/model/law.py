@@ -1,4 +1,4 @@
-"""A friction law: the force as a function of velocity, load and, where it remembers, of states of its own."""
+"""Friction laws: the force as a function of velocity, load and optional internal states."""
 
 from __future__ import annotations
 
@@ -21,48 +21,47 @@ FORCE = "force"
 
 @dataclass(frozen=True)
 class FrictionLaw(Declared):
-    """The friction force as a declaration, in one of two forms.
+    """A friction law, which is either set-valued or single-valued.
 
-    Set-valued, with a mode of its own for rest; v >= 0 is the magnitude of the relative velocity::
+    A set-valued law has a stick mode; v >= 0 is the magnitude of the relative velocity::
 
-        slip :  |f| = slip(v, N),   forward and backward alike unless ``slip_backward`` is given
+        slip :  |f| = slip(v, N),   the same in both directions unless ``slip_backward`` is set
         stick:  -stick_backward(N) <= f <= stick(N)
 
-    Single-valued, with states of its own or none; v is the relative velocity with its sign::
+    A single-valued law may have states z; v is the signed relative velocity::
 
         f = force(v, N, z),   z' = der(v, N, z)
 
     Parameters
     ----------
     name : str
-        What the law is called.
+        Name of the law.
     slip, stick : str or float, optional
-        Expressions of ``v`` (slip alone), ``N`` (normal load) and the law's own parameters.
+        Expressions of ``v`` (only in slip), ``N`` (normal load) and the parameters of the law.
     parameters : mapping of str to str, float or None, or sequence of str, optional
-        Name to default (a number or an expression of the others); a default of None, or a plain sequence of
-        names, makes them arguments that every contact has to give.
+        Default of each parameter, a number or an expression of other parameters. Without a default (None, or a plain
+        sequence of names) every contact must set the parameter.
     title, source : str, optional
-        What it is, and where it comes from.
+        Description and reference.
     slip_backward, stick_backward : str or float, optional
-        Where they differ from the forward ones; both are magnitudes.
+        Magnitudes in backward direction, if they differ from the forward ones.
     force : str or float, optional
         Expression of ``v``, ``N``, ``dN`` (rate of the load), parameters, states and definitions.
     states : sequence of State, optional
-        `State` objects; in a contact f the state z is called ``f_z``.
+        `State` objects; in a contact f the state z is named ``f_z``.
     definitions : mapping of str to str or float, optional
-        Named parts of the other expressions.
+        Named expressions that the other expressions use.
     modes : sequence of Mode, optional
-        With ``initial``, an automaton of the law: modes with guards, rates ``der`` of the states and, with
-        ``set``, a ``force`` of their own.
+        Modes of the law, with guards, rates ``der`` of the states and, in ``set``, the ``force``.
     initial : str, optional
         The mode at t0.
     copies : str, optional
-        Parameter that says how many copies of the law act in parallel, each with its own states and modes;
-        the force is the sum, the index of a copy is ``i`` = 1, 2, ...
+        Parameter with the number of copies of the law that act in parallel. Each copy has its own states and modes
+        and its index ``i`` = 1, 2, ...; the force is the sum.
     tables : sequence of LawTable, optional
-        Named functions of one argument, given by points.
+        Named functions of one argument, defined by points.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -74,8 +73,8 @@ class FrictionLaw(Declared):
     """
 
     name: str
-    # None where the law gives a force, and nowhere else; most readers have to do with set-valued laws alone
-    slip: Expression = None  # type: ignore[assignment]  # None in a law with memory alone, which nobody asks for it
+    # both are None in a single-valued law and set in a set-valued law
+    slip: Expression = None  # type: ignore[assignment]  # only read in set-valued laws
     stick: Expression = None  # type: ignore[assignment]  # likewise
     parameters: Mapping[str, Expression | None] = field(default_factory=FrozenMap)
     title: str = ""
@@ -98,7 +97,7 @@ class FrictionLaw(Declared):
             names = as_tuple(given)
             if not all(isinstance(name, str) for name in names):
                 raise self._fault(
-                    f"parameters is {given!r}", "give names, or a mapping from names to defaults"
+                    f"parameters is {given!r}", "use a list of names, or a dict of names and defaults"
                 )
             object.__setattr__(self, "parameters", dict.fromkeys(names))
         self._maps("parameters", "definitions")
@@ -110,19 +109,21 @@ class FrictionLaw(Declared):
         given_forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
         if self.force is None and len(given_forms) < 2:
             raise self._fault(
-                "it gives neither slip and stick nor a force",
-                "give slip and stick (magnitudes), or force (with its sign)",
+                "it has neither slip and stick nor force",
+                "set slip and stick (magnitudes), or force (with its sign)",
             )
         if self.force is not None and given_forms:
-            raise self._fault("it gives both slip or stick and a force", "give slip and stick, or force")
+            raise self._fault(
+                "it has force together with slip or stick", "set either slip and stick, or force"
+            )
 
     @property
     def is_set_valued(self) -> bool:
-        """Whether rest is a mode with a range of forces, to be solved for."""
+        """Whether the law has a stick mode with a range of forces."""
         return self.force is None
 
     def expressions(self) -> Iterator[tuple[str, Expression]]:
-        """Every expression of the law with the words for where it stands, defaults of parameters left out."""
+        """Yield every expression of the law, except defaults, with a description of its place."""
         for name in ("slip", "stick", "slip_backward", "stick_backward", "force"):
             if (value := getattr(self, name)) is not None:
                 yield name, value

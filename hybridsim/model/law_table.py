@@ -1,4 +1,4 @@
-"""A function of one argument given by points, between them a cubic that is monotone where the points are."""
+"""Functions of one argument defined by points, with monotone cubic interpolation."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from hybridsim.model.declared import Declared
 
 _SPEED = parse("v")
 Piece = tuple[float, float, float, float, float]
-"""Left end, and the coefficients of 1, d, d**2, d**3 with d the distance from it."""
+"""Left end of the piece, and the coefficients of 1, d, d**2, d**3, with d the distance from the left end."""
 
 
 @dataclass(frozen=True)
 class LawTable(Declared):
-    """Points of a law: ``values`` at increasing arguments ``at``; beyond the ends the end values hold.
+    """A table of a friction law: ``values`` at increasing arguments ``at``, constant beyond both ends.
 
-    Between the points a cubic with a continuous slope, monotone wherever the points are.
+    The interpolation is a monotone piecewise cubic with continuous slope.
 
     Parameters
     ----------
     name : str
-        What the function is called in the law's expressions.
+        Name of the function in the law's expressions.
     at : sequence of float
         Arguments (k,), increasing.
     values : sequence of float
-        Values (k,) at these.
+        Values (k,) at the arguments.
     over : str or float, optional
-        The argument, an expression of what the law knows; the speed if not given.
+        The argument, an expression of the names of the law; the default is the speed v.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     References
     ----------
@@ -53,17 +53,17 @@ class LawTable(Declared):
         self._expressions("over")
         if len(self.at) != len(self.values):
             raise self._fault(
-                f"at has {len(self.at)} numbers, and values has {len(self.values)}",
-                "give a value for each of at",
+                f"at has {len(self.at)} numbers, but values has {len(self.values)}",
+                "use one value for each number in at",
             )
         if len(self.at) < 2:
-            raise self._fault(f"{len(self.at)} points", "give at least two")
+            raise self._fault(f"it has {len(self.at)} points", "use at least two points")
         for first, second in zip(self.at, self.at[1:], strict=False):
             if not first < second:
-                raise self._fault(f"the argument {second:g} follows {first:g}", "let them increase")
+                raise self._fault(f"the argument {second:g} follows {first:g}", "sort the arguments")
 
     def value(self, argument: float) -> float:
-        """The function at one argument."""
+        """Return the value of the function at one argument."""
         if argument <= self.at[0]:
             return self.values[0]
         if argument >= self.at[-1]:
@@ -73,7 +73,7 @@ class LawTable(Declared):
         return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
 
     def pieces(self) -> list[Piece]:
-        """The cubics between the points, from left to right."""
+        """Return the cubics between the points, from left to right."""
         slopes, found = self._slopes(), []
         for k, x in enumerate(self.at[:-1]):
             h, first, last = self.at[k + 1] - x, slopes[k], slopes[k + 1]
@@ -90,7 +90,7 @@ class LawTable(Declared):
         return found
 
     def _slopes(self) -> list[float]:
-        """Weighted harmonic means of the chords' slopes; zero where these change their sign."""
+        """Return weighted harmonic means of the slopes of adjacent intervals, or zero at a sign change."""
         h = [b - a for a, b in zip(self.at, self.at[1:], strict=False)]
         chord = [(b - a) / w for a, b, w in zip(self.values, self.values[1:], h, strict=False)]
         if len(h) == 1:
@@ -105,11 +105,11 @@ class LawTable(Declared):
         return [first, *inner, last]
 
     def component(self, name: str, argument: Expression, from_zero: bool) -> Corner:
-        """The automaton of the pieces: it sets the variable `name`; neighbours agree where they meet.
+        """Return the automaton of the pieces, which sets the variable `name` and is continuous.
 
         Parameters
         ----------
-        from_zero : the argument is never negative, so that what lies below needs no piece.
+        from_zero : the argument is never negative, so no piece below zero is needed.
         """
         texts = []
         if not (from_zero and self.at[0] <= 0.0):
@@ -136,7 +136,7 @@ def _guard(name: str, text: str, argument: Expression, to: str) -> Guard:
 
 
 def _end_slope(h: float, other: float, chord: float, next_chord: float) -> float:
-    """Three-point slope at an end, cut so that the cubic stays monotone."""
+    """Return the three-point slope at an end, limited so that the cubic stays monotone."""
     slope = ((2.0 * h + other) * chord - h * next_chord) / (h + other)
     if slope * chord <= 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""A contact whose law gives the force itself: states that the law brings, and its automata, in the model's names."""
+"""Contacts with a single-valued friction law: its states and automata in the names of the model."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from hybridsim.model.quantities import State
 if TYPE_CHECKING:
     from hybridsim.model.contact import Contact
 
-# Each copy is a component and a state of its own; more belong into a mechanical system.
+# Each copy adds a component and states; for more copies use a MechanicalSystem.
 MOST_COPIES = 64
-SINGLE = "smooth"  # the mode of a law that declares none
+SINGLE = "smooth"  # name of the only mode of a law without declared modes
 
 
 @dataclass(frozen=True)
 class ContactState(State):
-    """A state that the law of a contact brings along; it is written with the contact, not among the states."""
+    """A state that the friction law of a contact adds; TOML files declare it with the contact."""
 
 
 def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State, ...]:
-    """The states of every copy, first all of the first."""
+    """Return the states of all copies, in the order of the copies."""
     found = []
     for index in _indices(contact, values):
         names = _names(contact, values, index)
         for state in contact.law.states:
             name = _own(contact, state.name, index)
-            own = name.removeprefix(contact.variable(""))  # z, or z3 of the third copy
+            own = name.removeprefix(contact.variable(""))  # z, or z3 in the third copy
             nominal = contact.nominal.get(own, contact.nominal.get(state.name, state.nominal))
             given = contact.start.get(own, contact.start.get(state.name))
             start = substitute(state.start, names) if given is None else given
@@ -44,7 +44,7 @@ def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State
 def components_of(
     contact: Contact, values: Mapping[str, Expression], loaded: tuple[Guard, ...]
 ) -> Iterator[Component]:
-    """The automaton of the law, or those of its copies and one that adds up their forces."""
+    """Yield the automaton of the law, or those of its copies and one that adds their forces."""
     law, name, parts = contact.law, contact.name, []
     for index in _indices(contact, values):
         names = _names(contact, values, index)
@@ -95,7 +95,7 @@ def _force(contact: Contact, names: Mapping[str, Expression]) -> Expression:
 
 
 def _names(contact: Contact, values: Mapping[str, Expression], index: int | None) -> dict[str, Expression]:
-    """What each of the law's names stands for in one copy."""
+    """Return the expressions for the names of the law in one copy."""
     law = contact.law
     names = {SPEED: contact.velocity, **values}
     if contact.opens and LOAD_RATE in names:
@@ -113,7 +113,7 @@ def _own(contact: Contact, name: str, index: int | None) -> str:
 
 
 def _indices(contact: Contact, values: Mapping[str, Expression]) -> list[int | None]:
-    """1, 2, ... for the copies; a single None where the law has no copies."""
+    """Return 1, 2, ... for the copies, or a single None for a law without copies."""
     law = contact.law
     if law.copies is None:
         return [None]
@@ -125,6 +125,6 @@ def _indices(contact: Contact, values: Mapping[str, Expression]) -> list[int | N
     if not 0 < count <= MOST_COPIES:
         raise contact.error(
             f"contact {contact.name}: the law '{law.name}' cannot have {law.copies} = {given.text} copies",
-            f"give a whole number from 1 to {MOST_COPIES}, written out: it decides how many states there are.",
+            f"write a whole number from 1 to {MOST_COPIES}, not an expression, because it sets the number of states",
         )
     return list(range(1, count + 1))

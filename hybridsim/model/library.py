@@ -1,4 +1,4 @@
-"""Models and laws by name or path: what comes with the package, and files of the user."""
+"""Load models and friction laws by name or path."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hybridsim.errors import ModelError, Place, UsageError, nearest
 from hybridsim.model.law import FrictionLaw
 from hybridsim.model.model import Model
 
-# A model of a thousand states takes some 100 kB; what is larger is no model.
+# Limit of the size of a model file; a model with a thousand states has about 100 kB.
 MAX_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
 class ModelInfo:
-    """What the list of packaged models says of each."""
+    """Name, title, source and path of a packaged model."""
 
     name: str
     title: str
@@ -29,12 +29,12 @@ class ModelInfo:
 
 @refusing
 def load(name_or_path: str | os.PathLike[str]) -> Model:
-    """Load a model by the name of one that comes with the package, or by the path of a ``.toml`` file.
+    """Load a packaged model by name, or a model file by its path.
 
     Parameters
     ----------
     name_or_path : str or path
-        A name of `list_models`, or the path of a file, ending in ``.toml``.
+        A name from `list_models`, or the path of a ``.toml`` file.
 
     Returns
     -------
@@ -44,8 +44,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     Raises
     ------
     ModelError
-        For no such model (the nearest names are listed) or file; for a file that is empty, too large, no text
-        or no TOML; or for all faults of a model in one.
+        For an unknown model (similar names are listed) or a missing file, for a file that is empty, too large or not
+        TOML, and for an invalid model, with all its errors.
 
     Examples
     --------
@@ -55,12 +55,12 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     """
     given: object = name_or_path
     if not isinstance(given, str | os.PathLike):
-        remedy = "give a Model, a name or a path"
+        remedy = "use a Model, a name or a path"
         if hasattr(given, "to_model"):
-            remedy = "hs.simulate takes it as it is; here give its ordinary model, system.to_model()"
+            remedy = "pass the system to hs.simulate directly, or use its model, system.to_model()"
         elif callable(given):
-            remedy = "a function f(t, x) of the rates makes a model with names: hs.Model(states={'x': 1.0}, flow=f)"
-        raise UsageError(f"the model is {given!r}", remedy=remedy)
+            remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
+        raise UsageError(f"The model is {given!r}", remedy=remedy)
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)
@@ -71,18 +71,18 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
             raise ModelError(
                 f"there is no model '{text}'",
                 remedy=nearest(text, names, kind="models")
-                + " A file of yours is given by its path, ending in .toml.",
+                + "; for your own file pass its path, ending in .toml",
             )
     return Model.from_toml(read_text(path), str(path))
 
 
 def list_models() -> tuple[ModelInfo, ...]:
-    """List the models that come with the package, by name.
+    """Return the packaged models, sorted by name.
 
     Returns
     -------
     tuple of ModelInfo
-        Of each model its ``name``, ``title``, ``source`` and ``path``.
+        The ``name``, ``title``, ``source`` and ``path`` of each model.
 
     Examples
     --------
@@ -98,13 +98,13 @@ def list_models() -> tuple[ModelInfo, ...]:
 
 
 def list_laws() -> tuple[str, ...]:
-    """Names of the friction laws that come with the package."""
+    """Return the names of the packaged friction laws."""
     return tuple(path.stem for path in sorted((models_folder() / "laws").glob("*.toml")))
 
 
 @refusing
 def load_law(name: str) -> FrictionLaw:
-    """Load a friction law of the package by name, ready for a `Contact`.
+    """Load a packaged friction law by name, for use in a `Contact`.
 
     Parameters
     ----------
@@ -119,9 +119,9 @@ def load_law(name: str) -> FrictionLaw:
     Raises
     ------
     ModelError
-        For an unknown name, with the nearest ones.
+        For an unknown name; the message lists similar names.
     UsageError
-        For what is no text.
+        If the name is not a string.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def load_law(name: str) -> FrictionLaw:
     True
     """
     if not isinstance(name, str):
-        raise UsageError(f"the law is {name!r}", remedy="give the name of a law")
+        raise UsageError(f"The law is {name!r}", remedy="use the name of a law (a string)")
     return _packaged_law(name)
 
 
@@ -143,7 +143,7 @@ def _packaged_law(name: str) -> FrictionLaw:
         known = nearest(name, list_laws(), kind="laws")
         raise ModelError(
             f"there is no law '{name}'",
-            remedy=f"{known} A law of your own is given as the FrictionLaw itself",
+            remedy=f"{known}; for your own law pass the FrictionLaw object",
         )
     path = models_folder() / "laws" / f"{name}.toml"
     root = open_text(read_text(path), str(path), "the law")
@@ -155,59 +155,58 @@ def _packaged_law(name: str) -> FrictionLaw:
 
 
 def models_folder() -> Path:
-    """Where the packaged models are: inside the wheel, or beside the package in a checkout."""
+    """Return the folder of the packaged models: inside the package, or next to it in a checkout."""
     package = Path(__file__).resolve().parent.parent
     inside = package / "models"
     return inside if inside.is_dir() else package.parent / "models"
 
 
 def read_text(path: Path) -> str:
-    """Text of a model file; ModelError naming what is wrong with the file."""
+    """Return the text of a model file, or raise ModelError with the reason."""
     place = Place(str(path))
     try:
         if path.is_dir():
-            raise ModelError("this is a folder", place=place, remedy="give the .toml file in it.")
-        if (
-            path.exists() and not path.is_file() and str(path) != "/dev/stdin"
-        ):  # it may have no end, or no beginning
-            raise ModelError("this is no regular file", place=place, remedy="give a .toml file.")
+            raise ModelError("this is a folder", place=place, remedy="use the .toml file in it")
+        # a device or a pipe may be endless
+        if path.exists() and not path.is_file() and str(path) != "/dev/stdin":
+            raise ModelError("this is not a regular file", place=place, remedy="use a .toml file")
         size = path.stat().st_size
         if size > MAX_BYTES:
-            remedy = "put tables into CSV files beside the model."
+            remedy = "move tables to CSV files in the same folder"
             raise ModelError(
-                f"the file has {size} bytes, {MAX_BYTES} are allowed", place=place, remedy=remedy
+                f"the file has {size} bytes, but at most {MAX_BYTES} are allowed", place=place, remedy=remedy
             )
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise ModelError("there is no such file", place=place, remedy=_beside(path)) from None
+        raise ModelError("the file does not exist", place=place, remedy=_beside(path)) from None
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
         raise ModelError(
-            f"the file cannot be read: {reason}", place=place, remedy="give a readable file."
+            f"the file cannot be read: {reason}", place=place, remedy="use a readable file"
         ) from None
     if len(data) > MAX_BYTES:
-        raise ModelError(f"the file has over {MAX_BYTES} bytes", place=place, remedy="give a model file.")
+        raise ModelError(f"the file has more than {MAX_BYTES} bytes", place=place, remedy="use a model file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         line = data.count(b"\n", 0, fault.start) + 1
         raise ModelError(
-            f"this is no text: byte {data[fault.start]:#04x} at offset {fault.start} is not UTF-8",
+            f"this is not a text file: byte {data[fault.start]:#04x} at offset {fault.start} is not UTF-8",
             place=Place(str(path), line),
-            remedy="a model is a TOML file in UTF-8.",
+            remedy="write the model as a TOML file in UTF-8",
         ) from None
 
 
 def _beside(path: Path) -> str:
-    """Near names in the same folder, else the names of the packaged models."""
+    """Return similar file names in the same folder, or the names of the packaged models."""
     packaged = [known.stem for known in _model_files()]
     try:
         beside = [other.name for other in path.parent.glob("*.toml")]
     except OSError:
         beside = []
     near = nearest(path.name, beside)
-    return near if "did you mean" in near else "models that go by name: " + ", ".join(packaged) + "."
+    return near if "did you mean" in near else "packaged models: " + ", ".join(packaged)
 
 
 def _model_files() -> list[Path]:

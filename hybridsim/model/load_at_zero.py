@@ -1,4 +1,4 @@
-"""A contact whose load is all but zero where its law divides by it, in words, for a run whose steps fail there."""
+"""Message for a run that fails because a friction law divides by a load near zero."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.model.contact import Contact
     from hybridsim.model.model import Model
 
-_FADED = 1e-6  # of the load at the start: a law whose rates grow as its inverse has no steps left by then
+_FADED = 1e-6  # fraction of the initial load below which the steps of such a law are too small to continue
 
 
 def load_at_zero(
@@ -25,9 +25,9 @@ def load_at_zero(
     start: tuple[float, Sequence[float]],
     now: tuple[float, Sequence[float]],
 ) -> str:
-    """What to do about the first such contact, by times and states at the start and now; or empty.
+    """Return the remedy for the first such contact, from time and state at the start and now, or "".
 
-    A load that is no expression of parameters, states and time is named where a state of its law is no number.
+    A load that depends on other names than parameters, states and time is reported if a state of its law is not finite.
     """
     if model.flow is not None:
         return ""
@@ -41,19 +41,19 @@ def load_at_zero(
             own = [k for k, name in enumerate(names) if name.startswith(contact.variable(""))]
             is_zero = not all(math.isfinite(now[1][k]) for k in own)
         else:
-            before, here = map(abs, loads)  # type: ignore[arg-type]  # none is None
+            before, here = map(abs, loads)  # type: ignore[arg-type]  # no load is None here
             is_zero = here <= _FADED * before
         if is_zero:
             return (
-                f"the load of contact {contact.name}, {contact.normal.text}, comes to zero, and the law "
-                f"'{contact.law.name}' divides by it: keep the load away from zero, as in max(load, least), or "
-                "choose a law without states"
+                f"the load '{contact.normal.text}' of contact {contact.name} reaches zero, but the law "
+                f"'{contact.law.name}' divides by it: keep the load positive, for example by max(load, minimum), or "
+                "use a law without states"
             )
     return ""
 
 
 def _divides_by_load(contact: Contact) -> bool:
-    """Whether the load stands in a denominator of a law with states, be it by its definitions."""
+    """Return whether a law with states divides by the load, directly or through definitions."""
     law, loaded = contact.law, {NORMAL}
     for _ in law.definitions:
         loaded |= {name for name, expr in law.definitions.items() if expr.names & loaded}

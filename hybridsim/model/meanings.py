@@ -1,4 +1,4 @@
-"""What the names of a model stand for: what moves, what waits for a force that a mode solves for, the tree behind."""
+"""The meaning of names in a model: definitions, varying quantities, and quantities that depend on forces."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 Family = frozenset[object]
-"""Stands for an expression, its multiples by numbers and their negatives."""
-_MOST_PARTS = 2_000  # of a tree with its definitions written out; a larger one is compared as it was written
+"""A key that an expression shares with all its nonzero multiples."""
+_MOST_PARTS = 2_000  # largest tree with inserted definitions; larger ones are compared as written
 
 
 class Meanings:
-    """Reads one model."""
+    """Definitions, varying names and force-dependent names of one model."""
 
     def __init__(self, model: Model) -> None:
         trees = {name: expr.tree for name, expr in model.definitions}
@@ -38,7 +38,7 @@ class Meanings:
         self.definitions = {name: self.with_single_signs(tree) for name, tree in trees.items()}
 
     def with_single_signs(self, node: ast.expr) -> ast.expr:
-        """A tree in which the sign of a product of what moves is the product of the signs; the same where none is."""
+        """Return a tree in which the sign of a varying product is the product of the signs."""
         if not any(isinstance(part, ast.Name) and part.id == "sign" for part in ast.walk(node)):
             return node
         match rebuilt(node, self.with_single_signs):
@@ -52,15 +52,15 @@ class Meanings:
                 return made
 
     def lookup(self, name: str) -> ast.expr | None:
-        """The tree of a definition."""
+        """Return the tree of a definition, or None."""
         return self.definitions.get(name)
 
     def moves(self, node: ast.expr) -> bool:
-        """Whether a value can change while no mode does."""
+        """Return whether a value can change while all modes stay active."""
         return not names_of(node).isdisjoint(self.moving)
 
     def reached(self, trees: Iterable[ast.expr]) -> set[str]:
-        """The definitions that trees depend on."""
+        """Return the definitions that trees depend on."""
         open_ = {name for tree in trees for name in names_of(tree)} & self.definitions.keys()
         found: set[str] = set()
         while open_:
@@ -70,14 +70,14 @@ class Meanings:
         return found
 
     def depended_on(self, names: Iterable[str]) -> set[str]:
-        """Names, and all that the definitions among them depend on."""
+        """Return the names, and all names that the definitions among them depend on."""
         trees: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
         return set().union(
             *map(names_of, trees), *(names_of(self.definitions[name]) for name in self.reached(trees))
         )
 
     def written_out(self, node: ast.expr) -> ast.expr:
-        """A tree with its definitions put in."""
+        """Return a tree with its definitions inserted, unless the result is too large."""
         inner = node
         while names_of(inner) & self.definitions.keys():
             inner = with_names(inner, self.definitions)
@@ -86,7 +86,7 @@ class Meanings:
         return inner
 
     def family(self, node: ast.expr) -> tuple[Family, int]:
-        """The family of an expression and its sign in it; (empty, -1, 0 or 1) for a number."""
+        """Return the family of an expression and its sign in it; a number has the empty family."""
         p: Polynomial = polynomial(self.written_out(node))
         number = constant_of(p)
         if number is not None:
@@ -95,7 +95,7 @@ class Meanings:
         return frozenset(found), sign
 
     def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
-        """The signs that a mode implies while it lasts, by family: its guards', and 0 for a surface that it holds."""
+        """Return the signs by family that hold in a mode: those of its guards, and 0 for a held surface."""
         surface = component.surface
         known: dict[Family, int] = {}
         for guard in mode.guards:
@@ -108,7 +108,7 @@ class Meanings:
 
 
 def _reaching(behind: Mapping[str, Iterable[ast.expr]], given: set[str]) -> set[str]:
-    """The given names and all that depend on one of them."""
+    """Return the given names and all names that depend on one of them."""
     found, size = set(given), -1
     while len(found) > size:
         size = len(found)

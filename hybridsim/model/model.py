@@ -1,4 +1,4 @@
-"""What a system is: states, parameters, automata, contacts, inputs, events and outputs, all frozen."""
+"""The class Model: states, parameters, automata, contacts, inputs, events and outputs, all immutable."""
 
 from __future__ import annotations
 
@@ -51,46 +51,45 @@ _INTERNAL = {
 
 @dataclass(frozen=True)
 class Model(Declared):
-    """A piecewise-smooth system.
+    """A piecewise-smooth (hybrid) dynamical system.
 
     Parameters
     ----------
     name : str
-        What the model is called.
+        Name of the model.
     states : sequence of State, or mapping of str to float
         Continuous states with their rates.
     parameters : sequence of Parameter, or mapping of str to str or float, optional
-        `Parameter` objects, or a dict of name to number or expression.
+        `Parameter` objects, or a dict of names and numbers or expressions.
     discrete : sequence of Discrete, optional
-        States changed by resets and ticks only.
+        States that change only by resets.
     components, contacts : sequence of Component, sequence of Contact, optional
         The automata; their modes together are the discrete state z.
     inputs, monitors, schedules : sequence, optional
-        Of `Input`, known signals; of `Monitor`, events that change no mode; of `Schedule`, events at known
-        times.
+        `Input` objects (known signals), `Monitor` objects (events that change no mode) and `Schedule` objects
+        (events at known times).
     outputs : sequence of Output, or mapping of str to str or float, optional
-        `Output` objects, or a dict of name to expression.
+        `Output` objects, or a dict of names and expressions.
     definitions : mapping of str to str or float, or sequence of pairs, optional
-        Named intermediate expressions, a dict or pairs; they may use one another and what components set.
+        Named intermediate expressions, as a dict or as pairs. They may use each other and the variables of components.
     title, source, description, look : str, optional
-        What it is, where it comes from, more, and what to look at.
+        Title, reference, longer description, and a hint what to look at.
     duration : str or float, optional
-        How long a run shows what there is to see, in the unit of t: an expression of parameters, the default
-        of ``hybridsim run`` and of comparisons. None leaves it to them.
+        Default length of runs and comparisons of the command line, in the unit of t; an expression of parameters.
     path : str, optional
-        The file it was read from.
+        Path of the file that the model was read from.
     flow : callable, optional
-        A Python function (t, x, p) -> the n rates (a tuple or an array), instead of rates by expressions. p
-        has the parameters as ``p.g`` and ``p[0]``. The states are then a dict of name to start value, or have
-        der 0; ``flow`` of a `Mode` replaces it there; guards, monitors, outputs, conditions and resets are
-        functions (t, x, p) -> a number, or a constant. Contacts, inputs, definitions and discrete states need
+        A Python function (t, x, p) that returns the n rates (a tuple or an array), instead of expressions. The
+        parameters are ``p.g`` or ``p[0]``. The states are then a dict of names and start values, or have der 0.
+        ``flow`` of a `Mode` replaces it in that mode. Guards, monitors, outputs, conditions and resets are functions
+        (t, x, p) that return a number, or constants. Contacts, inputs, definitions and discrete states need
         expressions.
     surfaces : sequence of SwitchingSurface, optional
-        Switching surfaces, along which the motion may slide; automata as well.
+        Switching surfaces, along which the motion may slide.
     impacts : sequence of Impact, optional
-        Unilateral contacts, whose gaps cannot become negative; automata as well.
+        Unilateral contacts, whose gaps cannot become negative.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -137,13 +136,13 @@ class Model(Declared):
         try:
             definitions = tuple((name, parse(text)) for name, text in pairs)
         except (TypeError, ValueError):
-            remedy = "give a mapping from names to expressions, or pairs of the two"
+            remedy = "use a dict of names and expressions, or a list of pairs"
             raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
         object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
 
     def _with_those_of_laws(self) -> Iterable[State]:
-        """The states, those that laws of contacts bring among them, as the contacts have them now."""
+        """Yield the states, including those that the laws of contacts add, with their current values."""
         brought: dict[str, State] = {}
         for contact in self.contacts:
             try:
@@ -162,10 +161,8 @@ class Model(Declared):
 
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:
-            remedy = (
-                "give hs.State(name, start, der) objects, or the rates of all as a function flow(t, x, p)"
-            )
-            raise self._fault(f"states gives {name} no rate", remedy)
+            remedy = "use hs.State(name, start, der) objects, or define all rates by a function flow(t, x, p)"
+            raise self._fault(f"state {name} has no rate", remedy)
         return State(name, start, parse(0))
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
@@ -174,7 +171,7 @@ class Model(Declared):
             object.__setattr__(self, field, tuple(kind(name, value) for name, value in given.items()))
 
     def __eq__(self, other: object) -> bool:
-        """Equal when everything declared is; where it was read from does not count."""
+        """Compare all declared parts; the place and the path of the file are ignored."""
         if not isinstance(other, Model):
             return NotImplemented
         return _content(self) == _content(other)
@@ -193,12 +190,12 @@ class Model(Declared):
         return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
 
     def with_(self, /, **changes: Expression | str | float) -> Model:
-        """A copy with parameter values changed: ``model.with_(N=40, omega="0.7*sqrt(k/m)")``.
+        """Return a copy with changed parameter values: ``model.with_(N=40, omega="0.7*sqrt(k/m)")``.
 
         Parameters
         ----------
         **changes : str or float
-            Parameter to number or expression of other parameters.
+            New values of parameters, numbers or expressions of other parameters.
 
         Returns
         -------
@@ -208,9 +205,9 @@ class Model(Declared):
         Raises
         ------
         UsageError
-            For a name that is no parameter.
+            For an unknown parameter.
         ExpressionError
-            For a value that is no expression.
+            For a value that is not a valid expression.
         """
         names = [parameter.name for parameter in self.parameters]
         _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
@@ -220,23 +217,23 @@ class Model(Declared):
         return self._valued(parameters=tuple(changed))
 
     def remedy_for_parameter(self, name: str, others: tuple[str, ...] = ()) -> str:
-        """What to do where a name is no parameter: near names, or how an argument of a law becomes a parameter."""
+        """Return the remedy for an unknown parameter: similar names, or the argument of a law to change."""
         names = [parameter.name for parameter in self.parameters]
         for contact in self.contacts:
             if name not in contact.law.parameters:
                 continue
             given = contact.arguments.get(name, contact.law.parameters[name])
             if given is not None and given.text in names:
-                return f"contact {contact.name} has {name} = {given.text}: change {given.text}."
-            text = "its own default" if given is None else given.text
+                return f"contact {contact.name} has {name} = {given.text}; change {given.text} instead"
+            text = "its default" if given is None else given.text
             return (
-                f"{name} is an argument of the law of contact {contact.name}, written there as {text}: name a "
-                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}.'
+                f"{name} is an argument of the law of contact {contact.name} with the value {text}; declare a "
+                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
             )
         return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
-        """A copy with initial values of states and discrete states changed: ``model.with_start(x=0.1)``."""
+        """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
         _known(changes, names, "state", self.name)
         contacts = tuple(self._started(contact, changes) for contact in self.contacts)
@@ -250,12 +247,12 @@ class Model(Declared):
         return self._valued(states=changed(self.states), discrete=changed(self.discrete), contacts=contacts)
 
     def with_values_of(self, other: Model) -> Model:
-        """A copy with the values of a model that has the same parameters, states and discrete states."""
+        """Return a copy with the values of another model with the same parameters and states."""
         states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
         return self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
 
     def _valued(self, **parts: Any) -> Model:
-        """A copy that differs in values alone: it shares what does not depend on them, and is not taken apart again."""
+        """Return a copy that differs only in values and shares everything that does not depend on them."""
         copy: Model = object.__new__(type(self))
         vars(copy).update(vars(self), **parts, _common=self._common)
         vars(copy).pop("_values", None)
@@ -266,13 +263,13 @@ class Model(Declared):
         return {}
 
     def once(self, name: str, make: Callable[[], Any]) -> Any:
-        """What follows from the declaration whatever its values are, made once for all copies with other values."""
+        """Return a result that depends only on the structure; it is computed once for all copies."""
         if name not in self._common:
             self._common[name] = make()
         return self._common[name]
 
     def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
-        """The contact with new initial values of states that its law brings."""
+        """Return the contact with new initial values for the states of its law."""
         own = {name for name in changes if name.startswith(contact.variable(""))}
         if not (own and contact.law.states):
             return contact
@@ -284,25 +281,25 @@ class Model(Declared):
         return contact.states(self._never_negative_names(), partial(self._load_rate, contact))
 
     def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
-        """A copy in which every contact has a single-valued force, for a look at what that costs.
+        """Return a copy in which every friction force is single-valued, to compare regularised laws.
 
         ::
 
             tanh     f = slip(|v|) tanh(v/v0)
             arctan   f = slip(|v|) (2/pi) atan(v/v0)
-            karnopp  in the band |v| < v0 the body is stopped and f is what holds it, up to the limit of stick
+            karnopp  in the band |v| < v0 the body is stopped and f is the holding force, up to the stick limit
 
-        With tanh and arctan there is no stick: a loaded body creeps at a speed of the order of v0, the modes are
-        gone and the problem gets stiff as v0 falls. The error falls with v0 too: at first order, but for
-        logarithms, with tanh; with v0**(2/3) with arctan, whose tails blunt each release; with karnopp at first
-        order or better where mu_s = mu_k, with v0**(1/2) where mu_s > mu_k (the time to leave the band).
+        With tanh and arctan there is no stick: a loaded body creeps at a speed of the order of v0. There are no
+        modes, and the problem becomes stiff for small v0. The error decreases with v0: at first order, up to
+        logarithms, with tanh; as v0**(2/3) with arctan, whose tails delay each release; with karnopp at first
+        order or better if mu_s = mu_k, and as v0**(1/2) if mu_s > mu_k (the time to leave the band).
 
         Parameters
         ----------
         kind : str
             "tanh", "arctan" or "karnopp".
         v0 : str or float
-            Width, a velocity above zero in the unit of the relative velocity; a parameter ``v0`` of the copy.
+            Width, a positive velocity in the unit of the relative velocity. It becomes a parameter ``v0`` of the copy.
 
         Returns
         -------
@@ -312,8 +309,8 @@ class Model(Declared):
         Raises
         ------
         UsageError
-            For a kind that does not exist, a model without contacts, and what a kind cannot stand for: static
-            friction above slip(0) with tanh and arctan, contacts that act on each other with karnopp.
+            For an unknown kind, for a model without contacts, for static friction above slip(0) with tanh or arctan,
+            and for contacts that act on each other with karnopp.
 
         References
         ----------
@@ -324,7 +321,7 @@ class Model(Declared):
         return regularized(self, kind, v0)
 
     def parameter_values(self) -> dict[str, float]:
-        """Numbers of all parameters; a circle among them, or a value that is not finite, is an error."""
+        """Return the values of all parameters; cyclic definitions and infinite values raise an error."""
         return dict(self._values)
 
     @cached_property
@@ -332,19 +329,19 @@ class Model(Declared):
         return resolve({parameter.name: parameter.value for parameter in self.parameters})
 
     def start_values(self) -> dict[str, float]:
-        """Initial values of the states at the parameters' values."""
+        """Return the initial values of the states for the current parameters."""
         return {state.name: evaluate(state.start, self._values) for state in self.states}
 
     def discrete_values(self) -> dict[str, float]:
-        """Initial values of the discrete states at the parameters' values."""
+        """Return the initial values of the discrete states for the current parameters."""
         return {part.name: evaluate(part.start, self._values) for part in self.discrete}
 
     def duration_value(self) -> float | None:
-        """The model's own duration at the parameters' values; None where it declares none."""
+        """Return the declared duration for the current parameters, or None."""
         return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
-        """All automata: the contacts expanded, surfaces, impacts, components, in order of declaration; corners last."""
+        """Return all automata: of contacts, surfaces, impacts and components in this order, corners last."""
         components: tuple[Component, ...] = self.once("components", self._components)
         return components
 
@@ -356,16 +353,16 @@ class Model(Declared):
         return tuple(sorted(parts, key=lambda part: isinstance(part, Corner)))
 
     def components_of(self, contact: Contact) -> tuple[Component, ...]:
-        """The automata that one of its contacts becomes."""
+        """Return the automata of one contact."""
         return contact.components(self._never_negative_names(), partial(self._load_rate, contact))
 
     def constant_names(self) -> frozenset[str]:
-        """Names that cannot change during a run: parameters, and definitions over these alone."""
+        """Return the names that are constant during a run: parameters and definitions of parameters."""
         names: frozenset[str] = self.once("constants", self._constant_names)
         return names
 
     def _never_negative_names(self) -> frozenset[str]:
-        """Names that are constant, or normal forces that impacts see to: a load of these needs no guard."""
+        """Return constant names and normal forces of impacts: a load of these needs no guard."""
         return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:
@@ -375,14 +372,14 @@ class Model(Declared):
         return frozenset(constants)
 
     def variables(self) -> dict[str, Component]:
-        """Variables that components set (contact forces among them), each with its component."""
+        """Return the variables that components set, contact forces included, each with its component."""
         return {name: component for component in self.all_components() for name in component.variables}
 
     def structure(self) -> str:
-        """Canonical text of all that generated code depends on.
+        """Return the canonical text of everything that generated code depends on.
 
-        Parameter values, initial values, units, titles and the numbers of tables are not in it, so models
-        that differ only in these share their code.
+        It excludes parameter values, initial values, units, titles and the numbers of tables, so that models that
+        differ only in these share their code.
         """
         from hybridsim.model.structure import structure
 
@@ -391,11 +388,11 @@ class Model(Declared):
 
     @property
     def is_known_to_be_sound(self) -> bool:
-        """Whether a check of this model, or of a copy with other values, found no fault but in values."""
+        """Whether this model, or a copy with other values, has passed all checks except those of values."""
         return "is sound" in self._common
 
     def validate(self) -> Model:
-        """See to it that the declaration holds together; returns the model itself.
+        """Check the declaration and return the model itself.
 
         Returns
         -------
@@ -405,7 +402,7 @@ class Model(Declared):
         Raises
         ------
         ModelError
-            With all faults in ``errors``.
+            With all errors in ``errors``.
         """
         from hybridsim.model.validate import find_errors
 
@@ -415,7 +412,7 @@ class Model(Declared):
         return self
 
     def to_toml(self) -> str:
-        """The model as a TOML text that stands on its own: laws and tables are written into it.
+        """Return the model as TOML text, which includes its laws and tables.
 
         Returns
         -------
@@ -425,24 +422,26 @@ class Model(Declared):
         Raises
         ------
         UsageError
-            For a model of Python functions: a text cannot hold them.
+            For a model with Python functions, which cannot be written as text.
         """
         from hybridsim.model.toml_write import write_model
 
         if self.flow is not None:
             raise UsageError(
-                f"model {self.name} is made of Python functions, which cannot be written to TOML",
-                remedy="write its rates, guards and resets as expressions, or keep it as a Python file",
+                f"model '{self.name}' contains Python functions, which cannot be written to TOML",
+                remedy="write its rates, guards and resets as expressions, or keep the model as a Python file",
             )
         return write_model(self)
 
     @classmethod
     def from_toml(cls, text: str, path: str | None = None) -> Model:
-        """Read and validate a model from TOML text; ``path`` names the file and finds its tables."""
+        """Read and validate a model from TOML text; table files are searched in the folder of ``path``."""
         from hybridsim.model.toml_read import read_model
 
         if not isinstance(text, str):
-            raise UsageError(f"the model's text is {text!r}", remedy="give TOML, or load a file by its path")
+            raise UsageError(
+                f"The text of the model is {text!r}", remedy="pass TOML text, or use hs.load for a file"
+            )
         if path is not None:
             path = path_text(path)
         return read_model(text, path)
@@ -458,7 +457,7 @@ def _content(model: Model) -> tuple[object, ...]:
 
 
 def _given(changes: Mapping[str, Any], name: str) -> Expression:
-    """A changed value; where it is no expression, that is said of its name."""
+    """Return a changed value as an expression; an error names the changed quantity."""
     try:
         return parse(changes[name])
     except ExpressionError as error:
@@ -477,7 +476,7 @@ def _known(
     allowed = as_tuple(names)
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
-            raise UsageError(f"{kind} {name} is {value!r}", remedy="give a number or an expression")
+            raise UsageError(f"{kind} {name} is {value!r}", remedy="use a number or an expression")
         if name not in allowed:
             raise UsageError(
                 f"the model '{model}' has no {kind} '{name}'",

@@ -1,4 +1,4 @@
-"""An event that changes no mode: it records, resets or ends the run where a scalar changes its side."""
+"""Monitors, events that change no mode: they record, reset or end the run at a zero of a scalar."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ ACTIONS = ("record", "terminate", "reset")
 
 @dataclass(frozen=True)
 class Monitor(Declared):
-    """Fires where ``expr`` leaves its side of zero over (t0, t1], whatever the action; a zero at t0 does not fire.
+    """An event at each zero crossing of ``expr`` in (t0, t1]; a zero at t0 does not count.
 
-    So it fires where its value changes its sign, or comes to zero and stays there, as a velocity does at a stop.
+    It fires when the value changes its sign, and when it reaches zero and remains zero, like a velocity at a stop.
 
     Parameters
     ----------
     name : str
-        What its events are called.
+        Name of the monitor and its events.
     expr : str or float
-        What is watched.
+        The monitored scalar.
     direction : str, optional
         "up" (from below zero), "down" (from above) or "both".
     action : str, optional
         "record", "terminate", or "reset" with ``reset`` evaluated at x-.
     reset : mapping of str to str or float, optional
-        State or discrete state to the expression that gives its new value, or to ``"+= amount"``, which adds:
-        amounts of one instant are summed in any order.
+        New value of each changed state or discrete state, as an expression, or ``"+= amount"``. Amounts added at
+        the same instant are summed.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The primitives of expressions that are not smooth, and what became of each where a model uses it."""
+"""Non-smooth primitives in expressions (abs, min, max, sign, conditionals) and their treatment."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from hybridsim.expr import Expression
     from hybridsim.model.model import Model
 
-# what became of a primitive
+# the treatments of a primitive, see Primitive.became
 COMPONENT, SURFACE, MODE, KEPT, POWER, TIMED = "component", "surface", "mode", "kept", "power", "signal"
-JUMPS = "it jumps, as far as its form shows"  # how the reason begins to keep a primitive whose sides differ
+JUMPS = "it jumps, judging by its form"  # start of the remark on a kept primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
 _ZERO = ast.Constant(0)
-_HOLDS = {  # whether a comparison holds where its left side less its right one is positive, zero, negative
+_HOLDS = {  # truth of a comparison for a positive, zero and negative difference left - right
     ast.Gt: (True, False, False),
     ast.GtE: (True, True, False),
     ast.Lt: (False, False, True),
@@ -33,17 +33,17 @@ _HOLDS = {  # whether a comparison holds where its left side less its right one 
 
 @dataclass(frozen=True)
 class Primitive:
-    """One primitive that is not smooth and depends on what moves.
+    """A non-smooth primitive whose argument varies, and its treatment.
 
     Parameters
     ----------
-    text : as written, or as a law reads in its contact.
+    text : source text, for a friction law with the names of its contact.
     where : the rates, guards, definitions and variables that use it.
-    became : "component" (it switches like a component of two modes), "surface" (it jumps, and is the sign of a
-        switching surface or, in time, of a component), "mode" (the modes of a component imply its side), "kept"
-        (integrated as it stands), "power" (a fractional power, which has no series at zero), "signal" (time alone
-        decides on it, at instants that are known beforehand).
-    remark : the component, the reason, or what changes its sign in time.
+    became : "component" (a corner, replaced by a component with two modes), "surface" (a jump, replaced by a switching
+        surface or, for a jump in time, by a component), "mode" (its side follows from the modes of a component), "kept"
+        (not replaced), "power" (a fractional power, which has no Taylor series at zero), "signal" (it depends on time
+        alone and switches at known times).
+    remark : the component, the reason, or the expression whose zeros in time switch it.
     """
 
     text: str
@@ -54,22 +54,22 @@ class Primitive:
 
 
 def uses_primitives(model: Model) -> bool:
-    """Whether anything that is integrated or watched may have a corner or a jump, by a look at the words."""
+    """Return whether an integrated or monitored expression contains a non-smooth primitive."""
     return any(_WORD.search(expr.text) for expr in _expressions(model))
 
 
 def uses_sign(model: Model) -> bool:
-    """Whether anything that is integrated or watched has a sign in it."""
+    """Return whether an integrated or monitored expression contains a sign."""
     return any("sign" in expr.text for expr in _expressions(model))
 
 
 def uses_conditions(model: Model) -> bool:
-    """Whether anything that is integrated or watched has a condition in it."""
+    """Return whether an integrated or monitored expression contains a condition."""
     return any(" if " in expr.text for expr in _expressions(model))
 
 
 def has_word(expr: Expression) -> bool:
-    """Whether an expression itself may have a corner or a jump."""
+    """Return whether the expression contains a non-smooth primitive, without its definitions."""
     return bool(_WORD.search(expr.text))
 
 
@@ -91,7 +91,7 @@ def _expressions(model: Model) -> Iterator[Expression]:
 
 
 def limited(node: ast.expr, meanings: Meanings) -> Iterator[ast.expr]:
-    """What stands in the parts of a tree that have no value beyond some border: in roots, logarithms, powers."""
+    """Yield the arguments of functions with a limited domain: roots, logarithms and powers."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _LIMITED:
@@ -105,7 +105,7 @@ def limited(node: ast.expr, meanings: Meanings) -> Iterator[ast.expr]:
 
 
 def roots_in(expr: Expression, meanings: Meanings) -> Iterator[tuple[ast.expr, ast.expr, str]]:
-    """The roots and fractional powers of what moves in an expression: each, its base, and its exponent as text."""
+    """Yield the roots and fractional powers of varying bases, each with its base and its exponent as text."""
     for part in ast.walk(meanings.written_out(expr.tree)):
         match part:
             case ast.Call(func=ast.Name(id="sqrt"), args=[base]) if meanings.moves(base):
@@ -116,13 +116,13 @@ def roots_in(expr: Expression, meanings: Meanings) -> Iterator[tuple[ast.expr, a
 
 
 def is_whole(exponent: ast.expr, meanings: Meanings) -> bool:
-    """Whether an exponent is a whole number whatever the parameters are."""
+    """Return whether an exponent is an integer for all values of the parameters."""
     value = number_of(exponent, {}, meanings.lookup)
     return value is not None and value == round(value)
 
 
 def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanings) -> bool:
-    """Whether the form of an expression shows that it stays above zero: 1 + v**2, an exponential."""
+    """Return whether the form of an expression shows that it is positive, as in 1 + v**2 or exp(v)."""
     match node:
         case ast.Name(id=name) if (tree := meanings.lookup(name)) is not None:
             return is_clear_of_zero(tree, numbers, meanings)
@@ -140,11 +140,11 @@ def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanin
 
 
 Sides = tuple[ast.expr, ast.expr, ast.expr, ast.expr]
-"""Argument; the value where it is positive, negative, zero."""
+"""The argument of a primitive, and its values for positive, negative and zero argument."""
 
 
 def sides_of(node: ast.expr) -> Sides | None:
-    """The sides of a primitive; None for any other node."""
+    """Return the argument and the sides of a primitive, or None for any other node."""
     match node:
         case ast.Call(func=ast.Name(id="abs"), args=[u]):
             return u, u, ast.UnaryOp(ast.USub(), u), u

@@ -1,4 +1,4 @@
-"""Whether an expression can be negative at all, as far as its form shows: squares, absolute values and the like."""
+"""Detection of expressions that cannot be negative by their form, such as squares and absolute values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.expr.grammar import CONSTANTS
 from hybridsim.expr.walk import NoValue, value_of
 
 Lookup = Callable[[str], ast.expr | None]
-"""The tree behind the name of a definition or a variable; None for any other name."""
+"""A function that returns the tree of a definition or variable, and None for any other name."""
 
 _POSITIVE_CALLS = {
     "exp": "an exponential",
@@ -20,7 +20,7 @@ _POSITIVE_CALLS = {
 
 
 def never_negative(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> str | None:
-    """Why an expression is never negative, in words such as "a square"; None where its form does not show it.
+    """Return the reason why an expression is never negative, such as "a square", or None.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ def never_negative(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup)
         case ast.BinOp(left=left, op=ast.Div(), right=right):
             return _factors(both(left, right), [left, right], numbers, lookup)
         case ast.BinOp(left=left, op=ast.Add(), right=right):
-            return "a sum of what is never negative" if both(left, right) else None
+            return "a sum of nonnegative terms" if both(left, right) else None
         case ast.IfExp(body=body, orelse=orelse):
-            return "never negative on either side of its condition" if both(body, orelse) else None
+            return "nonnegative on both sides of its condition" if both(body, orelse) else None
         case ast.Call(func=ast.Name(id="max"), args=args):
             reasons = [never_negative(argument, numbers, lookup) for argument in args]
-            return "a maximum with what is never negative" if any(reasons) else None
+            return "a maximum with a nonnegative term" if any(reasons) else None
         case ast.Call(func=ast.Name(id=name)):
             return _POSITIVE_CALLS.get(name)
     return None
@@ -65,15 +65,15 @@ def never_negative(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup)
 def _factors(
     reasons: list[str] | None, parts: list[ast.expr], numbers: Mapping[str, float], lookup: Lookup
 ) -> str | None:
-    """The reason for a product: that of its only factor that varies, or of them all."""
+    """Return the reason for a product: that of its only varying factor, or that of all factors."""
     if not reasons:
         return None
     varying = [r for r, part in zip(reasons, parts, strict=True) if number_of(part, numbers, lookup) is None]
-    return varying[0] if len(varying) == 1 else "a product of what is never negative"
+    return varying[0] if len(varying) == 1 else "a product of nonnegative factors"
 
 
 def number_of(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> float | None:
-    """The value of an expression of parameters and numbers; None for any other."""
+    """Return the value of an expression of numbers and known names, or None."""
     values: dict[str, float] = {}
     for name in names_of(node):
         if name in numbers:
@@ -89,7 +89,7 @@ def number_of(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> f
 
 
 def names_of(node: ast.AST) -> frozenset[str]:
-    """Names of quantities in a tree, functions and constants left out; each part keeps its own, as no tree changes."""
+    """Return the names of quantities in a tree, without functions and constants; the result is cached."""
     found: frozenset[str] | None = getattr(node, "names_of", None)
     if found is None:
         if isinstance(node, ast.Name):
@@ -97,5 +97,5 @@ def names_of(node: ast.AST) -> frozenset[str]:
         else:
             parts = node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
             found = frozenset().union(*map(names_of, parts))
-        node.names_of = found  # type: ignore[attr-defined]  # an attribute of our own
+        node.names_of = found  # type: ignore[attr-defined]  # cache on the node
     return found

@@ -1,4 +1,4 @@
-"""Where things stand in a TOML text: from the path of a key to line and column, which `tomllib` forgets."""
+"""Line and column of every key in a TOML text, which `tomllib` does not report."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ _BLANK = " \t"
 
 
 def positions(text: str) -> Mapping[Path, tuple[int, int]]:
-    """Line (from 1) and column (from 0) of every key and array element of a valid TOML text.
+    """Return the line (from 1) and column (from 0) of every key and array element of a valid TOML text.
 
-    The text must have passed `tomllib`: nothing is checked again here, and an escape in a quoted key is not
-    resolved.
+    The text must be valid TOML, which `tomllib` has checked. Escapes in quoted keys are not resolved.
     """
     return _Scanner(text).scan()
 
 
 class _Scanner:
-    """Reads keys and skips values; `at` is the place in the text."""
+    """A scanner that reads keys and skips values; `at` is the current offset."""
 
     def __init__(self, text: str) -> None:
         self.text = text + "\n"
@@ -37,7 +36,7 @@ class _Scanner:
         return self.found
 
     def skip(self, characters: str) -> bool:
-        """Go past the given characters and comments; False at the end."""
+        """Skip the given characters and comments; return False at the end of the text."""
         while self.at < len(self.text):
             character = self.text[self.at]
             if character == "#":
@@ -53,7 +52,7 @@ class _Scanner:
         self.at = to
 
     def note(self, path: Path) -> None:
-        """Remember where the last part of a path begins; the first mention counts."""
+        """Record the place of the last part of a path; the first mention counts."""
         column = self.at - (self.text.rfind("\n", 0, self.at) + 1)
         self.found.setdefault(path, (self.line, column))
 
@@ -74,7 +73,7 @@ class _Scanner:
         self.value(path)
 
     def key(self, path: Path) -> Path:
-        """Read a key, dotted or not, inside the table at a path; every part of it is remembered."""
+        """Read a simple or dotted key in the table at a path, and record every part."""
         while True:
             self.skip(_BLANK)
             start = self.at
@@ -117,7 +116,7 @@ class _Scanner:
                 self.at += 1
 
     def string(self, quote: str) -> None:
-        """Go past a string; a quote that is escaped, or one of several at its end, is inside."""
+        """Skip a string, including escaped quotes and extra quotes at its end."""
         end = self.at + len(quote)
         while not self.text.startswith(quote, end):
             end += 2 if self.text[end] == "\\" and quote[0] == '"' else 1

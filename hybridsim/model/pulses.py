@@ -1,4 +1,4 @@
-"""Parts of an expression that are pulses or smooth steps in plain time, which an integrator can step over."""
+"""Pulses and smooth steps in time t inside expressions, which an integration step can miss."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import ast
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.one_sided import Lookup
 
-# Degree in t of what is no polynomial in it.
+# Degree that stands for expressions that are not polynomials in t.
 _CURVED = 9
 
 
 def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
-    """The first part that is a pulse or a smooth step in t, or None.
+    """Return the first part that is a pulse or smooth step in t, or None.
 
-    These are: exp of a bend in t, division by one, its negative powers, tanh and atan of t. Polynomials in t and
-    periodic functions of linear angles are none; conditions on t are met, or told of as jumps.
+    Pulses and steps are exp(p(t)), 1/p(t) and negative powers of p(t) for p of degree 2 or more, and tanh and atan of
+    t. Polynomials in t, sines and cosines are not. Conditions on t are located, or reported as jumps.
     """
     match node:
         case ast.Name(id=name) if (tree := lookup(name)) is not None:
@@ -37,7 +37,7 @@ def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
 
 
 def degree_in_time(node: ast.expr, lookup: Lookup) -> int:
-    """Degree of an expression in t: 0 without it or inside a sine or cosine, 9 where it is no polynomial."""
+    """Return the degree in t: 0 without t or inside a sine or cosine, 9 if it is not a polynomial."""
     match node:
         case ast.Name(id=name):
             tree = lookup(name)

@@ -1,4 +1,4 @@
-"""The named numbers of a model: parameters, states, discrete states and outputs."""
+"""Parameters, states, discrete states and outputs of a model."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class Parameter(Declared):
     Parameters
     ----------
     name : str
-        What other expressions call it.
+        Name of the parameter in expressions.
     value : str or float
         Number, or expression of other parameters.
     unit : str, optional
         Unit, for labels.
     title : str, optional
-        What it is, in words.
+        Description.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -47,23 +47,23 @@ class Parameter(Declared):
 
 @dataclass(frozen=True)
 class State(Declared):
-    """A continuous state: x' = der, x(t0) = start.
+    """A continuous state with x' = der and x(t0) = start.
 
     Parameters
     ----------
     name : str
-        What other expressions call it.
+        Name of the state in expressions.
     start : str or float
         Initial value, an expression of parameters.
     der : str or float
-        Its rate over everything the model names; a mode may override it in its own ``der``. 0 where the
-        model's rates are a Python function.
+        Rate, an expression of any names of the model. A mode may replace it in its ``der``. It is 0 if the rates of
+        the model are a Python function.
     unit : str, optional
-        For people; never computed with.
+        Unit, for labels; it does not affect computations.
     nominal : float, optional
-        Typical size in that unit, from which the absolute tolerance follows; None takes it from the run.
+        Typical size in this unit, which sets the default of the absolute tolerance. The default is ``|x0|`` or 1.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -88,7 +88,7 @@ class State(Declared):
 
 @dataclass(frozen=True)
 class Discrete(Declared):
-    """A state that only resets and clock ticks change.
+    """A state that changes only by resets.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Discrete(Declared):
     unit : str, optional
         Unit, for labels.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -120,21 +120,20 @@ class Discrete(Declared):
 
 @dataclass(frozen=True)
 class Output(Declared):
-    """A named expression to look at; it changes nothing.
+    """A named expression for results; it does not affect the run.
 
     Parameters
     ----------
     name : str
-        What `Solution.output` calls it.
+        Name of the output in `Solution.output`.
     expr : str or float
-        Over states, inputs, parameters, definitions and t.
+        Expression of states, inputs, parameters, definitions and t.
     unit : str, optional
         Unit, for labels.
     modes : mapping of str to str or float, optional
-        ``"component.mode"`` to the expression that replaces ``expr`` in that mode; where several apply the
-        last one counts.
+        Expressions that replace ``expr`` in a mode, by ``"component.mode"``; if several apply, the last one is used.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------

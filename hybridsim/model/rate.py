@@ -1,4 +1,4 @@
-"""How fast a quantity changes along the flow of a model, as an expression."""
+"""The time derivative of a quantity along the flow of a model."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 
 def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
-    """d(quantity)/dt = partial over t + sum over states of partial over x times x', definitions put in.
+    """Return d(quantity)/dt, the partial derivative by t plus the sum of partial derivatives by x times x'.
 
     Raises
     ------
     ModelError
-        Where the quantity uses an input or a variable that a component sets: these have no rate here.
+        If the quantity uses an input or a variable of a component, whose rates are unknown.
     """
     from hybridsim.expr.slope import slope
 
@@ -27,9 +27,9 @@ def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
     known = {state.name for state in model.states} | {p.name for p in model.parameters} | {"t"}
     if foreign := sorted(inner.names - known - {d.name for d in model.discrete}):
         raise ModelError(
-            f"{what} uses {', '.join(foreign)}, whose rate is not known",
+            f"{what} depends on {', '.join(foreign)}, whose time derivative is unknown",
             place=quantity.place,
-            remedy="write it over states, parameters and t.",
+            remedy="use only states, parameters and t",
         )
     rate = slope(inner, "t")
     for state in model.states:
@@ -41,7 +41,7 @@ def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
 
 
 def inlined(expr: Expression, definitions: Mapping[str, Expression]) -> Expression:
-    """An expression with its definitions put in."""
+    """Return an expression with its definitions inserted."""
     while used := expr.names & definitions.keys():
         expr = substitute(expr, {name: definitions[name] for name in used})
     return expr

@@ -1,4 +1,4 @@
-"""A model with its dry friction made single-valued: what one does when the corner is in the way."""
+"""Regularised friction: a copy of a model with single-valued friction forces."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ if TYPE_CHECKING:
 
 KINDS = ("tanh", "arctan", "karnopp")
 _SMOOTH = {"tanh": "slip*tanh(velocity/v0)", "arctan": "slip*2/pi*atan(velocity/v0)"}
-_TRIALS = 8  # points at which a law is tried for a jump at rest; one would do but for accidents
+_TRIALS = 8  # random points that test a law for a jump at rest; one point could hit a zero by chance
 
 
 def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
-    """The model with every contact in a regularised form; see `Model.regularized`."""
+    """Return the model with regularised contacts (see `Model.regularized`)."""
     if not isinstance(kind, str) or kind not in KINDS:
         raise UsageError(
-            f"there is no regularisation {kind!r}", remedy=nearest(str(kind), KINDS, kind="regularisations")
+            f"Unknown regularisation {kind!r}", remedy=nearest(str(kind), KINDS, kind="regularisations")
         )
     if not any(contact.law.is_set_valued for contact in model.contacts):
-        raise UsageError(f"the model '{model.name}' has no contact with a set-valued law to regularise")
+        raise UsageError(f"Model '{model.name}' has no contact with a set-valued law to regularise")
     taken = names_of_model(model)
     name = free_name(taken, "v0")
     width = Parameter(name, v0)  # type: ignore[arg-type]  # a text or a number becomes an expression
     changed = replace(model, parameters=(*model.parameters, width))
     value = changed.parameter_values()[name]
     if not value > 0.0:
-        raise UsageError(f"v0 is {value!r}", remedy="give a velocity above zero")
+        raise UsageError(f"v0 is {value!r}", remedy="use a velocity above zero")
     build: Callable[[Model, Contact, str], Component]
     build = _karnopp if kind == "karnopp" else lambda m, contact, w: _smooth(m, contact, w, kind)
     components = tuple(
@@ -69,12 +69,12 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
 
 
 def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
-    """One mode, f = slip(|v|) g(v/v0) with g odd and rising from -1 to 1."""
+    """Return a component with one mode, f = slip(|v|) g(v/v0), with g odd and rising from -1 to 1."""
     _refuse_static(model, contact, kind)
     if contact.law.slip_backward is not None:
         raise UsageError(
-            f"contact {contact.name}: its law '{contact.law.name}' is not the same forward and backward; "
-            f"'{kind}' knows one magnitude",
+            f"contact {contact.name}: the law '{contact.law.name}' depends on the direction of slip, which '{kind}' "
+            "does not support",
             remedy="use 'karnopp'",
         )
     slip = contact.law.slip
@@ -93,7 +93,7 @@ def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
 
 
 def _refuse_static(model: Model, contact: Contact, kind: str) -> None:
-    """A single-valued force through zero has no peak at rest: static friction above slip(0) would be lost."""
+    """Reject static friction above slip(0), which a smooth force cannot represent."""
     surface = contact.component(model.constant_names()).surface
     assert surface is not None  # every contact has one
     jump = surface.jump_above
@@ -103,18 +103,17 @@ def _refuse_static(model: Model, contact: Contact, kind: str) -> None:
         size = evaluate(jump, {**values, **others})
         if abs(size) > 1e-12 * max(abs(value) for value in (1.0, *values.values(), *others.values())):
             raise UsageError(
-                f"contact {contact.name}: its law '{contact.law.name}' holds more at rest than it slides with; "
-                f"'{kind}' has no force at rest of its own and would lose that",
-                remedy="use 'karnopp', or a law that falls from its static value over a speed, as stribeck does",
+                f"contact {contact.name}: the static friction of the law '{contact.law.name}' exceeds its slip force "
+                f"at v = 0, which '{kind}' cannot represent",
+                remedy="use 'karnopp', or a law that decreases continuously from its static value, such as stribeck",
             )
 
 
 def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
-    """A dead band |v| < v0 where the body is stopped and the force is what holds it, as far as the law allows.
+    """Return the automaton of Karnopp's dead band |v| < v0, in which the body is stopped.
 
-    D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698, in the form in which the
-    velocity is set to zero on entering the band; broken loose, the body slides at the limit force until it has
-    left the band.
+    D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698. In this variant the velocity is set
+    to zero on entering the band. After release the body slides at the limit force until it leaves the band.
     """
     name, velocity, loaded = contact.name, contact.velocity, _loaded(model, contact)
     held, limit, width = parse(_holding(model, name)), contact.limit_force(), parse(v0)
@@ -128,7 +127,7 @@ def _karnopp(model: Model, contact: Contact, v0: str) -> Component:
     out_up = Guard("fast", _form("v0 - velocity", **parts), (Choice("slip+"),))
     out_down = Guard("fast-backward", _form("v0 + velocity", **parts), (Choice("slip-"),))
     forward_force = contact.slip_force(velocity)
-    speed = contact.table_speed  # at rest tables are read at no speed
+    speed = contact.table_speed  # in the band tables are evaluated at zero speed
 
     def at(value: Expression) -> dict[str, Expression]:
         return {} if speed is None else {speed: value}
@@ -180,12 +179,12 @@ def _holding(model: Model, contact: str) -> str:
 
 
 def _holding_force(model: Model, contact: Contact) -> Expression:
-    """The force that keeps the relative velocity as it is: -(its rate without f)/(what f adds to it).
+    """Return the force that keeps the relative velocity constant: -(its rate without f)/(d rate/df).
 
     Raises
     ------
     UsageError
-        Where the relative velocity uses an input, or where another contact's force acts on it.
+        If the relative velocity depends on an input, or if the force of another contact acts on it.
     """
     from hybridsim.expr.slope import slope
 
@@ -193,31 +192,31 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
     inputs = velocity.names & {i.name for i in model.inputs}
     if inputs:
         raise UsageError(
-            f"contact {contact.name}: its velocity uses the input {', '.join(sorted(inputs))}, whose rate "
-            f"'karnopp' would need",
+            f"contact {contact.name}: the velocity depends on the input {', '.join(sorted(inputs))}, which 'karnopp' "
+            "does not support",
             remedy="use 'tanh' or 'arctan'",
         )
     rate = rate_along(model, velocity, f"the velocity of contact {contact.name}")
     others = rate.names & {c.name for c in model.contacts if c is not contact}
     if others:
         raise UsageError(
-            f"contact {contact.name}: the force {', '.join(sorted(others))} acts on its velocity; "
-            f"'karnopp' holds one contact at a time",
+            f"contact {contact.name}: the force {', '.join(sorted(others))} also acts on its velocity, but 'karnopp' "
+            "supports only independent contacts",
             remedy="use 'tanh' or 'arctan'",
         )
     effect = slope(rate, contact.name)
     if contact.name in effect.names or effect.text == "0":
         raise ModelError(
-            f"contact {contact.name}: the force {contact.name} does not act linearly on its own velocity",
+            f"contact {contact.name}: the rate of its velocity does not depend linearly on the force {contact.name}",
             place=contact.place,
-            remedy="let it enter the derivative of the velocity as '- f/m'",
+            remedy=f"add a term such as '- {contact.name}/m' to the rate",
         )
     free = substitute(rate, {contact.name: parse(0)})
     return _form("-free/effect", free=free, effect=effect)
 
 
 def _stopping(model: Model, contact: Contact) -> dict[str, Expression]:
-    """The reset that makes the relative velocity zero: of the state in it whose coefficient is a number."""
+    """Return the reset of one state that makes the relative velocity zero."""
     from hybridsim.expr.slope import slope
 
     for state in model.states:
@@ -226,14 +225,14 @@ def _stopping(model: Model, contact: Contact) -> dict[str, Expression]:
             after = _form("x - velocity/part", x=parse(state.name), velocity=contact.velocity, part=part)
             return {state.name: after}
     raise ModelError(
-        f"contact {contact.name}: its relative velocity is linear in no state",
+        f"contact {contact.name}: the relative velocity is not linear in any state",
         place=contact.velocity.place or contact.place,
-        remedy="introduce the relative velocity as a state of its own",
+        remedy="declare the relative velocity as a state",
     )
 
 
 def _loaded(model: Model, contact: Contact) -> tuple[Guard, ...]:
-    """The guard that ends the run where the normal load would become negative, if it can."""
+    """Return the guard that ends the run if the normal load becomes negative, if there is one."""
     guards = contact.component(model.constant_names()).modes[0].guards
     return tuple(guard for guard in guards if guard.fatal)
 

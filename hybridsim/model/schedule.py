@@ -1,4 +1,4 @@
-"""Events at known times: a list of times, or a clock that ticks."""
+"""Events at known times: a list of times, or a periodic clock."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from hybridsim.model.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Schedule(Declared):
-    """Resets, or the end of the run, at times that are known beforehand and stepped to, not searched for.
+    """Resets, or the end of the run, at known times, which integration steps hit exactly.
 
-    The k-th time of a clock is start + k*period, k = 0, 1, ..., never a running sum.
+    The k-th tick of a clock is computed as start + k*period, k = 0, 1, ..., without accumulated rounding.
 
     Parameters
     ----------
     name : str
-        What its events are called.
+        Name of the schedule and its events.
     times : sequence of str or float, optional
-        Single times, one that is listed twice counts twice; or instead a clock, by the next three.
+        List of times; a time that is listed twice counts twice. Alternatively, define a clock by the next three.
     start, period : str or float, optional
-        First tick (0 if only a period is given), time between ticks. All times are expressions of parameters,
-        in the unit of t.
+        Time of the first tick (default 0) and time between ticks. All times are expressions of parameters, in the
+        unit of t.
     count : int, optional
-        Number of ticks; None: no end.
+        Number of ticks; None for an unlimited number.
     reset : mapping of str to str or float, optional
-        State or discrete state to the expression that gives its new value, evaluated at x-, or to ``"+= amount"``,
-        which adds: amounts of one instant are summed in any order.
+        New value of each changed state or discrete state, an expression evaluated at x-, or ``"+= amount"``. Amounts
+        added at the same instant are summed.
     terminate : bool, optional
-        Whether the run ends there.
+        Whether the run ends at the event.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Examples
     --------
@@ -66,5 +66,5 @@ class Schedule(Declared):
         self._flags("terminate")
         count: object = self.count
         if not (count is None or isinstance(count, Integral)) or isinstance(count, bool):
-            raise self._fault(f"count is {count!r}", "give a whole number >= 1, or leave it out")
+            raise self._fault(f"count is {count!r}", "use a whole number >= 1, or omit count")
         self._maps("reset", functions=True)

@@ -1,4 +1,4 @@
-"""What the names of a model mean, and the list of faults that the checks add to."""
+"""The names of a model by kind, and the errors that the checks collect."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class Scope:
-    """The names of one model by kind; checks report to it."""
+    """The names of one model by kind, and the list of errors found by the checks."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self.errors: list[ModelError] = []
-        # the automata of each contact, by its number; none of one that could not be built
+        # the automata of each contact; empty for a contact that could not be built
         self.made = [self._made(contact) for contact in model.contacts]
         self.components = tuple(self._expanded())
 
@@ -36,7 +36,7 @@ class Scope:
             return ()
 
     def _expanded(self) -> Iterator[Component]:
-        """The components that could be built; a contact that could not is reported."""
+        """Yield all components that could be built; failures have been reported."""
         for parts in self.made:
             yield from parts
         yield from (surface.component() for surface in self.model.surfaces)
@@ -47,16 +47,16 @@ class Scope:
         self.errors.append(part.error(message, remedy))
 
     def unknown(self, part: Declared, what: str, name: str, known: Iterable[str], kind: str) -> None:
-        """Report a name that is not among the known ones."""
+        """Report a name that is not among the known ones, with similar names."""
         self.fail(part, f"{what} '{name}'", nearest(name, known, kind=kind))
 
     @cached_property
     def kinds(self) -> dict[str, str]:
-        """Kind of every quantity, for messages: ``{"k": "parameter", ...}``."""
+        """The kind of every quantity, for messages: ``{"k": "parameter", ...}``."""
         return {name: kind for kind, name, _ in self.declarations()}
 
     def declarations(self) -> Iterator[tuple[str, str, Declared]]:
-        """(kind, name, part) of everything that expressions can name."""
+        """Yield (kind, name, part) of everything that expressions can use."""
         model = self.model
         yield from (("parameter", part.name, part) for part in model.parameters)
         yield from (("state", part.name, part) for part in model.states)
@@ -82,7 +82,7 @@ class Scope:
                 yield f"variable of component {component.name}", name, component
 
     def is_switched(self, name: str) -> bool:
-        """Whether a name stands for something that modes decide."""
+        """Return whether the value of a name depends on modes."""
         kind = self.kinds.get(name, "")
         return kind.startswith("variable") or kind in ("contact force", "switching surface", "normal force")
 
@@ -99,11 +99,11 @@ class Scope:
         return frozenset(parameter.name for parameter in self.model.parameters)
 
     def need(self, expr: Expression, what: str, known: Iterable[str], *, boolean: bool = False) -> None:
-        """Report unknown names in an expression, and a number where a condition is wanted or the reverse."""
+        """Report unknown names, and a number instead of a condition or the reverse."""
         allowed = frozenset(known)
         if expr.names <= allowed and (expr.is_boolean == boolean or isinstance(expr, FunctionExpression)):
-            return  # a function is seen when it is called
-        # an output that only shows something by its name uses that, not itself
+            return  # the value of a function is checked when it is called
+        # an output with the name of a quantity refers to that quantity, not to itself
         outputs = {output.name: output for output in self.model.outputs if output.expr.text != output.name}
         misplaced = sorted((expr.names - allowed) & (self.all_names | outputs.keys()))
         try:
@@ -111,45 +111,49 @@ class Scope:
                 name = misplaced[0]
                 if allowed >= self.all_names:
                     raise expr.error(
-                        f"'{name}' is an output: no expression can use it", remedy=_instead(outputs[name])
+                        f"'{name}' is an output, which expressions cannot use", remedy=_instead(outputs[name])
                     )
                 kind = "the time" if name == TIME else f"the {self.kinds.get(name, 'output')}"
-                remedy = f"only these can: {', '.join(sorted(allowed)) or 'numbers'}."
+                remedy = f"allowed here: {', '.join(sorted(allowed)) or 'numbers'}"
                 raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
             self._require(expr, allowed)
             if boolean and not expr.is_boolean:
-                raise expr.error(f"'{expr.text}' is a number", remedy="a condition is needed, e.g. 'x > 0'.")
+                raise expr.error(f"'{expr.text}' is a number", remedy="write a condition, such as 'x > 0'")
             if expr.is_boolean and not boolean:
-                raise expr.error(f"'{expr.text}' is true or false", remedy="a number is needed.")
+                raise expr.error(
+                    f"'{expr.text}' is a condition", remedy="write an expression with a numeric value"
+                )
         except ExpressionError as fault:
             place = fault.place or Place(text=expr.text)
             self.errors.append(ExpressionError(f"{what}: {fault.message}", place=place, remedy=fault.remedy))
 
     def _require(self, expr: Expression, allowed: frozenset[str]) -> None:
-        """See to it that every name is known; a force is the name of a contact, which a newcomer has to be told."""
+        """Check that every name is known; the remedy explains friction forces if there are no contacts."""
         try:
             require_names(expr, allowed)
         except ExpressionError as fault:
             if self.model.contacts or "did you mean" in (fault.remedy or ""):
                 raise
-            hint = "A friction force is the name of a contact: hs.Contact, or [contacts.NAME] in a file."
-            raise ExpressionError(fault.message, place=fault.place, remedy=f"{fault.remedy} {hint}") from None
+            hint = "for a friction force declare a contact of this name: hs.Contact, or [contacts.NAME] in a file"
+            raise ExpressionError(
+                fault.message, place=fault.place, remedy=f"{fault.remedy}; {hint}"
+            ) from None
 
     def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
-        """The same for a law, which sees its own names and nothing of the model."""
+        """Report names of the model in an expression of a friction law, and conditions."""
         foreign = sorted(expr.names - frozenset(known))
         if foreign or expr.is_boolean:
-            reason = f"the law has no '{foreign[0]}'" if foreign else f"'{expr.text}' is true or false"
+            reason = f"unknown name '{foreign[0]}'" if foreign else f"'{expr.text}' is a condition"
             remedy = (
-                f"it knows {', '.join(sorted(known))}; give the law a parameter and the contact its value."
+                f"allowed here: {', '.join(sorted(known))}; pass other quantities as parameters of the law"
                 if foreign
-                else "a number is needed."
+                else "write an expression with a numeric value"
             )
             fault = expr.error(f"{what}: {reason}", node=None, remedy=remedy)
             self.errors.append(fault)
 
     def reached(self, expr: Expression) -> frozenset[str]:
-        """Names that an expression depends on, those behind definitions included."""
+        """Return the names that an expression depends on, including those in definitions."""
         definitions = dict(self.model.definitions)
         found: set[str] = set()
         open_names = set(expr.names)
@@ -162,7 +166,7 @@ class Scope:
 
 
 def _instead(output: Output) -> str:
-    """What to write where an expression uses an output."""
+    """Return the remedy for an expression that uses an output."""
     if output.modes:
-        return f"write {output.expr.text} there: it differs from mode to mode."
-    return f"declare {output.name} under [definitions] (definitions=), where it can be used, and read with sol.output."
+        return f"write {output.expr.text} instead, since the output depends on the mode"
+    return f"declare {output.name} under [definitions] (definitions=) instead; sol.output returns definitions too"

@@ -1,10 +1,10 @@
-"""A model with the corners and jumps of its flows, guards and laws as components, so that every mode is smooth.
+"""Replace the corners and jumps of a model by components, so that every mode is smooth.
 
-`abs`, `min`, `max` and conditionals whose branches agree where they change are corners. Where the mode of a component
-implies the side that holds (v >= 0 in slip+), that side is put in. Any other corner gets a component of two modes which
-changes its mode where the argument passes through zero; both modes have one value there. A jump (`sign`, a conditional
-whose branches differ) is a switching surface (`hybridsim.model.jumps`), or a signal where time alone decides on it
-(`hybridsim.model.steps_in_time`); where neither can be, it is left as it stands.
+Corners are `abs`, `min`, `max` and conditionals whose branches agree at the change. If the mode of a component implies
+the active side (v >= 0 in slip+), this side replaces the corner. Any other corner becomes a component with two modes
+that switches at the zero of its argument, where both modes have the same value. A jump (`sign`, a conditional whose
+branches differ) becomes a switching surface (`hybridsim.model.jumps`), or a signal if it depends on time alone
+(`hybridsim.model.steps_in_time`). If neither is possible, the jump is not replaced.
 """
 
 from __future__ import annotations
@@ -25,21 +25,22 @@ from hybridsim.model.rewriting import IN_VELOCITY, WATCHED, Found, Here, Rewriti
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
-# Each event judges all components again, and compiled loops keep tables of the combinations of modes that they meet.
+# Largest number of corners and jumps to replace. Each event checks all components, and compiled loops store a table of
+# the combinations of modes.
 MOST = 8
-IN_MODE = "it stands in a mode of a component"
+IN_MODE = "it is in a mode of a component"
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The model that is run, and what became of the primitives of the one that was written."""
+    """The model with replaced corners and jumps, and the treatment of each primitive."""
 
     model: Model
     primitives: tuple[Primitive, ...]
 
 
 def smoothed(model: Model) -> Model:
-    """The model with its corners as components; the model itself where there is none."""
+    """Return the model with its corners and jumps as components, or the model itself without any."""
     if model.flow is not None:
         return model
     found: Model | None = model.once("smoothed", lambda: _smoothed(model))
@@ -47,18 +48,18 @@ def smoothed(model: Model) -> Model:
 
 
 def _smoothed(model: Model) -> Model | None:
-    """None where there is no corner; the same model but for its values, whatever these are."""
+    """Return the smoothed model, which copies with other values share, or None if nothing changes."""
     result = smoothing_of(model).model if uses_primitives(model) else model
     return None if result is model else result
 
 
 def smoothing_of(model: Model) -> Smoothed:
-    """The same with an account of every primitive that is not smooth, fractional powers included.
+    """Return the smoothed model and the treatment of every non-smooth primitive and fractional power.
 
     Raises
     ------
     ModelError
-        For what jumps in a velocity, a gap or a switching function and is no signal.
+        For a jump in a velocity, gap or switching function that does not depend on time alone.
     """
     if model.flow is not None:
         return Smoothed(model, ())
@@ -72,11 +73,11 @@ def smoothing_of(model: Model) -> Smoothed:
             raise work.faults[0]
         both = (work.corners.keys() & work.jumps.keys()) - shared
         in_time = (work.steps.keys() & {*work.jumps, *work.corners}) - timed
-        if len(work.corners) + len(work.jumps) > MOST:  # a signal does not count among them
+        if len(work.corners) + len(work.jumps) > MOST:  # signals do not count
             in_time |= work.timed_by_form() - timed
         if not (crooked or both or in_time):
             break
-        refused |= dict.fromkeys(crooked, "it does not enter the rates linearly")
+        refused |= dict.fromkeys(crooked, "it enters the rates nonlinearly")
         shared, timed = (shared | both) - refused.keys(), timed | in_time
     count = len(work.corners) + len(work.jumps)
     if count > MOST:
@@ -88,7 +89,7 @@ def smoothing_of(model: Model) -> Smoothed:
 
 
 class _Smoothing:
-    """One pass over one model."""
+    """One pass over a model."""
 
     def __init__(self, model: Model, work: Rewriting) -> None:
         self.model, self.work = model, work
@@ -97,9 +98,9 @@ class _Smoothing:
     # -- the model ------------------------------------------------------------------------------------------
 
     def run(self) -> tuple[Model, list[Family]]:
-        """Rewrite all that is integrated or watched; the model itself where nothing came of it.
+        """Rewrite everything that is integrated or monitored; return the model itself if nothing changed.
 
-        And the borders of jumps that do not enter linearly.
+        The second result contains the families of jumps that enter the rates nonlinearly.
         """
         model = self.model
         surfaces = [c.surface.function.tree for c in self.components if c.surface]
@@ -149,7 +150,7 @@ class _Smoothing:
         return result, self._crooked(result)
 
     def _integrated(self) -> Iterator[ast.expr]:
-        """Rates, and what modes set."""
+        """Yield the trees of rates and of variables that modes set."""
         yield from (state.der.tree for state in self.model.states)
         yield from self._of_modes()
 
@@ -164,7 +165,7 @@ class _Smoothing:
             yield from (guard.expr.tree for mode in component.modes for guard in mode.guards)
 
     def _crooked(self, result: Model) -> list[Family]:
-        """The borders of jumps that do not enter the rates linearly."""
+        """Return the families of jumps that enter the rates nonlinearly."""
         jumps = {family: jump for family, jump in self.work.jumps.items() if not jump.is_timed}
         carried = {name: {name} for name in self.meanings.forced}
         for jump in jumps.values():
@@ -191,11 +192,11 @@ class _Smoothing:
         return replace(component, modes=tuple(modes), surface=self._surface(component))
 
     def _surface(self, component: Component) -> Surface | None:
-        """Its surface with what jumps in time alone as signals."""
+        """Return the surface of a component, with jumps in time replaced by signals."""
         surface = component.surface
         if surface is None:
             return None
-        here = Here("", component.place, untouched=IN_VELOCITY)  # its modes tell of what is kept
+        here = Here("", component.place, untouched=IN_VELOCITY)  # the modes report primitives that are kept
         return replace(
             surface,
             function=self._rewritten(surface.function, here),
@@ -221,9 +222,7 @@ class _Smoothing:
                 and self.work.never_negative(guard.expr.tree)
                 and self._has_corner(guard.expr.tree)
             ):
-                self.work.note(
-                    guard.expr.tree, MODE, "it is never negative, so that the guard never fires", here
-                )
+                self.work.note(guard.expr.tree, MODE, "it is never negative, so the guard never fires", here)
                 self.work.count += 1
                 continue
             yield replace(guard, expr=self._rewritten(guard.expr, here))
@@ -247,8 +246,7 @@ class _Smoothing:
         for m, (name, other) in enumerate((("+", "-"), ("-", "+"))):
             side = found.argument if m == 0 else ast.UnaryOp(ast.USub(), found.argument)
             values = {variable: of_tree(pair[m]) for variable, pair in found.values.items()}
-            # a name stands for a Choice, as in any declaration
-            guard = Guard("side", of_tree(side), then=(other,))  # type: ignore[arg-type]  # made a choice
+            guard = Guard("side", of_tree(side), then=(other,))  # type: ignore[arg-type]  # becomes a Choice
             modes.append(Mode(name, (guard,), set=values))
         return Corner(found.name, tuple(modes), initial="+")
 

@@ -1,4 +1,4 @@
-"""Facts about a valid model that decide events and that its form shows: guards at zero at the start, loads at zero."""
+"""Facts about a valid model that decide events: guards that are zero at the start, loads that can be zero."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from hybridsim.model.component import Component
     from hybridsim.model.model import Model
 
-_ULP = 2.0**-52  # the least relative step of a double: a start that is no whole number is known no better
+_ULP = 2.0**-52  # relative spacing of doubles: the uncertainty of a start value that is not a whole number
 
 
 def starting_facts(model: Model) -> tuple[str, ...]:
-    """A sentence about each start on a guard or a surface, and each normal load that can reach zero."""
+    """Return a sentence for each guard or surface at zero at the start, and each load that can be zero."""
     if model.flow is not None:
         return ()
     meanings = Meanings(model)
@@ -31,32 +31,38 @@ def starting_facts(model: Model) -> tuple[str, ...]:
 
 
 def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[str]:
-    """What of a component is zero at the start."""
+    """Yield the facts about a component that starts at zero of a guard or surface."""
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return
     if surface is not None and _is_zero_at_start(model, surface.function, meanings):
         text = surface.function.text
         if surface.is_unilateral:
-            yield f"the gap of impact {name} ({text}) is zero at the start: its rates decide whether it is closed"
+            yield (
+                f"the gap of impact {name} ({text}) is zero at the start: its time derivatives decide whether it is "
+                "closed"
+            )
         elif any(contact.name == name for contact in model.contacts):
             yield (
                 f"the relative velocity of contact {name} ({text}) is zero at the start: "
                 "the forces decide whether it sticks"
             )
         else:
-            yield f"the surface {name} ({text}) is zero at the start: the rates on its sides decide its mode"
+            yield (
+                f"the surface function of {name} ({text}) is zero at the start: the rates on both sides decide the "
+                "mode"
+            )
     if surface is None and component.initial:
         for guard in component.mode(component.initial).guards:
             if _is_zero_at_start(model, guard.expr, meanings):
                 yield (
                     f"guard {guard.name} of mode {component.initial}, component {name} ({guard.expr.text}) is zero at "
-                    "the start: the first of its rates that is not zero decides whether it fires at once"
+                    "the start: its first nonzero time derivative decides whether it fires immediately"
                 )
 
 
 def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> bool:
-    """Whether an expression is zero at the start within the rounding of its evaluation and of the start's numbers."""
+    """Return whether an expression is zero at the start within rounding errors."""
     starts = model.start_values() | model.discrete_values()
     values = {**model.parameter_values(), **starts, TIME: 0.0}
     tree = meanings.written_out(expr.tree)
@@ -74,15 +80,15 @@ def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> boo
 
 
 def _loads(model: Model, meanings: Meanings) -> Iterator[str]:
-    """Normal loads that can reach zero without becoming negative: friction ends there and the run goes on."""
+    """Yield the facts about normal loads that can reach zero."""
     numbers = model.parameter_values()
     for contact in model.contacts:
         tree = meanings.written_out(contact.normal.tree)
         load = f"the normal load of contact {contact.name} ({contact.normal.text})"
         if contact.opens:
-            yield f"{load} may become negative: the contact opens where it reaches zero"
+            yield f"{load} can become negative: the contact opens when it reaches zero"
             continue
         if not meanings.moves(tree) or is_clear_of_zero(tree, numbers, meanings):
             continue
         if never_negative(tree, numbers, meanings.lookup):
-            yield f"{load} can reach zero: friction ends there until it is positive again"
+            yield f"{load} can reach zero: friction is then zero until the load is positive again"

@@ -1,8 +1,8 @@
-"""A condition on time alone as a known signal: 1 while it holds, 0 while it does not, with its changes as knots.
+"""Conditions on time alone as known signals: 1 if true, 0 if false, with the changes as knots.
 
-In a rate a component stands for such a condition, since a run goes over it without a pause. In the velocity of a
-contact, a load, a law, a gap or a guard it is a signal, so that its jumps are those of an input. Its times may depend
-on parameters, on discrete states that nothing sets and on inputs that are constant.
+In a rate such a condition becomes a component, which the compiled loop passes without stopping. In the velocity of a
+contact, a load, a law, a gap or a guard it becomes a signal, whose jumps are treated like those of an input. Its times
+may depend on parameters, on discrete states that no reset changes, and on constant inputs.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from hybridsim.model.one_sided import names_of
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
-STEP = "__step_"  # begins the name of a signal; names of a model do not begin with two underscores
+STEP = "__step_"  # prefix of the name of a signal; declared names cannot start with two underscores
 _ZERO, _ONE = ast.Constant(0), ast.Constant(1)
 
 
 @dataclass(frozen=True)
 class TimeStep(Input):
-    """1 where shift + rate*t, or shift + amplitude*sin(phase + rate*t), is above zero, else 0.
+    """A signal that is 1 if shift + rate*t, or shift + amplitude*sin(phase + rate*t), is positive, else 0.
 
     Parameters
     ----------
     shift, rate, amplitude, phase, period : Expression
-        Expressions of parameters and of what lasts, see `lasting`; the last three for the sine only.
+        Expressions of parameters and of the constants of `lasting`; the last three only for the sine.
     title : str
-        What is above zero, as it was written.
+        Source text of the expression.
     """
 
     shift: Expression | None = None
@@ -44,24 +44,24 @@ class TimeStep(Input):
 
     @property
     def subject(self) -> str:
-        """What messages call it."""
+        """The name of the signal in messages."""
         return f"the condition on '{self.title}'"
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """Its expressions of parameters by field name."""
+        """The expressions of parameters by field name."""
         fields = ("shift", "rate", "amplitude", "phase", "period")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 
 
 def constant_inputs(model: Model) -> dict[str, float]:
-    """The tables of one value."""
+    """Return the inputs that are tables with a single value."""
     tables = (signal for signal in model.inputs if signal.kind == "table")
     return {table.name: table.values[0] for table in tables if len(set(table.values)) == 1}
 
 
 def lasting(model: Model) -> frozenset[str]:
-    """What keeps its value as a parameter does: the discrete states that nothing sets, and constant inputs."""
+    """Return names that are constant during a run: unchanged discrete states and constant inputs."""
     choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
     resets = [choice.reset for choice in choices]
     resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]
@@ -69,7 +69,7 @@ def lasting(model: Model) -> frozenset[str]:
 
 
 def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:
-    """The signal that is 1 where an expression of time, its definitions put in, is above zero; None for other forms."""
+    """Return the signal that is 1 while an expression of time is positive, or None for unsupported forms."""
     if linear := _linear(argument, TIME, parameters):
         return TimeStep(name, "step", shift=of_tree(linear[0]), rate=of_tree(linear[1]), title=title)
     for part in ast.walk(argument):
@@ -102,7 +102,7 @@ def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> 
 
 
 def _linear(tree: ast.expr, name: str, parameters: Set[str]) -> tuple[ast.expr, ast.expr] | None:
-    """a and b of a + b*name, over parameters alone; None for what has no such form."""
+    """Return a and b of a + b*name, which depend only on parameters, or None for other forms."""
     shift, at_one = (with_names(tree, {name: value}) for value in (_ZERO, _ONE))
     slope = ast.BinOp(at_one, ast.Sub(), shift)
     if not names_of(shift) <= parameters:

@@ -1,4 +1,4 @@
-"""The part of a model that generated code depends on, as a canonical text: the key of the code's cache."""
+"""The structure of a model as canonical text, which is the cache key of generated code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def structure(model: Model) -> str:
-    """One line for each thing that matters; equal texts mean that the same code serves both models."""
+    """Return one line for each relevant part; models with equal texts share their code."""
     return "\n".join(_lines(model)) + "\n"
 
 
@@ -39,7 +39,7 @@ def _lines(model: Model) -> Iterator[str]:
     for schedule in model.schedules:
         yield _schedule(schedule)
     for output in model.outputs:
-        modes = "; ".join(f"{name} = {expr}" for name, expr in output.modes.items())  # their order counts
+        modes = "; ".join(f"{name} = {expr}" for name, expr in output.modes.items())  # in order of priority
         yield f"output {output.name}: {output.expr} {{{modes}}}"
 
 
@@ -76,5 +76,5 @@ def _schedule(schedule: Schedule) -> str:
 
 
 def _map(items: Mapping[str, Expression]) -> str:
-    """Sorted, since the order of rates, variables and resets means nothing."""
+    """Return the items sorted by name, because their order has no meaning."""
     return " {" + "; ".join(f"{name} = {items[name]}" for name in sorted(items)) + "}"

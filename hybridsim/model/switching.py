@@ -1,4 +1,4 @@
-"""A switching surface: fields that differ on its sides, crossed or slid along by Filippov's convention."""
+"""Switching surfaces: rates that differ on the two sides, with sliding by Filippov's convention."""
 
 from __future__ import annotations
 
@@ -15,47 +15,50 @@ from hybridsim.model.frozen_map import FrozenMap
 
 ABOVE, BELOW, SLIDING = "above", "below", "sliding"
 _BLEND = parse("(above + below)/2 + u*(above - below)/2").tree
-ATTRACTION = "__attraction_"  # before the unknown: how strongly it pulls towards its surface; no model's name begins so
+ATTRACTION = (
+    "__attraction_"  # prefix of the unknown's name in the guard that tests whether both sides point to it
+)
 
 
 @dataclass(frozen=True)
 class SwitchingSurface(Declared):
-    """A surface expr = 0 on which rates jump; its name u is the sign of expr, and the weight of the sides in sliding.
+    """A surface expr = 0 at which rates jump; its name u is the sign of expr, or a weight in sliding.
 
     ::
 
-        u = +1            where expr > 0
-        u = -1            where expr < 0
-        -1 <= u <= +1     while the motion slides along expr = 0, solved for from d(expr)/dt = 0
+        u = +1            for expr > 0
+        u = -1            for expr < 0
+        -1 <= u <= +1     while the motion slides along expr = 0, from d(expr)/dt = 0
 
-    A rate that uses u is so (1 + u)/2 times the rate above plus (1 - u)/2 times the one below: Filippov's convex
-    combination of the two, Utkin's equivalent control. u has to enter the rates linearly.
+    A rate that contains u therefore equals (1 + u)/2 times the rate above plus (1 - u)/2 times the rate below. This is
+    Filippov's convex combination, or Utkin's equivalent control. u must enter the rates linearly.
 
-    The motion crosses where both sides lead the same way, slides where both lead to the surface, and leaves where u
-    comes to +1 or -1. Where both lead away (a start on a surface that repels) the run ends with status ``nonunique``.
+    The motion crosses the surface if the rates on both sides point the same way, slides if both point to the surface,
+    and leaves it when u reaches +1 or -1. If both point away (a start on a repelling surface), the run ends with status
+    ``nonunique``.
 
     Parameters
     ----------
     name : str
-        Of the variable u.
+        Name of the variable u.
     expr : str or float
         The switching function h(t, x), smooth, in any unit.
     above, below : mapping of str to str or float, optional
-        Values of further variables on either side, with the same names in both; in sliding (1 + u)/2 above +
-        (1 - u)/2 below. For whole fields that are not written with a sign.
+        Values of further variables on each side, with the same names in both. In sliding they are (1 + u)/2 above +
+        (1 - u)/2 below. Use them for fields that are not written with a sign.
     place : Place, optional
-        Where it is written, for the messages of errors.
+        Place of the declaration, for error messages.
 
     Raises
     ------
     UsageError
-        For names on one side only.
+        For a variable with a value on one side only.
 
     Notes
     -----
-    For a relay, a controller of variable structure, a field given on each side of a border. For dry friction
-    a `Contact`, which knows static friction; for hysteresis a `Component`; for a corner, at which nothing
-    jumps, `abs` and `max`.
+    Use it for relays, variable-structure controllers and fields that differ on the two sides of a surface. For dry
+    friction use a `Contact`, which includes static friction; for hysteresis a `Component`; for continuous corners `abs`
+    or `max`.
 
     References
     ----------
@@ -82,11 +85,11 @@ class SwitchingSurface(Declared):
         if single := sorted(set(self.above) ^ set(self.below)):
             side, other = ("above", "below") if single[0] in self.above else ("below", "above")
             raise self._fault(
-                f"'{single[0]}' has a value {side} and none {other}", f"write {single[0]} = ... in {other}"
+                f"'{single[0]}' has a value {side} but not {other}", f"set {single[0]} in {other} too"
             )
 
     def component(self) -> Component:
-        """Its automaton, of the modes ``above``, ``below`` and ``sliding``."""
+        """Return the automaton, with the modes ``above``, ``below`` and ``sliding``."""
         return self._component
 
     @cached_property
@@ -108,7 +111,7 @@ class SwitchingSurface(Declared):
         return Component(self.name, modes, surface=surface, place=self.place)
 
     def blends(self) -> dict[str, Expression]:
-        """Its further variables as they are in sliding; with u = +1 and -1 these are their values on the sides."""
+        """Return the further variables in sliding, which for u = +1 and -1 equal those on the sides."""
         return {
             name: of_tree(blend(value.tree, self.below[name].tree, self.name), self.place)
             for name, value in self.above.items()
@@ -116,5 +119,5 @@ class SwitchingSurface(Declared):
 
 
 def blend(above: ast.expr, below: ast.expr, unknown: str) -> ast.expr:
-    """What is above where the unknown is 1, below where it is -1, and in proportion between."""
+    """Return the expression that interpolates linearly from below (unknown -1) to above (unknown +1)."""
     return with_names(_BLEND, {"above": above, "below": below, "u": ast.Name(unknown, ast.Load())})

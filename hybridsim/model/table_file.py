@@ -1,4 +1,4 @@
-"""Two columns of a CSV file: the table of an input."""
+"""Read two columns of a CSV file as the table of an input."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from pathlib import Path
 
 from hybridsim.errors import ModelError, Place, nearest
 
-# A table of a million rows has some 40 MB; more than that is no hand-made signal but a mistaken file.
+# Limit of the file size; a table with a million rows has about 40 MB.
 MAX_BYTES = 64_000_000
 
 
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
-    """Columns of a CSV file as numbers.
+    """Return columns of a CSV file as numbers.
 
-    Comma, semicolon or tab separates. Lines that are empty or begin with # are skipped. The first line holds the names
-    if a column is asked for by its name, or if there is no number in any column that is asked for by its index; what
-    stands in other columns decides nothing.
+    The separator is a comma, a semicolon or a tab. Empty lines and lines that start with # are skipped. The first line
+    contains names if a column is selected by name, or if none of the columns selected by index has a number there.
+    Other columns are ignored.
 
     Parameters
     ----------
-    columns : name, or index from 0, of each column wanted.
+    columns : name, or index from 0, of each selected column.
 
     Raises
     ------
     ModelError
-        With file and line: no such file or column, a cell that is no number.
+        For a missing file or column, or a cell that is not a number, with file and line.
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
     names = head if _are_names(head, columns) else None
     if len(rows) < (2 if names else 1):
-        remedy = "give time and value in each row."
+        remedy = "write time and value in each row"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     indices = [_index(column, names, len(head), path) for column in columns]
     found: list[tuple[float, ...]] = []
@@ -42,7 +42,7 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
 
 
 def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
-    """Whether the first line holds names."""
+    """Return whether the first line contains column names."""
     if any(isinstance(column, str) for column in columns):
         return not all(map(_is_number, head))
     return not any(0 <= column < len(head) and _is_number(head[column]) for column in map(int, columns))
@@ -52,17 +52,20 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     try:
         size = path.stat().st_size
         if not path.is_file():  # a device or a pipe may have no end
-            raise ModelError(f"{path} is no file", remedy="give a CSV file.")
+            raise ModelError(f"{path} is not a regular file", remedy="use a CSV file")
         if size > MAX_BYTES:
-            raise ModelError(f"{path} has {size} bytes, {MAX_BYTES} are allowed", remedy="thin it out.")
+            raise ModelError(
+                f"{path} has {size} bytes, but at most {MAX_BYTES} are allowed",
+                remedy="reduce the number of rows",
+            )
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError:
-        raise ModelError(f"there is no file {path}", remedy="correct the path.") from None
+        raise ModelError(f"the file {path} does not exist", remedy="correct the path") from None
     except UnicodeDecodeError:
-        raise ModelError(f"{path} is no text in UTF-8", remedy="write the table as CSV.") from None
+        raise ModelError(f"{path} is not a text file in UTF-8", remedy="write the table as CSV") from None
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
-        raise ModelError(f"{path} cannot be read: {reason}", remedy="give a CSV file.") from None
+        raise ModelError(f"{path} cannot be read: {reason}", remedy="use a CSV file") from None
     kept = [
         (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
     ]
@@ -74,7 +77,8 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         return [(n, row) for (n, _), row in zip(kept, rows, strict=True)]
     except (csv.Error, ValueError) as fault:
         raise ModelError(
-            f"{path} is no CSV file: {fault}", remedy="one row a line, no line breaks in cells."
+            f"{path} is not a valid CSV file: {fault}",
+            remedy="write one row per line, without line breaks in cells",
         ) from None
 
 
@@ -83,16 +87,20 @@ def _index(column: str | int, names: list[str] | None, width: int, path: Path) -
     if isinstance(column, int):
         if not 0 <= column < width:
             raise ModelError(
-                f"there is no column {column}", place=place, remedy=f"it has columns 0 to {width - 1}."
+                f"column {column} does not exist",
+                place=place,
+                remedy=f"the file has columns 0 to {width - 1}",
             )
         return column
     if names is None:
         raise ModelError(
-            f"there is no column '{column}', the first line is numbers", place=place, remedy="use indices."
+            f"column '{column}' does not exist, because the first line has no names",
+            place=place,
+            remedy="use indices",
         )
     if column not in names:
         raise ModelError(
-            f"there is no column '{column}'", place=place, remedy=nearest(column, names, kind="columns")
+            f"column '{column}' does not exist", place=place, remedy=nearest(column, names, kind="columns")
         )
     return names.index(column)
 
@@ -100,9 +108,9 @@ def _index(column: str | int, names: list[str] | None, width: int, path: Path) -
 def _cell(row: list[str], index: int, line: int, path: Path) -> float:
     text = row[index].strip() if index < len(row) else ""
     if not _is_number(text):
-        what = f"'{text}' is no number" if text else f"column {index} is empty"
+        what = f"'{text}' is not a number" if text else f"column {index} is empty"
         raise ModelError(
-            what, place=Place(str(path), line), remedy="every row needs a number in each column used."
+            what, place=Place(str(path), line), remedy="write a number in both columns of every row"
         )
     return float(text)
 

@@ -1,4 +1,4 @@
-"""Components out of TOML: modes, guards and choices, and which mode is the initial one."""
+"""Read components from TOML: modes, guards, choices and the initial mode."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from hybridsim.errors import Place
 from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.toml_table import Table
 
-# A file with one automaton needs no name for it: its modes stand in [modes.*].
+# Name of the only automaton of a file that declares its modes in [modes.*].
 SINGLE = "mode"
 
 
 def read_components(root: Table) -> Iterable[Component]:
-    """The automaton of the top-level [modes.*], then those of [components.*]."""
+    """Yield the automaton of the top-level [modes.*], then those of [components.*]."""
     if "modes" in root.data or "initial" in root.data:
         yield _component(SINGLE, root, root.source.place(("modes",)))
     for name, table in root.entries("components", "component"):
@@ -24,12 +24,12 @@ def read_components(root: Table) -> Iterable[Component]:
 def _component(name: str, table: Table, place: Place) -> Component:
     tables = dict(table.entries("modes", "mode"))
     if not tables:
-        table.fail("it has no modes", f"write [components.{name}.modes.NAME].")
+        table.fail("it has no modes", f"write [components.{name}.modes.NAME]")
     marked = [mode for mode, part in tables.items() if part.flag("initial")]
     named = table.text("initial") if "initial" in table.data else None
     for mode in marked:
         if mode != (named or marked[0]):
-            remedy = "a component starts in one mode: mark one."
+            remedy = "mark one mode as initial"
             table.fail(
                 f"two initial modes, '{named or marked[0]}' and '{mode}'", remedy, "modes", mode, "initial"
             )
@@ -43,7 +43,7 @@ def _component(name: str, table: Table, place: Place) -> Component:
 
 
 def read_mode(name: str, table: Table) -> Mode:
-    """One entry of a table of modes."""
+    """Read one entry of a table of modes."""
     table.only("guards", "der", "set", "initial")
     guards = tuple(
         _guard(guard, part) for guard, part in table.entries("guards", f"mode {name}, guard", "expr")
@@ -53,7 +53,7 @@ def read_mode(name: str, table: Table) -> Mode:
 
 def _guard(name: str, table: Table) -> Guard:
     table.only("expr", "then", "fatal")
-    expr = table.needed("expr", 'write expr = "what stays >= 0 while the mode lasts".')
+    expr = table.needed("expr", 'write expr = "EXPRESSION", which is >= 0 while the mode lasts')
     given = table.data.get("then", [])
     then = []
     for index, value in enumerate(given if isinstance(given, list) else [given]):
@@ -67,13 +67,13 @@ def _guard(name: str, table: Table) -> Guard:
 
 def _choice(table: Table) -> Choice:
     table.only("to", "when", "reset")
-    table.require("to", 'write to = "the next mode".')
+    table.require("to", 'write to = "MODE", the next mode')
     return Choice(table.text("to"), table.expression("when"), table.resets("reset"), place=table.place)
 
 
 def _limit(table: Table) -> Choice:
     table.only("to", "reset")
-    table.require("to", 'write to = "the mode at the limit".')
+    table.require("to", 'write to = "MODE", the mode after the limit')
     return Choice(table.text("to"), None, table.resets("reset"), place=table.place)
 
 
@@ -88,10 +88,12 @@ def _surface(parent: Table) -> Surface | None:
     jumps = ("jump_above", "jump_below")
     table.only("function", *names, *jumps, "unique", "restitution")
     for key in names:
-        table.require(key, f'write {key} = "...".')
+        table.require(key, f'write {key} = "..."')
     unknown, above, hold, *sides = (table.text(key) for key in names)
-    jump_above, jump_below = (table.needed(key, f"{key} = 0 says that nothing jumps there.") for key in jumps)
-    function = table.needed("function", 'write function = "s(t, x)".')
+    jump_above, jump_below = (
+        table.needed(key, f"write {key} = 0 if the unknown does not jump there") for key in jumps
+    )
+    function = table.needed("function", 'write function = "EXPRESSION"')
     unique = table.flag("unique")
     below = sides[0] if sides else None
     jumps_of = (jump_above, jump_below)

@@ -1,4 +1,4 @@
-"""Inputs out of TOML: waves, chirps, and tables given in place or in a CSV file beside the model."""
+"""Read inputs from TOML: waves, chirps, and tables in the file or in a CSV file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _NUMBERS = ("times", "values")
 
 
 def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
-    """The inputs of a file; ``folder`` is where the paths of tables begin."""
+    """Yield the inputs of a file; paths of tables are relative to ``folder``."""
     for name, table in root.entries("inputs", "input"):
         kind = table.text("kind")
         if kind not in KINDS:
-            what = f"the kind '{kind}' is not known" if kind else "'kind' is missing"
+            what = f"unknown kind '{kind}'" if kind else "'kind' is missing"
             table.fail(what, nearest(kind, KINDS, kind="kinds"), "kind")
             continue
         known = (*NEEDED[kind], *OPTIONAL[kind])
@@ -30,7 +30,7 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
             numbers = _from_file(table, folder)
         else:
             for key in NEEDED[kind]:
-                table.require(key, f"an input of kind {kind} needs {', '.join(NEEDED[kind])}.")
+                table.require(key, f"an input of kind {kind} needs {', '.join(NEEDED[kind])}")
             numbers = {key: _numbers(table, key) for key in _NUMBERS if key in table.data}
         texts = {key: table.text(key) for key in _TEXTS if key in table.data}
         rest = [key for key in known if key not in (*_TEXTS, *_NUMBERS) and key in table.data]
@@ -44,7 +44,7 @@ def _numbers(table: Table, key: str) -> tuple[float, ...]:
     numbers = given if isinstance(given, list) else [given]
     for index, value in enumerate(numbers):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            table.fail(f"'{key}' holds {value!r}", "it must be a list of numbers.", key, index)
+            table.fail(f"'{key}' contains {value!r}", "it must be a list of numbers", key, index)
             return ()
     return tuple(float(value) for value in numbers)
 
@@ -52,11 +52,11 @@ def _numbers(table: Table, key: str) -> tuple[float, ...]:
 def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
     for key in _NUMBERS:
         if key in table.data:
-            table.fail(f"both 'file' and '{key}' are given", "give the table in one way.", key)
+            table.fail(f"'file' and '{key}' cannot be combined", f"remove 'file' or '{key}'", key)
     columns = table.data.get("columns", [0, 1])
     good = isinstance(columns, list) and len(columns) == 2
     if not good or not all(isinstance(column, (str, int)) for column in columns):
-        table.fail(f"'columns' is {columns!r}", "give two names or indices: [time, value].", "columns")
+        table.fail(f"'columns' is {columns!r}", "use two names or indices, [time, value]", "columns")
         return {}
     path = folder / table.text("file")
     try:
@@ -64,7 +64,9 @@ def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
     except ModelError as fault:
         where = fault.place.prefix if fault.place else ""
         table.fail(
-            where + fault.message, f"{fault.remedy} Paths begin at the folder {folder.resolve()}", "file"
+            where + fault.message,
+            f"{fault.remedy}; paths are relative to the folder {folder.resolve()}",
+            "file",
         )
         return {}
     return {"times": times, "values": values}

@@ -1,4 +1,4 @@
-"""Friction laws out of TOML: [laws.*], and the law that a contact names or brings along."""
+"""Read friction laws from TOML: [laws.*], and the laws of contacts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BRINGS = ("slip", "stick", "force")
 
 
 def read_laws(root: Table) -> dict[str, FrictionLaw]:
-    """The laws that the file declares, by name."""
+    """Return the laws that the file declares, by name."""
     found = {}
     for name, table in root.entries("laws", "law"):
         table.only(*KEYS)
@@ -35,12 +35,12 @@ def read_laws(root: Table) -> dict[str, FrictionLaw]:
 def read_law_of_contact(
     contact: Table, laws: dict[str, FrictionLaw]
 ) -> tuple[FrictionLaw, dict[str, Expression]] | None:
-    """Law and arguments of a contact; None, with the fault noted, where there is none of that name.
+    """Return law and arguments of a contact, or None after reporting an unknown law.
 
-    ``law = { name = "coulomb", mu = "mu" }`` names one of the file or of the package; with ``slip`` and
-    ``stick``, or with ``force``, the law is brought along, and every other key is a parameter of it with its value.
+    ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package. With ``slip`` and ``stick``,
+    or with ``force``, the table declares the law itself, and every other key is a parameter with its value.
     """
-    if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }.'):
+    if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }'):
         return None
     table = contact.sub(contact.data["law"], f"{contact.kind}, law", "name", "law")
     if table is None:
@@ -52,14 +52,16 @@ def read_law_of_contact(
         return None if own is None else (own, arguments)
     for key in KEYS:
         if key in table.data:
-            table.fail(f"'{key}' belongs to the declaration of a law", f"write it in [laws.{name}].", key)
-    if not table.require("name", 'write law = { name = "coulomb", mu = 0.5 }.'):
+            table.fail(
+                f"'{key}' is allowed only in the declaration of a law", f"write it in [laws.{name}]", key
+            )
+    if not table.require("name", 'write law = { name = "coulomb", mu = 0.5 }'):
         return None
     law = laws.get(name) or _packaged(name)
     if law is None:
         from hybridsim.model.library import list_laws
 
-        table.fail(f"there is no law '{name}'", nearest(name, {*laws, *list_laws()}, kind="laws"), "name")
+        table.fail(f"unknown law '{name}'", nearest(name, {*laws, *list_laws()}, kind="laws"), "name")
         return None
     return law, arguments
 
@@ -81,11 +83,13 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
     for argument in arguments:
         parameters.setdefault(argument, None)
     force = table.expression("force")
-    slip: Any = table.expression("slip")  # None only beside a force, as FrictionLaw sees to
+    slip: Any = table.expression("slip")  # None only together with a force, which FrictionLaw checks
     stick: Any = table.expression("stick")
     if force is None:
-        slip = table.needed("slip", 'write slip = "force over v >= 0, N and parameters", or force = "...".')
-        stick = table.needed("stick", 'write stick = "limit over N and parameters".')
+        slip = table.needed(
+            "slip", 'write slip = "EXPRESSION" of v >= 0, N and parameters, or force = "EXPRESSION"'
+        )
+        stick = table.needed("stick", 'write stick = "EXPRESSION" of N and parameters')
     modes = dict(table.entries("modes", "mode"))
     marked = [mode for mode, part in modes.items() if part.flag("initial")]
     texts = {key: table.text(key) for key in ("initial", "copies") if key in table.data}
@@ -109,7 +113,7 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
             place=table.place,
         )
     except UsageError as fault:
-        table.fail(fault.message.partition(": ")[2], f"{fault.remedy}.")
+        table.fail(fault.message.partition(": ")[2], fault.remedy or "")
         return None
 
 
@@ -117,7 +121,7 @@ def _states(law: Table) -> Iterator[State]:
     for name, table in law.entries("states", f"{law.kind}, state", "der"):
         table.only("start", "der", "unit", "nominal")
         start = table.expression("start") or parse(0)
-        der = table.needed("der", 'write der = "..." over v, N, parameters and states of the law.')
+        der = table.needed("der", 'write der = "EXPRESSION" of v, N, parameters and states of the law')
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 
@@ -125,19 +129,19 @@ def _tables(law: Table) -> Iterator[LawTable]:
     for name, table in law.entries("tables", f"{law.kind}, table"):
         table.only("at", "values", "over")
         for key in ("at", "values"):
-            table.require(key, f"write {key} = [0, ...].")
+            table.require(key, f"write {key} = [0, ...]")
         over = table.expression("over") or parse(SPEED)
         try:
             yield LawTable(name, table.numbers("at"), table.numbers("values"), over, place=table.place)
         except UsageError as fault:
-            table.fail(fault.message.partition(": ")[2], f"{fault.remedy}.")
+            table.fail(fault.message.partition(": ")[2], fault.remedy or "")
 
 
 def _listed(table: Table, item: Any, index: int) -> dict[str, Expression | None]:
-    """One entry of a list of parameters: a name without default, or a table of names with theirs."""
+    """Return one entry of a list of parameters: a name without default, or names with defaults."""
     if isinstance(item, str):
         return {item: None}
     if isinstance(item, dict):
         return {name: table.parsed(value, "parameters", index, name) for name, value in item.items()}
-    table.fail(f"'parameters' holds {item!r}", "write a name, or { name = default }.", "parameters", index)
+    table.fail(f"'parameters' contains {item!r}", "write a name, or { name = default }", "parameters", index)
     return {}

@@ -1,4 +1,4 @@
-"""A model out of a TOML text: the tables of the file form, one function each."""
+"""Read a model from TOML text, with one function for each kind of table."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def read_model(text: str, path: str | None = None) -> Model:
     Raises
     ------
     ModelError
-        For what is not TOML (with line and column), or all faults of form in one, or all faults of content in one.
+        For invalid TOML (with line and column), for all errors of the tables, or for all errors of the model.
     """
     root = open_text(text, path, "the model")
     model = _model(root, Path(path).parent if path else Path())
@@ -48,9 +48,9 @@ def read_model(text: str, path: str | None = None) -> Model:
 
 
 def open_text(text: str, path: str | None, kind: str) -> Table:
-    """The top table of a TOML text; ModelError where the text is empty or no TOML."""
+    """Return the top table of a TOML text, or raise ModelError if it is empty or not valid TOML."""
     if not text.strip():
-        raise ModelError("the file is empty", place=Place(path), remedy="a model has at least [states].")
+        raise ModelError("the file is empty", place=Place(path), remedy="write at least [states]")
     try:
         data = tomllib.loads(text)
         source = Source(path, _split(text), positions(text))
@@ -58,7 +58,7 @@ def open_text(text: str, path: str | None, kind: str) -> Table:
         raise _not_toml(fault, text, path) from None
     except (ValueError, RecursionError) as fault:
         reason = "it is nested too deeply" if isinstance(fault, RecursionError) else str(fault)
-        raise ModelError(f"not TOML: {reason}", place=Place(path), remedy="simplify the file.") from None
+        raise ModelError(f"invalid TOML: {reason}", place=Place(path), remedy="simplify the file") from None
     return Table(source, (), data, kind)
 
 
@@ -69,21 +69,21 @@ def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> Mo
     line, column = (int(found[1]), int(found[2]) - 1) if found else (len(lines), 0)
     shown = lines[line - 1] if 0 < line <= len(lines) else ""
     return ModelError(
-        f"not TOML: {message[:1].lower()}{message[1:]}",
+        f"invalid TOML: {message[:1].lower()}{message[1:]}",
         place=Place(path, line, column, shown),
-        remedy='TOML wants key = value, expressions in double quotes: der = "-k*x".',
+        remedy='write key = value, with expressions in double quotes: der = "-k*x"',
     )
 
 
 def _split(text: str) -> list[str]:
-    """Lines as TOML counts them: other characters that Python calls line breaks are not."""
+    """Split a text into lines as TOML does, only at line feeds."""
     return [line.rstrip("\r") for line in text.split("\n")]
 
 
 def _model(root: Table, folder: Path) -> Model:
     root.only(*KEYS)
     if root.data.get("schema", SCHEMA) != SCHEMA:
-        root.fail(f"schema {root.data['schema']!r} is not known", f"write schema = {SCHEMA}.", "schema")
+        root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
     name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
     laws = read_laws(root)
     return Model(
@@ -113,30 +113,30 @@ def _model(root: Table, folder: Path) -> Model:
 def _parameters(root: Table) -> Iterable[Parameter]:
     for name, table in root.entries("parameters", "parameter", "value"):
         table.only("value", "unit", "title")
-        value = table.needed("value", "write value = a number or an expression.")
+        value = table.needed("value", 'write value = NUMBER or "EXPRESSION"')
         yield Parameter(name, value, table.text("unit"), table.text("title"), place=table.place)
 
 
 def _states(root: Table) -> Iterable[State]:
     for name, table in root.entries("states", "state"):
         table.only("start", "der", "unit", "nominal")
-        start = table.needed("start", "write start = the initial value.")
-        der = table.needed("der", 'write der = "..." (the modes may override it in their own der).')
+        start = table.needed("start", "write start = NUMBER, the initial value")
+        der = table.needed("der", 'write der = "EXPRESSION"; modes may replace it by their own der')
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 
 def _discrete(root: Table) -> Iterable[Discrete]:
     for name, table in root.entries("discrete", "discrete state", "start"):
         table.only("start", "unit")
-        start = table.needed("start", "write start = the initial value.")
+        start = table.needed("start", "write start = NUMBER, the initial value")
         yield Discrete(name, start, table.text("unit"), place=table.place)
 
 
 def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
     for name, table in root.entries("contacts", "contact"):
         table.only("velocity", "normal", "law", "opens", "start", "nominal")
-        velocity = table.needed("velocity", 'write velocity = "the relative velocity".')
-        normal = table.needed("normal", 'write normal = "the normal load".')
+        velocity = table.needed("velocity", 'write velocity = "EXPRESSION", the relative velocity')
+        normal = table.needed("normal", 'write normal = "EXPRESSION", the normal load')
         law = read_law_of_contact(table, laws)
         if law is not None:
             yield Contact(
@@ -154,12 +154,12 @@ def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
 def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
     for name, table in root.entries("surfaces", "surface", "expr"):
         table.only("expr", "above", "below")
-        expr = table.needed("expr", 'write expr = "what is positive on one side and negative on the other".')
+        expr = table.needed("expr", 'write expr = "EXPRESSION", which changes its sign at the surface')
         above, below = table.expressions("above"), table.expressions("below")
         single = sorted(set(above) ^ set(below))
         for one in single:
             given, side = ("above", "below") if one in above else ("below", "above")
-            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}.", given, one)
+            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}", given, one)
         if not single:
             yield SwitchingSurface(name, expr, above, below, place=table.place)
 
@@ -167,15 +167,15 @@ def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
 def _impacts(root: Table) -> Iterable[Impact]:
     for name, table in root.entries("impacts", "impact"):
         table.only("gap", "restitution")
-        gap = table.needed("gap", 'write gap = "what cannot become negative", of positions.')
-        restitution = table.needed("restitution", "write restitution = a number from 0 to 1.")
+        gap = table.needed("gap", 'write gap = "EXPRESSION" of positions, which cannot become negative')
+        restitution = table.needed("restitution", "write restitution = NUMBER from 0 to 1")
         yield Impact(name, gap, restitution, place=table.place)
 
 
 def _monitors(root: Table) -> Iterable[Monitor]:
     for name, table in root.entries("monitors", "monitor", "expr"):
         table.only("expr", "direction", "action", "reset")
-        expr = table.needed("expr", 'write expr = "the scalar to watch".')
+        expr = table.needed("expr", 'write expr = "EXPRESSION", whose zeros are the events')
         action = table.text("action", "reset" if "reset" in table.data else "record")
         direction = table.text("direction", "both")
         yield Monitor(name, expr, direction, action, table.resets("reset"), place=table.place)
@@ -205,7 +205,7 @@ def _times(table: Table) -> Iterable[Expression]:
 def _clocks(root: Table) -> Iterable[Schedule]:
     for name, table in root.entries("clocks", "clock"):
         table.only("period", "offset", "set")
-        period = table.needed("period", "write period = the time between ticks.")
+        period = table.needed("period", "write period = NUMBER, the time between ticks")
         start = table.expression("offset")
         yield Schedule(name, start=start, period=period, reset=table.resets("set"), place=table.place)
 
@@ -213,5 +213,5 @@ def _clocks(root: Table) -> Iterable[Schedule]:
 def _outputs(root: Table) -> Iterable[Output]:
     for name, table in root.entries("outputs", "output", "expr"):
         table.only("expr", "unit", "modes")
-        expr = table.needed("expr", 'write expr = "what to look at".')
+        expr = table.needed("expr", 'write expr = "EXPRESSION", the value of the output')
         yield Output(name, expr, table.text("unit"), table.expressions("modes"), place=table.place)

@@ -1,4 +1,4 @@
-"""One TOML table while it is read: hands out checked values, collects every fault with its line."""
+"""Checked access to a TOML table, which collects all errors with their lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ZERO = parse(0)
 
 @dataclass
 class Source:
-    """The text that is read, where its keys stand, and the faults found so far."""
+    """The text of the file, the positions of its keys, and the errors found so far."""
 
     file: str | None
     lines: list[str]
@@ -24,7 +24,7 @@ class Source:
     errors: list[ModelError] = field(default_factory=list)
 
     def place(self, path: Path) -> Place:
-        """Place of a key, or of the nearest table around it that has a line."""
+        """Return the place of a key, or of the nearest enclosing table with a known line."""
         while path and path not in self.positions:
             path = path[:-1]
         if not path:
@@ -34,7 +34,7 @@ class Source:
 
 
 class Table:
-    """A table at a path; a getter reports a wrong type and returns a stand-in, so that reading goes on."""
+    """A table at a path; getters report wrong types and return a placeholder, so that reading continues."""
 
     def __init__(self, source: Source, path: Path, data: Mapping[str, Any], kind: str) -> None:
         self.source = source
@@ -44,24 +44,24 @@ class Table:
         self.place = source.place(path)
 
     def fail(self, message: str, remedy: str, *keys: str | int) -> None:
-        """Note a fault at this table, or at a key of it."""
+        """Report an error at this table, or at one of its keys."""
         place = self.source.place((*self.path, *keys))
         self.source.errors.append(ModelError(f"{self.kind}: {message}", place=place, remedy=remedy))
 
     def only(self, *known: str) -> None:
-        """Report every key that is not known here."""
+        """Report every unknown key."""
         for key in self.data:
             if key not in known:
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
 
     def require(self, key: str, remedy: str) -> bool:
-        """Whether the key is there; reports it if not."""
+        """Return whether the key exists, and report it if not."""
         if key not in self.data:
             self.fail(f"'{key}' is missing", remedy)
         return key in self.data
 
     def text(self, key: str, default: str = "") -> str:
-        return str(self._typed(key, str, "a text in quotes", default))
+        return str(self._typed(key, str, "a string in quotes", default))
 
     def flag(self, key: str) -> bool:
         return bool(self._typed(key, bool, "true or false", False))
@@ -71,7 +71,7 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int):
-            self.fail(f"'{key}' is {_shown(value)}", "it must be a whole number.", key)
+            self.fail(f"'{key}' is {_shown(value)}", "it must be a whole number", key)
             return None
         return value
 
@@ -80,27 +80,27 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.fail(f"'{key}' is {_shown(value)}", "it must be a number.", key)
+            self.fail(f"'{key}' is {_shown(value)}", "it must be a number", key)
             return None
         return _real(value)
 
     def reals(self, key: str) -> dict[str, float]:
-        """A table of numbers under a key; empty where it is absent."""
+        """Return a table of numbers, empty if the key is missing."""
         found = self._typed(key, dict, "a table of numbers", {})
         table = Table(self.source, (*self.path, key), found, f"{self.kind}, {key}")
         return {name: value for name in found if (value := table.real(name)) is not None}
 
     def numbers(self, key: str) -> tuple[float, ...]:
-        """A list of numbers under a key; empty, and reported, where it is none."""
+        """Return a list of numbers; a wrong list is reported and returned as empty."""
         found = self._typed(key, list, "a list of numbers", [])
         wrong = [value for value in found if isinstance(value, bool) or not isinstance(value, (int, float))]
         if wrong:
-            self.fail(f"'{key}' holds {_shown(wrong[0])}", "it must be a list of numbers.", key)
+            self.fail(f"'{key}' contains {_shown(wrong[0])}", "it must be a list of numbers", key)
             return ()
         return tuple(_real(value) for value in found)
 
     def expression(self, key: str, remedy: str | None = None) -> Expression | None:
-        """The expression under a key; None where it is absent, which is a fault if a remedy is given."""
+        """Return the expression of a key, or None; with a remedy, a missing key is reported."""
         if key not in self.data:
             if remedy is None:
                 return None
@@ -114,7 +114,7 @@ class Table:
     def parsed(
         self, value: Any, *keys: str | int, form: Callable[[Any, Place], Expression] = parse
     ) -> Expression:
-        """An expression out of a TOML value that stands at a key of this table."""
+        """Parse the TOML value at a key of this table as an expression."""
         place = self.source.place((*self.path, *keys))
         try:
             return form(value, Place(place.file, place.line))
@@ -127,27 +127,27 @@ class Table:
             return _ZERO
 
     def expressions(self, key: str) -> dict[str, Expression]:
-        """A table of expressions under a key; empty where it is absent."""
+        """Return a table of expressions, empty if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name) for name, value in found.items()}
 
     def resets(self, key: str) -> dict[str, Expression]:
-        """A table of resets under a key, some of which may add: '+= amount'; empty where it is absent."""
+        """Return a table of resets, which may contain '+= amount', empty if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name, form=parse_reset) for name, value in found.items()}
 
     def entries(self, key: str, kind: str, shorthand: str | None = None) -> Iterator[tuple[str, Table]]:
-        """Named sub-tables under a key; a plain value stands for a table with the ``shorthand`` key alone."""
+        """Yield named sub-tables; a plain value becomes a table with only the ``shorthand`` key."""
         for name, value in self._typed(key, dict, "a table", {}).items():
             table = self.sub(value, f"{kind} {name}", shorthand, key, name)
             if table is not None:
                 yield name, table
 
     def sub(self, value: Any, kind: str, shorthand: str | None, *keys: str | int) -> Table | None:
-        """A table out of a value at a key; None, reported, where it is none."""
+        """Return the sub-table at a key, or None after reporting a wrong type."""
         if not isinstance(value, dict):
             if shorthand is None or isinstance(value, list):
-                self.fail(f"{kind} is {_shown(value)}", "it must be a table { ... }.", *keys)
+                self.fail(f"{kind} is {_shown(value)}", "it must be a table { ... }", *keys)
                 return None
             value = {shorthand: value}
         return Table(self.source, (*self.path, *keys), value, kind)
@@ -155,13 +155,13 @@ class Table:
     def _typed(self, key: str, kind: type, wanted: str, default: Any) -> Any:
         value = self.data.get(key, default)
         if not isinstance(value, kind):
-            self.fail(f"'{key}' is {_shown(value)}", f"it must be {wanted}.", key)
+            self.fail(f"'{key}' is {_shown(value)}", f"it must be {wanted}", key)
             return default
         return value
 
 
 def _real(value: float) -> float:
-    """A number as a double; what is beyond all of them is infinite, and refused where a finite one is needed."""
+    """Return a number as float; numbers beyond the range of floats become infinite."""
     try:
         return float(value)
     except OverflowError:
@@ -173,7 +173,7 @@ def _shown(value: Any) -> str:
         bool: "true or false",
         dict: "a table",
         list: "a list",
-        str: "a text",
+        str: "a string",
         int: "a number",
         float: "a number",
     }

@@ -1,4 +1,4 @@
-"""A model as a TOML text that stands on its own and reads back to an equal model."""
+"""Write a model as complete TOML text, which reads back to an equal model."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def write_model(model: Model) -> str:
-    """TOML text of a model; laws and tables are written into it, so it needs no other file."""
+    """Return the TOML text of a model, including its laws and tables."""
     return "\n".join(_lines(model)) + "\n"
 
 
@@ -86,7 +86,7 @@ def _given(value: Any) -> bool:
 
 
 def _short(key: str, value: Expression, **more: Any) -> Any:
-    """A plain value where there is nothing else to say, a table otherwise."""
+    """Return a plain value if there are no further fields, otherwise a table."""
     rest = {name: text for name, text in more.items() if _given(text)}
     return {key: value, **rest} if rest else value
 
@@ -97,7 +97,7 @@ def _input(signal: Input) -> dict[str, Any]:
 
 
 def _law(law: FrictionLaw) -> dict[str, Any]:
-    # Only the form of a list can say that a parameter has no default.
+    # TOML has no null, so parameters without a default need the list form
     parameters: Any = law.parameters
     if None in law.parameters.values():
         parameters = [name if value is None else {name: value} for name, value in law.parameters.items()]
@@ -124,7 +124,7 @@ def _law(law: FrictionLaw) -> dict[str, Any]:
 
 def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any]:
     law: dict[str, Any] = {"name": contact.law.name}
-    if laws[contact.law.name] != contact.law:  # a second law of the same name goes along with its contact
+    if laws[contact.law.name] != contact.law:  # another law with the same name is written into its contact
         law |= _law(contact.law)
     fields = ("velocity", "normal", "opens", "start", "nominal")
     return {**{name: getattr(contact, name) for name in fields}, "law": {**law, **contact.arguments}}
@@ -183,7 +183,7 @@ def _key(name: str) -> str:
 
 
 def _text(text: str) -> str:
-    # TOML's basic strings are JSON's, but for DEL, which TOML wants escaped.
+    # a basic string of TOML equals one of JSON, except that DEL must be escaped
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
@@ -203,7 +203,7 @@ def _value(value: Any) -> str:
 
 
 def _number(text: str) -> str | None:
-    """The text itself where it is a number that TOML reads back to the same text; else None."""
+    """Return the text if it is a number that TOML reads back to the same text, otherwise None."""
     for kind in (int, float):
         try:
             value = kind(text)

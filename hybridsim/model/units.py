@@ -1,4 +1,4 @@
-"""Units of what a model names, as they were declared; of a contact force from the load that presses it."""
+"""Units of the quantities of a model; a contact force has the unit of its load."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
 
-_COUNT = 4  # numbers up to this, halves and quarters included, are taken to have no unit
+_COUNT = 4  # multiples of 1/4 up to this count as dimensionless factors
 
 
 def units_of(model: Model) -> dict[str, str]:
-    """Names of states, outputs, contact forces, discrete states and inputs, in that order, with their units."""
+    """Return the units of states, outputs, contact forces, discrete states and inputs, in this order."""
     units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
     rest = dict.fromkeys((contact.name for contact in model.contacts), "")
     if missing := [contact for contact in model.contacts if contact.name not in units]:
@@ -27,13 +27,13 @@ def units_of(model: Model) -> dict[str, str]:
 
 
 def unit_of(model: Model, expression: Expression) -> str:
-    """The unit of an expression of a model, where it is that of one of its parts; else empty."""
+    """Return the unit of an expression if it equals the unit of one of its terms, otherwise ""."""
     units = units_of(model) | {q.name: q.unit for q in model.parameters}
     return _unit(expression.tree, units, {name: e.tree for name, e in model.definitions})
 
 
 def rate_of(unit: str, time: str, order: int) -> str:
-    """The unit of a derivative with respect to time."""
+    """Return the unit of a time derivative."""
     if not unit or not time or order == 0:
         return unit
     known = re.fullmatch(rf"(.*)/{re.escape(time)}(?:\^(\d+))?", unit)
@@ -42,7 +42,7 @@ def rate_of(unit: str, time: str, order: int) -> str:
 
 
 def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:
-    """Of each friction force that of its load, coefficients having none; where that is a number, of a coefficient."""
+    """Return the unit of each friction force, from its load or, for a numeric load, from a coefficient."""
     known = {q.name: q.unit for q in model.states} | {q.name: q.unit for q in model.parameters}
     known |= {q.name: q.unit for q in model.discrete}
     definitions = {name: expression.tree for name, expression in model.definitions}
@@ -57,10 +57,10 @@ def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:
 
 
 def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, ast.expr]) -> str:
-    """The unit of an expression where it is that of one of its parts; "" where units would have to be multiplied.
+    """Return the unit of an expression, or "" if units would have to be multiplied.
 
-    A number that multiplies may have a unit of its own, which nothing tells: 9.81*m is no mass. Up to 4, halves and
-    quarters included, it is taken for a share or a count: 0.5*N is a load.
+    A numeric factor may have an unknown unit: 9.81*m is not a mass. Multiples of 1/4 up to 4 count as dimensionless:
+    0.5*N is a load.
     """
 
     def of(part: ast.expr) -> str:
@@ -89,7 +89,7 @@ def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, as
 
 
 def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> bool:
-    """Whether a factor or a divisor of a product is a number that counts nothing, also by way of names."""
+    """Return whether a product contains a numeric factor that may have a unit, also through definitions."""
     match node:
         case ast.Constant(value=int() | float() as value):
             return bool(abs(value) > _COUNT or (4 * value) % 1)
@@ -103,6 +103,6 @@ def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> boo
 
 
 def time_unit(model: Model) -> str:
-    """Seconds, if any unit of the model speaks of them; else time has no unit."""
+    """Return "s" if any unit of the model contains seconds, otherwise ""."""
     units = [*units_of(model).values(), *(parameter.unit for parameter in model.parameters)]
     return "s" if any(re.search(r"(?<![A-Za-z])s(?![A-Za-z])", unit) for unit in units) else ""

@@ -1,4 +1,4 @@
-"""Whether a declaration holds together: every check, all faults collected."""
+"""Run all checks of a model and collect the errors."""
 
 from __future__ import annotations
 
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
 
 
 def find_errors(model: Model) -> tuple[ModelError, ...]:
-    """All faults of a model, in the order of the checks.
+    """Return all errors of a model, in the order of the checks.
 
-    Names come first, then how the parts fit together, then the expressions; values are only looked at where
-    all of that is sound, since they would repeat the same faults in other words.
-
-    In a copy of a sound model with other values, only these are looked at.
+    The checks of names come first, then those of the structure, then those of the expressions. Values are checked
+    only if all of these succeed, because they would repeat the same errors. In a copy of a valid model with other
+    values only the values are checked.
     """
     scope = Scope(model)
     if model.is_known_to_be_sound:

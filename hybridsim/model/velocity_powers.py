@@ -1,4 +1,4 @@
-"""Fractional powers of a contact's velocity: without a value beyond zero, or without a Taylor series at it."""
+"""Fractional powers of a contact velocity, which are undefined below zero or not differentiable at zero."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VelocityPower:
-    """A root or a power, of what is zero where a contact sticks, that is no product there.
+    """A root or fractional power of a quantity that is zero while a contact sticks.
 
-    Its exponent is no whole number, or a parameter with a larger one than such powers are made products for.
+    The exponent is not a whole number, or it is a parameter whose whole value is not in `WHOLE_POWERS`.
 
     Parameters
     ----------
-    text, where : as it reads, and the rate or the force that it stands in.
-    contact : whose velocity it is.
-    is_signed : the base changes its sign with the velocity, and no condition stands before it: in one of the modes of
-        slip it has no value.
-    remedy : the same power, rounded over a small speed.
+    text, where : source text, and the rate or force that contains it.
+    contact : contact whose velocity it depends on.
+    is_signed : the base changes its sign with the velocity without a condition, so the power is undefined in one slip
+        mode.
+    remedy : the same power, smoothed over a small speed.
     """
 
     text: str
@@ -44,7 +44,7 @@ class VelocityPower:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A root or power in a flow; exponent None: one half. families: those of velocities that may be meant."""
+    """A root or power in a flow; an exponent of None is 1/2, `families` are the possible velocities."""
 
     node: ast.expr
     base: ast.expr
@@ -57,7 +57,7 @@ class _Candidate:
 
 
 def velocity_powers(model: Model) -> tuple[VelocityPower, ...]:
-    """Every such power of a model, as far as the form of its expressions shows it."""
+    """Return all such powers of a model that the form of its expressions shows."""
     found = model.once("velocity powers", lambda: _candidates(model))
     if not found:
         return ()
@@ -83,7 +83,7 @@ def _of_model(
         yield from _of(
             state.der, f"the rate of {state.name}", state.der.place or state.place, families, meanings
         )
-    for part in model.components:  # a mode of theirs may hold where the power has a value
+    for part in model.components:  # such a mode may be active only while the power is defined
         for mode in part.modes:
             for name, expr in (*mode.der.items(), *mode.set.items()):
                 where = f"{name} of mode {mode.name}"
@@ -144,7 +144,7 @@ def _judged(
 
 
 def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], meanings: Meanings) -> bool:
-    """Whether the form of an expression shows that it is zero where those of a family are."""
+    """Return whether the form of an expression shows that it is zero at zero velocity of a family."""
     if not names_of(node).isdisjoint(meanings.moving) and meanings.family(node)[0] == family:
         return True
 
@@ -171,9 +171,9 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
 
 
 def _rounded(base: str, power: float | None, is_force: bool) -> str:
-    """The power without its corner at zero, over a small speed b: a magnitude, or with the sign of its base."""
+    """Return the remedy: a smooth power over a small speed b, even for forces and odd for rates."""
     if power is None or power < 0.0 or not base.isidentifier():
-        return "round it over a small speed b, as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
+        return "smooth it with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
     if is_force:
-        return f"round it over a small speed b: ({base}**2 + b**2)**{power / 2:g} - b**{power:g}"
-    return f"round it over a small speed b: {base}*({base}**2 + b**2)**{(power - 1) / 2:g}"
+        return f"replace it by ({base}**2 + b**2)**{power / 2:g} - b**{power:g} with a small speed b"
+    return f"replace it by {base}*({base}**2 + b**2)**{(power - 1) / 2:g} with a small speed b"

@@ -184,7 +184,7 @@ def test_static_and_kinetic() -> None:
     check(found, values, full)
     assert found.simplest.name == "full model"
     assert found["mu_s=mu_k"].verdict == "not adequate"
-    assert "holds more at rest" in found["tanh"].why
+    assert "static friction" in found["tanh"].why
 
 
 def test_settings_are_measured() -> None:

@@ -65,10 +65,10 @@ def test_a_table_of_too_many_points(points: int, tmp_path: object) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["sweep", "dfcs", "F0=1:2:10000000000"], "sweep in parts"),
-        (["sweep", "dfcs", "F0=1:2:" + "9" * 5000], "sweep in parts"),
+        (["sweep", "dfcs", "F0=1:2:10000000000"], "in several sweeps"),
+        (["sweep", "dfcs", "F0=1:2:" + "9" * 5000], "in several sweeps"),
         (["sweep", "dfcs", "F0=1:2:100000", "N=1:2:100000"], "more than 33554432 points"),
-        (["run", "dfcs", "--csv", "r.csv", "--points", "10000000000"], "give at most"),
+        (["run", "dfcs", "--csv", "r.csv", "--points", "10000000000"], "use at most"),
         (["run", "dfcs", "--csv", "r.csv", "--points", "9" * 5000], "whole number"),
     ],
 )

@@ -36,4 +36,4 @@ def test_what_is_refused(hybridsim: Callable) -> None:
     code, _, err = hybridsim("advise", "dfcs", "--quantity", "amplitud.x")
     assert code == 2 and "amplitude" in err
     code, _, err = hybridsim(*ASK, "--uncertain", "mu=0.3")
-    assert code == 2 and "NAME=LOW:HIGH" in err
+    assert code == 2 and "mu=LOW:HIGH" in err

@@ -17,10 +17,10 @@ from hybridsim.testing import SCENES, TROUBLES
     [
         (("SCI-cubik",), "SCI-cubic"),
         (("--class", "slidding"), "sliding"),
-        (("FREE-1", "--class", "stick"), "leave out one"),
+        (("FREE-1", "--class", "stick"), "cannot be combined"),
         (("FREE-1", "--integrators", "rk4-sing"), "rk4-sign"),
         (("FREE-1", "--workers", "0"), "--workers"),
-        (("FREE-1", "--workers", "1" + 12 * "0"), "more than 1024"),
+        (("FREE-1", "--workers", "1" + 12 * "0"), "at most 1024"),
     ],
 )
 def test_bad_usage_names_what_is_near(

@@ -114,7 +114,7 @@ BAD = {
     "newer schema": (swapped(GOOD, "schema = 1", "schema = 99"), ["99"], 1),
     "no states": ('schema = 1\nname = "none"\n', ["state"], None),
     "empty file": ("", ["empty"], None),
-    "not TOML": ("states = { x = ", ["TOML"], 1),
+    "invalid TOML": ("states = { x = ", ["TOML"], 1),
     "twice the same key": (swapped(GOOD, "mu = 0.3", "mu = 0.3\nmu = 0.4"), ["mu"], 8),
 }
 

@@ -23,7 +23,7 @@ def test_a_warning_names_file_line_and_remedy(hybridsim: Callable, tmp_path: Pat
     assert code == 0
     assert "mode a" in out
     assert err.startswith("hybridsim: warning: odd.toml:7: guard g of mode a")
-    assert "never fires" in err and "write a quantity" in err
+    assert "never fires" in err and "write an expression" in err
 
 
 def test_warnings_as_json(hybridsim: Callable, tmp_path: Path) -> None:
@@ -53,9 +53,9 @@ def test_corners_and_jumps_are_accounted_for(hybridsim: Callable, tmp_path: Path
     (tmp_path / "cornered.toml").write_text(CORNERED)
     code, out, _ = hybridsim("check", "cornered.toml")
     assert code == 0
-    assert "abs(x) in state v: two modes that agree where they change" in out
-    assert "sign(v) in state v: it jumps, and switches with sign(v)" in out
-    assert "2 if x == 0.5 else 1 in state v: integrated as it stands, it jumps" in out
+    assert "abs(x) in state v: two modes, continuous at the change of mode" in out
+    assert "sign(v) in state v: a jump at the switching surface sign(v)" in out
+    assert "2 if x == 0.5 else 1 in state v: not replaced by modes, it jumps" in out
     primitives = json.loads(hybridsim("check", "cornered.toml", "--json")[1])["primitives"]
     assert [(one["text"], one["became"], one["line"]) for one in primitives] == [
         ("abs(x)", "component", 5),
@@ -70,8 +70,8 @@ def test_a_run_warns_of_a_jump_before_it_begins_and_once(hybridsim: Callable, tm
         'v = { start = 0, der = "-x if x != 0.5 else -2*x" }\n'
     )
     _, _, err = hybridsim("run", "c.toml", "--t-end", "1e6", "--limit", "steps=300")
-    assert err.index("jumps inside a mode") < err.index("300 steps")
-    assert err.count("jumps inside a mode") == 1
+    assert err.index("is not treated as a switching surface") < err.index("300 steps")
+    assert err.count("is not treated as a switching surface") == 1
 
 
 NOTED = """schema = 1
@@ -112,15 +112,16 @@ def test_starts_on_a_guard_and_loads_that_can_vanish_are_noted(hybridsim: Callab
     assert code == 0
     assert json.loads(out)["notes"] == [
         "the relative velocity of contact f (u - 1) is zero at the start: the forces decide whether it sticks",
-        "the gap of impact q (x - a - b) is zero at the start: its rates decide whether it is closed",
+        "the gap of impact q (x - a - b) is zero at the start: its time derivatives decide whether it is closed",
         "guard even of mode one, component mode (x - (a + b)) is zero at the start: "
-        "the first of its rates that is not zero decides whether it fires at once",
-        "the normal load of contact f (k*max(-y, 0)) can reach zero: friction ends there until it is positive again",
-        "the normal load of contact g (y) may become negative: the contact opens where it reaches zero",
+        "its first nonzero time derivative decides whether it fires immediately",
+        "the normal load of contact f (k*max(-y, 0)) can reach zero: friction is then zero until the load is positive "
+        "again",
+        "the normal load of contact g (y) can become negative: the contact opens when it reaches zero",
     ]
     text = hybridsim("check", "noted.toml")[1]
     assert "\nnotes\n  the relative velocity of contact f (u - 1) is zero at the start" in text
-    assert "abs(x) in guard bent of mode one of mode: two modes that agree where they change" in text
+    assert "abs(x) in guard bent of mode one of mode: two modes, continuous at the change of mode" in text
 
 
 def test_a_start_off_its_guards_has_no_notes(hybridsim: Callable, tmp_path: Path) -> None:

@@ -179,8 +179,8 @@ def test_check_prints_the_automaton(hybridsim: Callable) -> None:
         "mode slip+ (linear)",
         "mode stick",
         "while mu*N - f >= 0",
-        "to slip+",
-        "clusters",
+        "to the admissible mode of slip+, slip-",
+        "selected together",
         "operations",
     ):
         assert part in out
@@ -262,7 +262,7 @@ def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: 
     (root / "elsewhere" / "kept.txt").write_text("what a link leads to")
     (root / "engine-link").symlink_to("elsewhere")
     code, _, err = hybridsim("cache", "clear")
-    assert code == 0 and "freed 0.0 MB" in err
+    assert code == 0 and "deleted 0.0 MB" in err
     assert f"{others} is left alone" in err and str(made) not in err
     assert not made.exists()
     left = {str(path.relative_to(root)) for path in root.rglob("*")}
@@ -311,10 +311,10 @@ def test_run_lasts_as_long_as_the_model_says(hybridsim: Callable) -> None:
 def test_steady_calls_the_sliding_of_a_surface_by_its_name(hybridsim: Callable) -> None:
     """Its share of the period is that of its own mode, and it has no work of friction; a contact has both."""
     _, of_surface, _ = hybridsim("steady", "relay-control")
-    assert "100 % of the period in sliding, 0 stops a period\n" in of_surface
+    assert "100 % of the period in sliding, 0 stops per period\n" in of_surface
     assert "stick" not in of_surface
     _, of_contact, _ = hybridsim("steady", "dfcs")
-    assert "% of the period in stick, 2 stops a period, work 0.0316" in of_contact
+    assert "% of the period in stick, 2 stops per period, work 0.0316" in of_contact
 
 
 def test_steady_says_on_stderr_why_it_found_nothing(hybridsim: Callable) -> None:
@@ -325,4 +325,4 @@ def test_steady_says_on_stderr_why_it_found_nothing(hybridsim: Callable) -> None
 
 def test_a_folder_without_a_name_is_refused(hybridsim: Callable) -> None:
     code, out, err = hybridsim("compare", "dfcs", "--out", "")
-    assert (code, out) == (2, "") and "the name is empty" in err
+    assert (code, out) == (2, "") and "the folder name is empty" in err

@@ -100,7 +100,7 @@ def test_a_run_that_is_asked_to_end_goes_on(tmp_path: Path) -> None:
     argv = ("run", "dfcs", "--t-end", "150T", "--integrator", "scipy-dop853", "--save", "run.hsol")
     code, messages = interrupted(tmp_path, *argv, number=signal.SIGTERM)
     assert code == 143, messages
-    assert "'hybridsim resume run.hsol' goes on" in messages and "Traceback" not in messages
+    assert "'hybridsim resume run.hsol' continues the run" in messages and "Traceback" not in messages
     saved = str(tmp_path / "run.hsol")
     assert hs.load_solution(saved).status == "interrupted"
     assert main(["resume", saved, "--save", saved]) == 0

@@ -34,19 +34,19 @@ def test_it_keeps_what_python_keeps(keep: str, hybridsim: Callable, tmp_path: Pa
         assert [event["t"] for event in found["events"]] == [event.t for event in sol.events]
     assert hs.load_solution(tmp_path / "r.hsol").y.tolist() == sol.y.tolist()
     text = hybridsim(*asked).out
-    assert ("events       not kept" in text) == (keep == "nothing")
+    assert ("events       not stored" in text) == (keep == "nothing")
     assert hybridsim("resume", "r.hsol", "--t-end", "0.4").code == 0
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--keep", "some"], "give all, events, last-period, nothing"),
+        (["--keep", "some"], "use all, events, last-period, nothing"),
         (["--keep", "-1"], "--keep"),
-        (["--keep", "events", "--csv", "r.csv"], "--csv with --keep events"),
-        (["--keep", "nothing", "--plot", "r.png"], "--plot with --keep nothing"),
-        (["--keep", "nothing", "--explain", "0"], "--explain with --keep nothing"),
-        (["--save", "events"], "hybridsim run --keep events"),
+        (["--keep", "events", "--csv", "r.csv"], "--csv needs the states over time, which --keep events"),
+        (["--keep", "nothing", "--plot", "r.png"], "--plot needs the states over time, which --keep nothing"),
+        (["--keep", "nothing", "--explain", "0"], "--explain needs the whole run, but --keep is nothing"),
+        (["--save", "events"], "or --keep events to choose"),
     ],
 )
 def test_what_cannot_be_kept_is_refused_before_the_run(
@@ -80,6 +80,6 @@ def test_an_event_that_there_is_not_does_not_lose_the_run(tmp_path, capsys):
     assert main([*given, "--csv", str(table), "--save", str(kept)]) == 2
     printed = capsys.readouterr()
     assert "1000" in printed.err
-    assert "is not zero decides" in printed.out
+    assert "nonzero time derivative decides" in printed.out
     assert table.exists()
     assert hs.load_solution(kept).success

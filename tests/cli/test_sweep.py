@@ -40,7 +40,7 @@ def test_readings_of_the_last_period(hybridsim: Callable) -> None:
         # it turns where v is zero: at events
         assert amplitude == pytest.approx(0.5 * (x.max() - x.min()), rel=1e-12)
     code, _, err = hybridsim("sweep", "dfcs", "F0=22,30", *FINAL, "--after", 40)
-    assert code == 2 and "--after is for readings of a period" in err
+    assert code == 2 and "--after cannot be combined with --measure final" in err
 
 
 def test_json_lists_expressions_and_ratios(hybridsim: Callable) -> None:
@@ -83,12 +83,15 @@ def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim
         (["F0=1:q:3"], "q"),
         (["F0=1,,2"], "F0"),
         (["F0=1", "F0=2"], "twice"),
-        (["F0=1", "--over", "N"], "--over N"),
-        (["F0=1", "--t-end", "3"], "--t-end is for --measure final"),
+        (["F0=1", "--over", "N"], "--over: parameter 'N' is not swept"),
+        (["F0=1", "--t-end", "3"], "--t-end requires --measure final"),
         (["F0=1", "--measure", "amplitude.y"], "amplitude.x"),
         (["F0=1,2", "N=1", "--list", *FINAL], "different lengths"),
-        (["omega=300,400", *FINAL], "--t-end 2T depends on omega, which is swept"),
-        (["m=0.1:0.3:3", "--measure", "final.x", "--t-end", "m"], "--t-end m depends on m"),
+        (["omega=300,400", *FINAL], "--t-end 2T depends on the swept parameter omega"),
+        (
+            ["m=0.1:0.3:3", "--measure", "final.x", "--t-end", "m"],
+            "--t-end m depends on the swept parameter m",
+        ),
         (["F0=1", "--workers", "0"], "--workers"),
     ],
 )
@@ -116,7 +119,12 @@ def test_the_end_of_a_model_that_depends_on_what_is_swept_is_refused(
         f"""schema = 1\nname = "d"\n{end}\nparameters = {{ R = 2 }}\nstates.x = {{ start = 0, der = "{rate}" }}\n"""
     )
     code, out, err = hybridsim("sweep", model, "R=1,3", "--measure", "final")
-    assert code == 2 and "the end of the runs depends on R" in err and "--t-end" in err and not out
+    assert (
+        code == 2
+        and "the end of the runs depends on the swept parameter R" in err
+        and "--t-end" in err
+        and not out
+    )
     code, out, err = hybridsim("sweep", model, "R=1,3", "--measure", "final", "--t-end", "2", "--json")
     assert code == 0, err
     assert json.loads(out)["values"]["final.x"] == pytest.approx(want, rel=1e-6)

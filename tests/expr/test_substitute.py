@@ -77,7 +77,7 @@ def test_the_place_stays() -> None:
 
 
 def test_bounds_hold_for_what_is_put_in() -> None:
-    with pytest.raises(ExpressionError, match="out of bounds"):
+    with pytest.raises(ExpressionError, match="too large; at most 64"):
         substitute(parse("a**x"), {"x": "9**9"})
     with pytest.raises(ExpressionError, match="division by zero"):
         substitute(parse("a/x"), {"x": "0", "a": 1})
@@ -88,7 +88,7 @@ def test_bounds_hold_for_what_is_put_in() -> None:
 
 
 def test_a_condition_does_not_go_where_a_number_belongs() -> None:
-    with pytest.raises(ExpressionError, match="number is needed"):
+    with pytest.raises(ExpressionError, match="expected a number"):
         substitute(parse("x + 1"), {"x": "a > 0"})
 
 

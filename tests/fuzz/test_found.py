@@ -170,7 +170,7 @@ v = { start = 0, der = "max(exp(-1/r**2), s - 0.5) - max(-r, min(r, v))" }
 
 def test_a_message_about_a_name_of_a_thousand_words_has_an_end() -> None:
     shape = "name if name > 0 else " * 1000
-    with pytest.raises(hs.ModelError, match="there is no shape") as caught:
+    with pytest.raises(hs.ModelError, match="unknown shape") as caught:
         hs.Model.from_toml(f'[inputs.p]\nkind = "wave"\nshape = "{shape}"\nperiod = 1\n'
                            '[states]\nx = { start = 0, der = "p" }\n')  # fmt: skip
     assert len(str(caught.value)) < 4000

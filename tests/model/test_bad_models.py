@@ -71,7 +71,7 @@ FORM = {
     "unknown key of a schedule": (BLOCK + "[schedules.c]\ntime = 1\n", "did you mean 'times'", 15),
     "unknown key of an output": (BLOCK + "[outputs]\nf = { exp = 'f' }\n", "did you mean 'expr'", 15),
     "a number for a text": (changed(BLOCK, '"block"', "3"), "'name' is a number (3)", 1),
-    "a text for a number": (changed(BLOCK, "start = 1,", "start = 1, nominal = 'big',"), "a text ('big')", 8),
+    "a text for a number": (changed(BLOCK, "start = 1,", "start = 1, nominal = 'big',"), "a string ('big')", 8),
     "a text for a flag": (changed(RELAY, "initial = true", "initial = 'yes'"), "it must be true or false", 4),
     "a list for a table": (changed(BLOCK, "[states]", "states = []\n[other]"), "states", None),
     "a number for a state": (changed(BLOCK, '{ start = 1, der = "v" }', "1"), "state x is a number (1)", 8),
@@ -85,8 +85,8 @@ FORM = {
     "a choice without mode": (changed(RELAY, '"T > 0", to = "off"', '"T > 0"'), "'to' is missing", 7),
     "a component without modes": (RELAY + "[components.empty]\n", "it has no modes", 12),
     "two initial modes": (changed(RELAY, "off]", "off]\ninitial = true"), "two initial modes, 'on' and 'off'", 10),
-    "an unknown law": (changed(BLOCK, "coulomb", "culomb"), "there is no law 'culomb'", 13),
-    "a parameter list of numbers": (changed(OWN, '{ a = 0.5, b = "a/2" }', "[1]"), "'parameters' holds 1", 15),
+    "an unknown law": (changed(BLOCK, "coulomb", "culomb"), "unknown law 'culomb'", 13),
+    "a parameter list of numbers": (changed(OWN, '{ a = 0.5, b = "a/2" }', "[1]"), "'parameters' contains 1", 15),
     "law keys in a contact": (changed(BLOCK, 'mu = "mu" }', 'mu = "mu", title = "x" }'), "[laws.coulomb]", 13),
     "an unknown schema": ("schema = 2\n" + BLOCK, "write schema = 1", 1),
 }  # fmt: skip
@@ -96,46 +96,46 @@ CONTENT = {
     "unknown name in a parameter": (changed(BLOCK, "4*m", "4*M"), "did you mean 'm'", 4),
     "a state in a parameter": (changed(BLOCK, "4*m", "4*x"), "the state 'x' cannot be used here", 4),
     "time in a start": (changed(BLOCK, "start = 1,", "start = 't',"), "the time 't' cannot be used here", 8),
-    "a condition for a number": (changed(BLOCK, 'der = "v"', 'der = "v > 0"'), "'v > 0' is true or false", 8),
-    "a number for a condition": (changed(RELAY, '"T > 0"', '"T"'), "a condition is needed", 7),
-    "an unknown mode": (changed(RELAY, 'to = "off"', 'to = "of"'), "there is no mode 'of'", 7),
-    "no initial mode": (changed(RELAY, "initial = true\n", ""), "in which of its 2 modes it starts", 3),
+    "a condition for a number": (changed(BLOCK, 'der = "v"', 'der = "v > 0"'), "'v > 0' is a condition", 8),
+    "a number for a condition": (changed(RELAY, '"T > 0"', '"T"'), "write a condition", 7),
+    "an unknown mode": (changed(RELAY, 'to = "off"', 'to = "of"'), "unknown mode 'of'", 7),
+    "no initial mode": (changed(RELAY, "initial = true\n", ""), "has no initial mode", 3),
     "an unknown initial mode": (changed(RELAY, "initial = true\n", "") + "[components.relay]\ninitial = 'un'\n",
-        "no initial mode 'un'", 3),
-    "a variable not set": (changed(RELAY, 'set = { u = "0" }', ""), "mode off does not set 'u', though mode on", 9),
+        "unknown initial mode 'un'", 3),
+    "a variable not set": (changed(RELAY, 'set = { u = "0" }', ""), "mode off does not set 'u', but mode on", 9),
     "a reset of a parameter": (BLOCK + "[monitors.a]\nexpr = 'x'\nreset = { m = 1 }\n",
-        "resets 'm', which is no state\n    [monitors.a]\n              ^\n'm' is a parameter", 14),
-    "a reset of an unknown state": (changed(RELAY, "reset = { T", "reset = { t0"), "resets 't0', which is no", 8),
-    "a rate of an unknown state": (RELAY + 'der = { S = "1" }\n', "a rate of an unknown state 'S'", 9),
+        "resets 'm', which is not a state\n    [monitors.a]\n              ^\n'm' is a parameter", 14),
+    "a reset of an unknown state": (changed(RELAY, "reset = { T", "reset = { t0"), "resets 't0', which is not", 8),
+    "a rate of an unknown state": (RELAY + 'der = { S = "1" }\n', "rate of an unknown state 'S'", 9),
     "a guard that leads nowhere": (changed(RELAY, ', then = "on"', ""), "guard cold has no choices", 11),
-    "a choice never reached": (changed(RELAY, 'when = "T > 0", ', ""), "the choice of 'on' is never reached", 8),
+    "a choice never reached": (changed(RELAY, 'when = "T > 0", ', ""), "the choice 'on' is never reached", 8),
     "two owners of a rate": (RELAY + 'der = { T = "1" }\n[components.two.modes.m]\nder = { T = "2" }\n',
-        "components relay and two both give the rate of 'T'", 13),
+        "components relay and two both set the rate of 'T'", 13),
     "a circle among parameters": (changed(BLOCK, "m = 1.0", 'm = "k/4"'), "m -> k -> m", None),
     "a circle among definitions": (BLOCK + '[definitions]\na = "b"\nb = "a"\n', "a -> b -> a", None),
     "a circle through a variable": (changed(RELAY, '"3"', '"d"') + '[definitions]\nd = "2*u"\n', "d -> u -> d", 5),
     "definitions that explode": (
         BLOCK + '[definitions]\nd0 = "x*x"\n' + "".join(f'd{i} = "d{i - 1}*d{i - 1}"\n' for i in range(1, 99)),
-        "20000 are allowed", 28),
+        "at most 20000 are allowed", 28),
     "a power bomb in pieces": (changed(BLOCK, "-k*x", "-k*x**(d*d)") + '[definitions]\nd = "3**4"\n', "6561", 9),
     "reserved name": (changed(BLOCK, "mu = 0.3", "pi = 3\nmu = 0.3"), "'pi': the name is reserved", 5),
     "a function's name": (changed(BLOCK, "mu = 0.3", "exp = 3\nmu = 0.3"), "reserved", 5),
     "a word of Python": (changed(BLOCK, "mu = 0.3", "lambda = 3\nmu = 0.3"), "reserved", 5),
-    "a name that is none": (changed(BLOCK, "mu = 0.3", '"a b" = 3\nmu = 0.3'), "parameter 'a b': not a name", 5),
-    "a name that is empty": (changed(BLOCK, "mu = 0.3", '"" = 3\nmu = 0.3'), "not a name", 5),
+    "a name that is none": (changed(BLOCK, "mu = 0.3", '"a b" = 3\nmu = 0.3'), "parameter 'a b': not a valid name", 5),
+    "a name that is empty": (changed(BLOCK, "mu = 0.3", '"" = 3\nmu = 0.3'), "not a valid name", 5),
     "a Greek name": (changed(BLOCK, "mu = 0.3", '"\u03bc" = 3\nmu = 0.3'), "ASCII", 5),
     "two things of one name": (changed(BLOCK, "mu = 0.3", "x = 3\nmu = 0.3"), "used twice", 9),
     "a contact named as a state": (changed(BLOCK, "[contacts.f]", "[contacts.x]"), "used twice", 10),
-    "a model's name with a path": (changed(BLOCK, '"block"', '"../block"'), "'../block': not a name", None),
+    "a model's name with a path": (changed(BLOCK, '"block"', '"../block"'), "'../block': not a valid name", None),
     "an output named as something else": (BLOCK + '[outputs]\nx = "2*x"\n', "rename the output", 15),
     "an output in an unknown mode": (BLOCK + '[outputs]\ng = { expr = "x", modes = { "f.stuck" = 1 } }\n',
-        "there is no component.mode 'f.stuck'", 15),
+        "unknown COMPONENT.MODE 'f.stuck'", 15),
     "an output of an output": (BLOCK + '[outputs]\np = "f*v"\nq = "2*p"\n',
-        "output q: 'p' is an output: no expression can use it\n    2*p\ndeclare p under [definitions]", 16),
+        "output q: 'p' is an output, which expressions cannot use\n    2*p\ndeclare p under [definitions]", 16),
     "a rate of an output": (changed(BLOCK, '"v" }', '"p" }') + '[outputs]\np = "v"\n',
-        "state x, der: 'p' is an output: no expression can use it", 8),
+        "state x, der: 'p' is an output, which expressions cannot use", 8),
     "an output of one by modes": (BLOCK + '[outputs]\np = { expr = "f*v", modes = { "f.stick" = 0 } }\nq = "2*p"\n',
-        "write f*v there: it differs from mode to mode", 16),
+        "write f*v instead, since the output depends on the mode", 16),
     "an output in a parameter": (changed(BLOCK, "4*m", "4*p") + '[outputs]\np = "v"\n',
         "the output 'p' cannot be used here", 4),
     "an output of nothing": (BLOCK + '[outputs]\nu = "u"\n', "output u: unknown name 'u'", 15),
@@ -147,26 +147,26 @@ CONTENT = {
     "negative normal load": (changed(BLOCK, "N = 2.0", "N = -2.0"), "the normal load is -2 (N)", 10),
     "negative load by expression": (changed(BLOCK, '"N"', '"N - 3*d"') + "[definitions]\nd = 'm'\n",
         "the normal load is -1 (N - 3*d)", 10),
-    "negative friction": (changed(BLOCK, "mu = 0.3", "mu = -0.3"), "the limit of stick is -0.6", 10),
-    "static below kinetic": (changed(OWN, "a - b", "a + b"), "the limit of stick 1 is below", 10),
+    "negative friction": (changed(BLOCK, "mu = 0.3", "mu = -0.3"), "the stick limit is -0.6", 10),
+    "static below kinetic": (changed(OWN, "a - b", "a + b"), "the stick limit 1 is below", 10),
     "a velocity without state": (changed(BLOCK, 'velocity = "v"', 'velocity = "t"'), "contains no state", 10),
     "a velocity with a force": (changed(BLOCK, 'velocity = "v"', 'velocity = "v + w"') + '[definitions]\nw = "f"\n',
         "the velocity depends on 'f'", 10),
     "its own force in the load": (changed(BLOCK, 'normal = "N"', 'normal = "N + f"'), "'f' cannot be used here", 12),
-    "a name of the model in a law": (changed(OWN, '"N*a"', '"N*a*mu"'), "the law has no 'mu'", 17),
-    "the speed in stick": (changed(OWN, '"N*a"', '"N*a + v"'), "the law has no 'v'", 17),
-    "an unused parameter of a law": (changed(OWN, "a = 0.5,", "a = 0.5, c = 1,"), "'c' is used in neither", 14),
-    "a parameter of a law named N": (changed(OWN, "a = 0.5,", "a = 0.5, N = 1,"), "already the normal load", 14),
+    "a name of the model in a law": (changed(OWN, '"N*a"', '"N*a*mu"'), "unknown name 'mu'", 17),
+    "the speed in stick": (changed(OWN, '"N*a"', '"N*a + v"'), "unknown name 'v'", 17),
+    "an unused parameter of a law": (changed(OWN, "a = 0.5,", "a = 0.5, c = 1,"), "'c' is used neither", 14),
+    "a parameter of a law named N": (changed(OWN, "a = 0.5,", "a = 0.5, N = 1,"), "the name of the normal load", 14),
     "an unknown argument": (changed(OWN, '"own" }', '"own", A = 1 }'), "has no parameter 'A'", 13),
     "an argument that is missing": (changed(BLOCK, ', mu = "mu"', ""), "needs a value for 'mu'", 10),
-    "a circle among defaults": (changed(OWN, "a = 0.5", 'a = "b"'), "a circle among defaults of the law 'own'", 15),
+    "a circle among defaults": (changed(OWN, "a = 0.5", 'a = "b"'), "dependency among defaults of the law 'own'", 15),
     "an unknown direction": (BLOCK + "[monitors.p]\nexpr = 'v'\ndirection = 'dwon'\n", "did you mean 'down'", 14),
     "an unknown action": (BLOCK + "[monitors.p]\nexpr = 'v'\naction = 'stop'\n", "known actions", 14),
     "a reset of nothing": (BLOCK + "[monitors.p]\nexpr = 'v'\naction = 'reset'\n", "nothing to reset", 14),
     "a period of zero": (BLOCK + "[clocks.c]\nperiod = 0\n", "period is 0", 14),
     "a negative period": (BLOCK + '[clocks.c]\nperiod = "m - 2"\n', "period is -1 (m - 2)", 14),
     "no times": (BLOCK + "[schedules.c]\nterminate = true\n", "has no times", 14),
-    "times and a clock": (BLOCK + "[schedules.c]\ntimes = 1\nperiod = 2\n", "both times and a clock", 14),
+    "times and a clock": (BLOCK + "[schedules.c]\ntimes = 1\nperiod = 2\n", "both times and start or period", 14),
     "a count without period": (BLOCK + "[schedules.c]\nstart = 1\ncount = 3\n", "count = 3 but no period", 14),
     "a count of zero": (BLOCK + "[schedules.c]\nperiod = 1\ncount = 0\n", "count is 0", 14),
     "two events of one name": (BLOCK + "[monitors]\na = 'v'\n[clocks.a]\nperiod = 1\n",
@@ -216,18 +216,18 @@ def test_python_models_are_checked_alike() -> None:
         block(contacts=[hs.Contact("f", "v", "N", "coulomb")]).validate()
     surface = hs.Surface("v", "r", "a", "b", "c", 0, 0)
     sides = [hs.Mode("a", set={"r": 1}), hs.Mode("b", set={"r": -1})]
-    with pytest.raises(hs.ModelError, match="surface: there is no mode 'c'"):
+    with pytest.raises(hs.ModelError, match="surface: unknown mode 'c'"):
         block(components=[hs.Component("s", sides, surface=surface)]).validate()
     held = hs.Mode("c", [hs.Guard("g", "r", "a")], set={"r": 0})
     with pytest.raises(hs.ModelError) as caught:
         block(components=[hs.Component("s", [*sides, held], surface=surface)]).validate()
-    assert "'r' is set, but this mode solves for it" in str(caught.value)
-    assert "has choices, but a surface decides" in str(caught.value)
+    assert "sets 'r', but the solver computes it in this mode" in str(caught.value)
+    assert "has choices, but the surface selects the next mode" in str(caught.value)
     unguarded = [*sides, hs.Mode("c", [hs.Guard("g", "1 - r")])]
     with pytest.raises(hs.ModelError) as caught:
         block(components=[hs.Component("s", unguarded, surface=surface)]).validate()
-    assert "mode a has no guard: its surface would never be met" in str(caught.value)
-    assert "mode c needs a guard for each side and has 1: it would not be left" in str(caught.value)
+    assert "mode a has no guard, so the surface could never be reached" in str(caught.value)
+    assert "mode c needs one guard for each side but has 1" in str(caught.value)
     with pytest.raises(hs.ModelError, match="both choices and a fatal message"):
         block(components=[hs.Component("s", [hs.Mode("a", [hs.Guard("g", "x", "a", "end")])])]).validate()
 

@@ -15,14 +15,14 @@ from hybridsim.errors import UsageError
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda sol: hs.compare("dfcs", rtol=1e-6), "compare has no argument 'rtol'\ndid you mean 'rtols'?"),
-        (lambda sol: hs.compare_suite(rtol=1e-6), "compare_suite has no argument 'rtol'"),
-        (lambda sol: hs.sweep("dfcs"), "sweep: missing a required argument: 'values'\nit takes model, values"),
-        (lambda sol: hs.advise("dfcs", "peak(x)", tolerance=1), "advise has no argument 'tolerance'"),
-        (lambda sol: hs.load_solution(), "load_solution: missing a required argument: 'path'"),
-        (lambda sol: sol.event_times(), "event_times: missing a required argument: 'component'\nit takes component"),
-        (lambda sol: sol.output("v", times=0.0), "output has no argument 'times'"),
-        (lambda sol: sol.resume(until=1.0), "resume has no argument 'until'\nit takes t_end, limits, progress"),
+        (lambda sol: hs.compare("dfcs", rtol=1e-6), "compare() has no argument 'rtol'\ndid you mean 'rtols'?"),
+        (lambda sol: hs.compare_suite(rtol=1e-6), "compare_suite() has no argument 'rtol'"),
+        (lambda sol: hs.sweep("dfcs"), "sweep(): missing a required argument: 'values'\narguments: model, values"),
+        (lambda sol: hs.advise("dfcs", "peak(x)", tolerance=1), "advise() has no argument 'tolerance'"),
+        (lambda sol: hs.load_solution(), "load_solution(): missing a required argument: 'path'"),
+        (lambda sol: sol.event_times(), "event_times(): missing a required argument: 'component'\nargu"),
+        (lambda sol: sol.output("v", times=0.0), "output() has no argument 'times'"),
+        (lambda sol: sol.resume(until=1.0), "resume() has no argument 'until'\narguments: t_end, limits, progress"),
     ],
 )  # fmt: skip
 def test_arguments_that_are_not_taken(call: Callable[[Any], Any], says: str) -> None:

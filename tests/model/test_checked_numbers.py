@@ -84,7 +84,7 @@ def test_random_mass_matrices_are_judged_as_their_eigenvalues_say() -> None:
 
 def test_tables_over_the_speed_begin_at_rest() -> None:
     table = hs.LawTable("mu", at=[-1, 0, 1], values=[0.5, 0.4, 0.5])
-    with pytest.raises(hs.ModelError, match=r"the argument -1 is negative, and v is a magnitude"):
+    with pytest.raises(hs.ModelError, match=r"the point -1 is negative, but v is the absolute speed"):
         sliding(hs.FrictionLaw(**TABLE, tables=[table])).validate()
 
 

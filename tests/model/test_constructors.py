@@ -15,37 +15,43 @@ X = hs.State("x", 0, "1")
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: hs.Model("a", states={"x": "v"}), "Model a: states gives x no rate"),
-        (lambda: hs.Model("a", states=5), "Model a: states holds 5"),
-        (lambda: hs.Model("a", states=None), "Model a: states holds None"),
+        (lambda: hs.Model("a", states={"x": "v"}), "Model a: state x has no rate"),
+        (lambda: hs.Model("a", states=5), "Model a: states contains 5"),
+        (lambda: hs.Model("a", states=None), "Model a: states contains None"),
         (lambda: hs.Model(5, states=[X]), "Model: name is 5"),
-        (lambda: hs.Model("a", [X], parameters=["k"]), "Model a: parameters holds 'k'"),
+        (lambda: hs.Model("a", [X], parameters=["k"]), "Model a: parameters contains 'k'"),
         (lambda: hs.Model("a", [X], parameters={"k": None}), "Parameter k: value is None"),
-        (lambda: hs.Model("a", [X], contacts=[X]), "Model a: contacts holds State"),
-        (lambda: hs.Model("a", [X], components=[hs.Mode("m")]), "Model a: components holds Mode"),
+        (lambda: hs.Model("a", [X], contacts=[X]), "Model a: contacts contains State"),
+        (lambda: hs.Model("a", [X], components=[hs.Mode("m")]), "Model a: components contains Mode"),
         (lambda: hs.Model("a", [X], definitions=5), "Model a: definitions is 5"),
         (lambda: hs.Model("a", [X], definitions=[5]), r"Model a: definitions is \[5\]"),
         (lambda: hs.Model("a", [X], outputs={"y": None}), "Output y: expr is None"),
-        (lambda: hs.State("x", 0, "1", units="m"), "State has no argument 'units'\ndid you mean 'unit'?"),  # type: ignore[call-arg]  # the slip meant
-        (lambda: hs.Contact(mu=0.3), "Contact has no argument 'mu'\nit takes name, velocity, normal"),  # type: ignore[call-arg]  # the slip meant
-        (lambda: hs.State("x"), "State: missing a required argument: 'start'\nit takes name, start"),  # type: ignore[call-arg]  # the slip meant
+        (
+            lambda: hs.State("x", 0, "1", units="m"),
+            r"State\(\) has no argument 'units'\ndid you mean 'unit'?",
+        ),  # type: ignore[call-arg]  # the slip meant
+        (lambda: hs.Contact(mu=0.3), r"Contact\(\) has no argument 'mu'\narguments: name, velocity, normal"),  # type: ignore[call-arg]  # the slip meant
+        (lambda: hs.State("x"), r"State\(\): missing a required argument: 'start'\narguments: name, start"),  # type: ignore[call-arg]  # the slip meant
         (lambda: hs.State(["x"], 0, "1"), r"State: name is \['x'\]"),
         (lambda: hs.State("x", None, "1"), "State x: start is None"),
-        (lambda: hs.State("x", 0, "1", unit=3), "State x: unit is 3\ngive a text"),  # type: ignore[arg-type]  # the slip meant
+        (lambda: hs.State("x", 0, "1", unit=3), "State x: unit is 3\nuse a string"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.Parameter("k", 4, unit=3), "Parameter k: unit is 3"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.Output("y", "x", unit=["m"]), r"Output y: unit is \['m'\]"),  # type: ignore[arg-type]  # the slip meant
-        (lambda: hs.Monitor("z", "x", direction=-1), "Monitor z: direction is -1\ngive 'up', 'down', 'both'"),  # type: ignore[arg-type]  # SciPy's way
+        (
+            lambda: hs.Monitor("z", "x", direction=-1),
+            "Monitor z: direction is -1\nuse 'up' or 'down' or 'both'",
+        ),  # type: ignore[arg-type]  # SciPy's way
         (lambda: hs.Model("a", [X], title=3), "Model a: title is 3"),  # type: ignore[arg-type]  # the slip meant
         (lambda: hs.State("x", 0, "1", nominal="a"), "State x: nominal is 'a'"),
-        (lambda: hs.Mode("m", guards={"g": "x"}), "Mode m: guards holds {'g': 'x'}"),
+        (lambda: hs.Mode("m", guards={"g": "x"}), "Mode m: guards contains {'g': 'x'}"),
         (lambda: hs.Mode("m", der=5), "Mode m: der is 5"),
         (lambda: hs.Mode("m", set=["u"]), r"Mode m: set is \['u'\]"),
-        (lambda: hs.Guard("g", "x", then=5), "Guard g: then holds 5"),
+        (lambda: hs.Guard("g", "x", then=5), "Guard g: then contains 5"),
         (lambda: hs.Choice("b", reset="x"), "Choice: reset is 'x'"),
-        (lambda: hs.Component("c", modes="m"), "Component c: modes holds 'm'"),
+        (lambda: hs.Component("c", modes="m"), "Component c: modes contains 'm'"),
         (
             lambda: hs.Component("c", hs.Mode("on"), hs.Mode("off")),  # type: ignore[arg-type]  # the slip meant
-            "Component c: initial is the mode 'off'\ngive several modes as a list",
+            "Component c: initial is the mode 'off'\npass several modes as a list",
         ),
         (lambda: hs.Component("c", [hs.Mode("m")], surface="x"), "Component c: surface is 'x'"),
         (lambda: hs.Contact("f", "v", "N", 5), "Contact f: law is 5"),
@@ -63,7 +69,7 @@ X = hs.State("x", 0, "1")
         (lambda: hs.load("dfcs").with_start(x=[1]), r"state x is \[1\]"),
         (lambda: hs.load(5), "model is 5"),
         (lambda: hs.load_law(5), "law is 5"),
-        (lambda: hs.Model.from_toml(5), "text is 5"),
+        (lambda: hs.Model.from_toml(5), "text of the model is 5"),
     ],
 )
 def test_what_cannot_be_is_named(make: Callable[[], object], says: str) -> None:
@@ -77,5 +83,5 @@ def test_a_component_without_a_start_mode_is_told_the_remedy_of_its_language() -
     model = hs.Model("m", [hs.State("x", 0.0, "1")], components=[hs.Component("relay", modes)])
     with pytest.raises(hs.ModelError) as caught:
         hs.simulate(model, (0.0, 1.0))
-    assert "hs.Component('relay', [...], initial='on')" in str(caught.value)
+    assert "pass initial='on' to hs.Component" in str(caught.value)
     assert "initial = true" not in str(caught.value)

@@ -49,10 +49,10 @@ def test_changed_copies() -> None:
     ("change", "near"),
     [
         (lambda model: model.with_(n=1), "did you mean 'N'?"),
-        (lambda model: model.with_(omega=1), "known parameters: N, k, m, mu."),
+        (lambda model: model.with_(omega=1), "known parameters: N, k, m, mu"),
         (lambda model: model.with_(x=1), "known parameters"),
         (lambda model: model.with_start(X=1), "did you mean 'x'?"),
-        (lambda model: model.with_start(f=1), "known states: v, x."),
+        (lambda model: model.with_start(f=1), "known states: v, x"),
     ],
 )
 def test_changing_what_is_not_there(change: Callable[[hs.Model], hs.Model], near: str) -> None:
@@ -67,7 +67,7 @@ def test_bad_values_are_refused_at_once_or_by_validation() -> None:
         block().with_(N=math.nan)
     with pytest.raises(hs.ModelError, match="the normal load is -3"):
         block().with_(N=-3).validate()
-    with pytest.raises(hs.ModelError, match="a circle among parameters: m -> k -> m"):
+    with pytest.raises(hs.ModelError, match="cyclic dependency among parameters: m -> k -> m"):
         block().with_(m="k").parameter_values()
 
 
@@ -174,8 +174,8 @@ def test_structure_sees_what_code_depends_on(change: str) -> None:
 @pytest.mark.parametrize(
     ("argument", "words"),
     [
-        ("0.3", r"written there as 0.3: name a parameter, mu = 0.3 under \[parameters\], and write"),
-        ("friction", "contact f has mu = friction: change friction"),
+        ("0.3", r"with the value 0.3; declare a parameter, mu = 0.3 under \[parameters\], and write"),
+        ("friction", "contact f has mu = friction; change friction instead"),
     ],
 )
 def test_an_argument_of_a_law_is_no_parameter_and_how_it_becomes_one(argument: str, words: str) -> None:

@@ -58,14 +58,19 @@ def test_a_surface_of_a_component_can_ask_for_the_only_motion() -> None:
     ("text", "message", "remedy", "line"),
     [
         ('[surfaces]\nu = "x + y"\n', "surface u, expr: unknown name 'y'", "", 7),
-        ('[surfaces]\nu = "t - 1"\n', "the switching function 't - 1' contains no state", "an input", 7),
+        (
+            '[surfaces]\nu = "t - 1"\n',
+            "the switching function 't - 1' contains no state",
+            "inputs need no surface",
+            7,
+        ),
         (
             '[surfaces]\nu = "w"\nw = "u"\n',
             "depends on 'w', which depends on a mode",
-            "write it over states",
+            "use only states",
             7,
         ),
-        ("[surfaces.u]\nabove = { a = 1 }\n", "'expr' is missing", "negative on the other", 6),
+        ("[surfaces.u]\nabove = { a = 1 }\n", "'expr' is missing", "changes its sign at the surface", 6),
         ('[surfaces.u]\nexpr = "x"\nabove = { a = 1 }\n', "'a' has no value below", "below = { a = ... }", 8),
         ('[surfaces.u]\nexpr = "x"\nbelow = { a = 1 }\n', "'a' has no value above", "above = { a = ... }", 8),
         ('[surfaces.u]\nexpr = "x"\nabouve = { a = 1 }\n', "unknown key 'abouve'", "did you mean 'above'", 8),
@@ -93,11 +98,11 @@ def test_faults_are_named(text: str, message: str, remedy: str, line: int) -> No
 
 
 def test_python_faults_are_named() -> None:
-    with pytest.raises(hs.UsageError, match="'a' has a value above and none below"):
+    with pytest.raises(hs.UsageError, match="'a' has a value above but not below"):
         hs.SwitchingSurface("u", "x", above={"a": 1})
-    with pytest.raises(hs.UsageError, match="surfaces holds"):
+    with pytest.raises(hs.UsageError, match="surfaces contains"):
         python(surfaces=["x"])
-    with pytest.raises(hs.ModelError, match="the model has surfaces"):
+    with pytest.raises(hs.ModelError, match="cannot have surfaces"):
         hs.Model(
             "m", {"x": 1}, surfaces=[hs.SwitchingSurface("u", "x")], flow=lambda t, x, p: (-x[0],)
         ).validate()
@@ -122,6 +127,6 @@ def test_corners_on_a_side_are_taken_care_of() -> None:
 def test_a_sign_in_a_rate_is_told_of_surfaces() -> None:
     relay = '[modes.a]\nset = { w = "sign(x)" }\n'
     (caution,) = warnings_of(read('[states]\nx = { start = 1, der = "-w" }\n' + relay))
-    assert "'sign(x)' in mode a of mode jumps inside a mode" in caution.message
+    assert "'sign(x)' in mode a of mode is not treated as a switching surface" in caution.message
     assert "[surfaces.NAME]" in caution.remedy and "[contacts.NAME]" in caution.remedy
     assert not warnings_of(read(STATES + '[surfaces]\nu = "x + v"\n'))

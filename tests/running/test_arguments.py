@@ -33,19 +33,19 @@ SPAN = (0.0, 0.01)
         ({"max_step": np.ones(2)}, "max_step is array", "positive number"),
         ({"first_step": "a"}, "first_step is 'a'", "positive number"),
         ({"first_step": -1}, "first_step is -1", "positive number"),
-        ({"x0": 5}, "x0 is 5", "mapping"),
-        ({"x0": "ab"}, "x0 is 'ab'", "mapping"),
+        ({"x0": 5}, "x0 is 5", "dict"),
+        ({"x0": "ab"}, "x0 is 'ab'", "dict"),
         ({"x0": [1, "a"]}, "x0 is 'a'", "number"),
         ({"x0": {"x": "1"}}, "x0 of x is '1'", r"with_start\(x="),
         ({"x0": {"x": math.nan}}, "x0 of x is nan", "finite"),
-        ({"x0": {5: 1}}, "x0 names 5", "known states"),
-        ({"z0": 5}, "z0 is 5", "mapping"),
+        ({"x0": {5: 1}}, "x0 contains 5", "known states"),
+        ({"z0": 5}, "z0 is 5", "dict"),
         ({"z0": {"f": 5}}, "z0 of f is 5", "slip"),
-        ({"z0": {5: "stick"}}, "z0 names 5", "known components"),
-        ({"params": 5}, "params is 5", "mapping"),
-        ({"params": "N=3"}, "params is 'N=3'", "mapping"),
+        ({"z0": {5: "stick"}}, "z0 contains 5", "known components"),
+        ({"params": 5}, "params is 5", "dict"),
+        ({"params": "N=3"}, "params is 'N=3'", "dict"),
         ({"params": {"N": None}}, "parameter N is None", "number or an expression"),
-        ({"params": {5: 1}}, "params is {5: 1}", "mapping"),
+        ({"params": {5: 1}}, "params is {5: 1}", "dict"),
         ({"integrator": None}, "integrator is None", "list_integrators"),
         ({"t_eval": "a"}, "t_eval is 'a'", "times from t0 to t1"),
         ({"t_eval": 5}, "t_eval is 5", "times from t0 to t1"),
@@ -102,7 +102,7 @@ def test_numbers_of_all_kinds_are_numbers() -> None:
 @pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
 @pytest.mark.parametrize("name", ["rtol", "atol"])
 def test_a_fixed_step_refuses_tolerances(integrator: str, name: str) -> None:
-    with pytest.raises(UsageError, match=f"{integrator} makes no use of {name}: its step is fixed"):
+    with pytest.raises(UsageError, match=f"{integrator} does not accept {name}: its step is fixed"):
         hs.simulate("dfcs", SPAN, integrator=integrator, **{name: 1e-9})
     assert hs.simulate("dfcs", SPAN, integrator=integrator).success
 
@@ -115,12 +115,12 @@ def test_a_fixed_step_is_not_above_the_longest(integrator: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "said"), [(float("nan"), "F0: nan is not finite"), ("22 N", "F0: not an expression")]
+    ("value", "said"), [(float("nan"), "F0: nan is not finite"), ("22 N", "F0: invalid expression")]
 )
 def test_a_value_that_is_none_is_said_of_its_parameter(value: object, said: str) -> None:
     with pytest.raises(hs.ModelError, match=said) as caught:
         hs.simulate("dfcs", (0.0, 0.1), params={"F0": value})
-    assert "finite" in str(caught.value) or "a unit stands in the field 'unit'" in str(caught.value)
+    assert "finite" in str(caught.value) or "set the unit in the field 'unit'" in str(caught.value)
 
 
 def test_events_of_what_does_not_exist_are_refused() -> None:

@@ -57,9 +57,9 @@ def test_it_is_written_and_read_and_in_the_structure() -> None:
 @pytest.mark.parametrize(
     ("limit", "words"),
     [
-        (hs.Choice("stand"), "there is no mode 'stand'"),
-        (hs.Choice("rest", when="h > 0"), "its limit has a condition"),
-        (hs.Choice("rest", reset={"z": 1}), "resets 'z', which is no state"),
+        (hs.Choice("stand"), "unknown mode 'stand'"),
+        (hs.Choice("rest", when="h > 0"), "the limit has a condition"),
+        (hs.Choice("rest", reset={"z": 1}), "resets 'z', which is not a state"),
     ],
 )
 def test_faults_of_a_limit_are_named(limit: hs.Choice, words: str) -> None:

@@ -1,4 +1,4 @@
-"""A load, or another guard, that comes to zero where an input or a corner in time begins a new piece: nothing happens.
+"""A load, or another guard, that reaches zero where an input or a corner in time begins a new piece: nothing happens.
 
 Truth: the speed falls by mu times the area under the load, and the way is its integral.
 """
@@ -105,7 +105,7 @@ COUNTING = {
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("what", COUNTING)
 def test_a_load_waits_for_its_schedule_whatever_else_is_zero(what, integrator):
-    """y = 1 - t comes to zero with the load; what it sets off says nothing of the load."""
+    """y = 1 - t reaches zero with the load; what it sets off says nothing of the load."""
     more = '[states.y]\nstart = 1\nder = "-1"\n[discrete]\nbegan = 0\nn = 0\n'
     more += '[schedules.s]\ntimes = [1]\nreset = { began = "t" }\n' + COUNTING[what]
     sol = hs.simulate(sliding("P*(1 - t + began)", more=more), (0, 1.5), integrator=integrator, rtol=1e-10)
@@ -214,7 +214,7 @@ def test_backward_a_load_touches_zero_as_well(integrator):
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
 def test_a_load_that_dies_away_with_the_speed(integrator):
-    """v - 40 = 10 exp(-20 t): the load comes to zero in no time, and below all rounding in two units of it."""
+    """v - 40 = 10 exp(-20 t): the load reaches zero in no time, and below all rounding in two units of it."""
     sol = hs.simulate(
         sliding("P*max(v - 40, 0)"), (0, 2), integrator=integrator, rtol=1e-9, limits={"steps": 1000}
     )
@@ -237,4 +237,4 @@ def test_a_law_that_divides_by_its_load_says_so_where_the_load_is_zero(law, load
         sol = hs.simulate(hs.Model.from_toml(text), (0, 2), integrator=integrator)
     assert sol.status == "step-failure"
     assert sol.t_end == pytest.approx(1.0, abs=1e-6)
-    assert f"the load of contact f, {load}, comes to zero" in sol.message and "divides by it" in sol.message
+    assert f"the load '{load}' of contact f reaches zero" in sol.message and "divides by it" in sol.message

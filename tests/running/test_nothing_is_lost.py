@@ -225,7 +225,7 @@ def test_results_that_cannot_be_written_leave_the_journal(
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     code, out, err = command(*SWEEP)
-    assert code == 0 and "going on with" in err and not journal.exists()
+    assert code == 0 and "continuing from" in err and not journal.exists()
     assert (tmp_path / "found" / last).exists()
 
 
@@ -235,7 +235,7 @@ def test_two_sweeps_into_one_folder(command: Callable, tmp_path: Path) -> None:
     with held(tmp_path / "found", "as another process does"):
         code, out, err = command(*SWEEP)
     assert code == 2 and not out
-    assert "another sweep is writing to found" in err and "internal" not in err
+    assert "Another sweep is writing to found" in err and "internal" not in err
     assert command(*SWEEP)[0] == 0
 
 

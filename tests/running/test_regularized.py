@@ -104,11 +104,11 @@ def test_a_name_that_is_taken_and_a_round_trip() -> None:
 @pytest.mark.parametrize(
     ("model", "kind", "v0", "words"),
     [
-        ("dfcs", "tan", 1e-3, "no regularisation 'tan'"),
+        ("dfcs", "tan", 1e-3, "Unknown regularisation 'tan'"),
         ("dfcs", "tanh", 0.0, "v0 is 0.0"),
         ("thermostat", "tanh", 1e-3, "no contact"),
-        ("static-kinetic", "tanh", 1e-3, "holds more at rest"),
-        ("sampled-servo", "arctan", 1e-3, "holds more at rest"),
+        ("static-kinetic", "tanh", 1e-3, "static friction"),
+        ("sampled-servo", "arctan", 1e-3, "static friction"),
     ],
 )
 def test_refusals(model: str, kind: str, v0: float, words: str) -> None:

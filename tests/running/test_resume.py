@@ -254,7 +254,7 @@ def test_where_there_is_no_way_on() -> None:
         sol.resume()
     with pytest.raises(hs.UsageError, match="already at"):
         sol.resume(0.005)
-    with pytest.raises(hs.UsageError, match="limits names"):
+    with pytest.raises(hs.UsageError, match="Unknown limit"):
         sol.resume(0.02, limits={"event": 3})
     with pytest.raises(hs.UsageError, match="limit of steps"):
         hs.simulate("dfcs", (0.0, 0.01), limits={"steps": 0})

@@ -153,7 +153,7 @@ def test_the_velocity_of_a_contact_elsewhere() -> None:
         hs.Output("slip", "v_rel(f)")
     assert (
         fault.value.remedy
-        == "write the velocity itself, as the contact has it, or give both a definition of it."
+        == "v_rel exists only in results; write the velocity of the contact, or a definition of it"
     )
 
 

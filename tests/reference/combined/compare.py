@@ -96,7 +96,7 @@ def hold(
     except Exception as error:
         return Verdict("crash", integrator, type(error).__name__, repr(error)[:300])
     v = compared(model, renderer, sol, truth, integrator)
-    if v.kind == "differs" and any("jumps inside a mode" in text for text in sol.warnings):
+    if v.kind == "differs" and any("is not treated as a switching surface" in text for text in sol.warnings):
         v.kind = "warned of"  # the run says that it is not to be trusted
     return v
 
