@@ -23,11 +23,18 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
     zero = np.zeros(system.n)
     located: list[Any] = []
+    faint = float(segment.tolerances.atol.min(initial=math.inf))
     if arrival.fired or arrival.stopping:
         series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-        located = [*series.guards[list(arrival.fired)], *series.monitors[list(arrival.stopping)]]
+        # within the bound of a corner either side will do, and the instant is one of them; unless it dies away
+        fired = [
+            g
+            for g in arrival.fired
+            if not system.is_corner[system.owner[g]] or np.abs(series.guards[g]).max() <= faint
+        ]
+        located = [*series.guards[fired], *series.monitors[list(arrival.stopping)]]
     # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
-    least = UNIT * float(segment.tolerances.atol.min(initial=math.inf))
+    least = UNIT * faint
     for series_of_zero in located:
         if np.abs(series_of_zero[:2]).max() > least:
             s_error = max(s_error, distance_of_zero(series_of_zero))
@@ -126,8 +133,11 @@ def located(
             wide.s_error += abs(target - arrival.s)
             at, series = wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
             at, series = _as_due(system, origin, at, series, arrival, known_at)
-    if not is_met and others_near(system, at, series, arrival, segment):
-        at, series = together(system, origin, at, series, arrival, segment)
+    share = spread(len(segment.knots), segment.method.rounding)
+    if not is_met and others_near(system, at, series, arrival, share):
+        wide, known = as_stepped(system, at, arrival, segment)
+        if others_near(system, wide, known, arrival, 1.0):
+            at, series = wide, known
     fired = coincident(system, origin, at, arrival.fired, series)
     sides = _before_instant(series, arrival, segment)
     segment.grazings = [
@@ -141,7 +151,8 @@ def located(
 
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
     """The state at an event with bounds that count what the steps to it have rounded away, and the series there."""
-    wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
+    with np.errstate(invalid="ignore"):  # a state may have grown beyond all bounds
+        wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
     add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
     return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
 
@@ -157,24 +168,13 @@ def _as_due(
     return (wide, known) if _number_at_zero(system, origin, wide, arrival, known) > fewer else (at, series)
 
 
-def others_near(system: System, at: Situation, series: Any, arrival: Arrival, segment: SegmentRun) -> bool:
-    """Whether something that has not fired is beyond its bound, and so little that steps may have rounded it away."""
-    share = spread(len(segment.knots), segment.method.rounding)
-    active = set(map(int, np.flatnonzero(system.active(at.z)))) - set(arrival.fired)
+def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
+    """Whether something that has not fired is zero within so many times its bound, as steps may have rounded it."""
+    active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
-    values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active]
+    values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
     values += [(series.monitors[k][0], series.monitor_bounds[k][0]) for k in monitors]
-    return any(bound < abs(value) <= share * bound for value, bound in values)
-
-
-def together(
-    system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, segment: SegmentRun
-) -> tuple[Situation, Any]:
-    """The state at an event with the bounds of the steps to it, if more is zero within them; else as it is."""
-    wide, known = as_stepped(system, at, arrival, segment)
-    fewer = _number_at_zero(system, origin, at, arrival, series)
-    more = _number_at_zero(system, origin, wide, arrival, known)
-    return (wide, known) if more > fewer else (at, series)
+    return any(0.0 < bound < math.inf and abs(value) <= share * bound for value, bound in values)
 
 
 def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:

@@ -7,10 +7,13 @@ import random
 from collections.abc import Callable
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 import hybridsim as hs
 from hybridsim.expr import evaluate, parse, rounding_of
+from hybridsim.testing.catalogue import SCENES
+from hybridsim.testing.judge import load
 
 LOCATING = ("dop853", "tsit5", "rodas5p", "exact", "taylor", "scipy-dop853", "cvode-adams", "cvode-bdf")
 
@@ -234,3 +237,43 @@ def test_a_touch_beside_an_event_tells_its_time_by_its_curvature(integrator: str
     expected = [0.5 * k + t for k in range(12) for t in half]
     sampled = [event.t for event in sol.events if event.kind == "transition" and event.component == "one"]
     assert sampled[:71] == pytest.approx(expected[:71], rel=1e-9)
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-12])
+def test_a_corner_that_turns_says_nothing_of_an_instant(rtol: float) -> None:
+    """The corner of abs(c - last) is passed where c turns, and no state is worse known for it."""
+    scene = next(scene for scene in SCENES if scene.name == "touch-beside-a-sample")
+    sol = hs.simulate(load(scene), scene.span, integrator="scipy-lsoda", rtol=rtol)
+    seen = [0.0] + [e.x_minus[0] for e in sol.events if e.component == "one" and e.kind == "transition"]
+    assert np.abs(np.abs(np.diff(seen)) - 2.0).max() < 1e-8
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "scipy-rk45"])
+@pytest.mark.parametrize("guard", ["a*T**2/2 - y", "(a*T**2/2 - y)*(1 + t)", "a*T**2/2 - y + h**2"])
+def test_what_touches_zero_at_an_impact_does_not_fire(integrator: str, guard: str) -> None:
+    """y = a*T*t - a*t**2/2 has its top at T, when a ball from 4.905*T**2 comes to the floor."""
+    draw = random.Random(5)
+    for _ in range(12):
+        top, steepness = draw.uniform(0.3, 1.3), draw.uniform(0.5, 2.0)
+        model = hs.Model(
+            "touch",
+            parameters={"T": top, "a": steepness},
+            states=[
+                hs.State("h", "4.905*T**2", "w"),
+                hs.State("w", 0, "-9.81 + p"),
+                hs.State("y", 0, "v"),
+                hs.State("v", "a*T", "-a"),
+            ],
+            impacts=[hs.Impact("p", gap="h", restitution=0.8)],
+            components=[
+                hs.Component(
+                    "c",
+                    [hs.Mode("on", guards=[hs.Guard("g", guard, then="off")]), hs.Mode("off")],
+                    initial="on",
+                )
+            ],
+        )
+        sol = hs.simulate(model, (0.0, 1.3 * top), integrator=integrator)
+        assert sol.success, sol.message
+        changes = [(e.t, e.component) for e in sol.events if e.kind != "near-grazing"]
+        assert changes == [(pytest.approx(top, rel=1e-12), "p")]
