@@ -107,7 +107,7 @@ def test_texts_as_values_of_a_parameter() -> None:
 @pytest.mark.parametrize(
     "draw, message",
     [
-        (lambda: swept(omega=OMEGA).plot("s"), "s is texts"),
+        (lambda: swept(omega=OMEGA).plot("s"), "s is text"),
         (lambda: swept(omega=OMEGA).plot("b"), "no 'b'"),
         (lambda: swept(omega=OMEGA, N=N).plot("all"), "all is an array"),
         (lambda: swept(omega=OMEGA).plot(over="N"), "over is 'N'"),
