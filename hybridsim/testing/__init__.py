@@ -1,4 +1,4 @@
-"""Scenes with known answers for integrators of your own: what they get right, what wrong, and why."""
+"""Scenes with known answers, to test integrators and to explain their failures."""
 
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import END, TOLERANCES, TROUBLES, VOCABULARY, Scene, Truth

@@ -1,4 +1,4 @@
-"""Checks of a solution beyond events and states: exactness bit for bit, amplitudes, how a run ended."""
+"""Checks of a solution beyond events and states: exact values, amplitudes, end of the run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Check
 
 
 def at_times(times: Sequence[float]) -> str:
-    """Times in words; of many the first three."""
+    """Return times in words; of many, only the first three."""
     if not times:
         return "never"
     shown = [repr(float(t)) for t in times[:3]]
@@ -21,7 +21,7 @@ def at_times(times: Sequence[float]) -> str:
 
 
 def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...] = ()) -> Check:
-    """In stick the held states have their value bit for bit; those in `rest` do not move by a bit either."""
+    """Return a check that held states are exact in stick, and that those in `rest` are constant."""
 
     def check(solution: Any) -> list[str]:
         names = [state.name for state in solution.model.states]
@@ -50,7 +50,7 @@ def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...]
 
 
 def amplitude(name: str, t0: float, t1: float) -> Callable[[Any], float]:
-    """(max - min)/2 of a state over [t0, t1], whose extremes are at events or at the ends."""
+    """Return a function for the amplitude (max - min)/2 on [t0, t1]; extremes must be at events or ends."""
 
     def quantity(solution: Any) -> float:
         row = [state.name for state in solution.model.states].index(name)
@@ -62,13 +62,13 @@ def amplitude(name: str, t0: float, t1: float) -> Callable[[Any], float]:
 
 
 def no_transition(solution: Any) -> list[str]:
-    """No mode changed at all."""
+    """Check that no mode changes."""
     changes = [event.t for event in solution.events if event.kind == "transition"]
     return [f"a mode changes {at_times(changes)}, where nothing happens"] if changes else []
 
 
 def equals(t: float, **values: float) -> Check:
-    """Quantities that have a value bit for bit at t, just after any event there."""
+    """Return a check that quantities have an exact value at t, just after any event there."""
 
     def check(solution: Any) -> list[str]:
         found = {name: float(solution.output(name, t)) for name in values}
@@ -80,7 +80,7 @@ def equals(t: float, **values: float) -> Check:
 
 
 def says(*words: str) -> Check:
-    """The message of a run that stopped names these."""
+    """Return a check that the message of a stopped run contains these words."""
 
     def check(solution: Any) -> list[str]:
         return [

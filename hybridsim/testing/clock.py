@@ -1,4 +1,4 @@
-"""Bounds a run by the processor time that it takes, so that other work on the machine changes no verdict."""
+"""Limits of the processor time of a run, so that other load on the machine does not change a verdict."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _LATER = 1e-3  # seconds
 
 
 class Endless(Exception):
-    """A run that does not come to an end."""
+    """A run that exceeds its time limit."""
 
 
 @contextmanager
 def bounded_work(seconds: float) -> Iterator[None]:
-    """Turn work without end into an Endless error (where the platform has such signals, in the main thread).
+    """Raise Endless when a block exceeds its time limit (in the main thread, where timer signals exist).
 
     The signals are those of this process: its processor time in all threads, and the clock on the wall as a backstop.
     """
@@ -59,7 +59,7 @@ def _giving_up(message: str) -> Callable[[int, FrameType | None], None]:
 
 
 def _is_passed_over(frame: FrameType | None) -> bool:
-    """Whether an error in a frame would be reported and passed over: in what is called where objects go."""
+    """Return whether Python would ignore an exception raised in a frame, as in finalisers."""
     codes = [getattr(function, "__code__", None) for function in gc.callbacks]
     files = (weakref.__file__, _weakrefset.__file__)
     while frame is not None:
@@ -71,7 +71,7 @@ def _is_passed_over(frame: FrameType | None) -> bool:
 
 
 class ProcessorTime:
-    """A `progress` of `simulate` that ends the run with the status "limit" after so much processor time.
+    """A `progress` function that ends the run with status "limit" after a given processor time.
 
     The time is that of the thread that runs it, counted from its first step, so that compiling is none of it.
     """

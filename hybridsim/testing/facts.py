@@ -1,4 +1,4 @@
-"""The published and recomputed facts that the scenes are held against."""
+"""Published and recomputed results with which the scenes are compared."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ States = tuple[tuple[float, tuple[float | None, ...]], ...]
 
 
 def recomputed(name: str, rename: Mapping[str, str] | None = None) -> tuple[Events, States]:
-    """Events and states of truths.json, in the form of a `Truth`; components may be given other names."""
+    """Return events and states of truths.json for a `Truth`, with other component names on request."""
     truth, other = TRUTHS[name], rename or {}
     events = tuple((float(t), f"{other.get(c, c)}:{mode}") for t, c, mode in truth["events"])
     return events, tuple((float(row[0]), tuple(row[1:])) for row in truth["states"])

@@ -1,4 +1,4 @@
-"""Runs a scene with one setting of an integrator and measures it against the truth."""
+"""Run a scene with one setting of an integrator, and compare the result with the truth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ START = (
 
 @dataclass(frozen=True)
 class Measured:
-    """One run held against the truth.
+    """The comparison of one run with the truth.
 
     Parameters
     ----------
@@ -45,29 +45,29 @@ class Measured:
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """All that was wrong beyond errors of numbers."""
+        """All errors except numeric ones."""
         return (*self.ending, *self.sequence, *self.checks)
 
 
 def label(event: Any) -> str:
-    """component:mode for a transition, else the name of the monitor or schedule."""
+    """Return component:mode for a transition, otherwise the name of the monitor or schedule."""
     return f"{event.component}:{event.target}" if event.kind == "transition" else event.component
 
 
 def load(scene: Scene) -> Any:
-    """The scene's model."""
+    """Return the model of a scene."""
     path = SCENES / f"{scene.file}.toml"
     return hs.load(str(path) if path.exists() else scene.file)
 
 
 def model_of(scene: Scene, form: str, settings: dict[str, Any]) -> Any:
-    """What is run: the model, or a form of `Model.regularized`, whose width v0 is taken out of the settings."""
+    """Return the model to run: the scene's model, or its regularised form with the setting v0 as width."""
     model = load(scene)
     return model.regularized(form, v0=settings.pop("v0")) if form else model
 
 
 def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> None:
-    """Compile what a run needs, however long it takes, so that a clock started then counts the run alone.
+    """Compile everything that a run needs, so that a time limit counts only the run.
 
     Errors
     ------
@@ -83,7 +83,7 @@ def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> N
 def run(
     scene: Scene, integrator: str, form: str = "", processor_seconds: float = inf, **settings: Any
 ) -> Any:
-    """Simulate the scene; with a form of `Model.regularized`, whose width is the setting v0."""
+    """Simulate the scene, or its regularised form with the width v0 of the settings."""
     model = model_of(scene, form, settings)
     return hs.simulate(
         model,
@@ -97,7 +97,7 @@ def run(
 
 
 def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:
-    """Hold a solution against the truth; checks of what the integrator lacks are left out, and all of a wrong end."""
+    """Compare a solution with the truth, without checks of capabilities that the integrator lacks."""
     wrong, time_error, state_error = ending(scene, solution), 0.0, 0.0
     sequence: list[str] = []
     if not wrong and scene.truth.events is not None:
@@ -123,7 +123,7 @@ def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured
 
 
 def ending(scene: Scene, solution: Any) -> list[str]:
-    """How and when the run ended."""
+    """Return errors of the end of the run: status, message and time."""
     truth, wrong = scene.truth, []
     if truth.status is not None and solution.status != truth.status:
         wrong.append(
@@ -142,7 +142,7 @@ def ending(scene: Scene, solution: Any) -> list[str]:
 
 
 def counted(scene: Scene, solution: Any) -> list[tuple[float, str]]:
-    """The events that the truth speaks of."""
+    """Return the events that the truth lists."""
     kinds = ("transition", "monitor", "scheduled") if scene.count_scheduled else ("transition", "monitor")
     first, last = scene.span
     return [
@@ -155,7 +155,7 @@ def counted(scene: Scene, solution: Any) -> list[tuple[float, str]]:
 
 
 def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
-    """Same events in the same order (within one instant in any order), and the largest error of their times."""
+    """Return a difference of the event sequence, and the largest error of the event times."""
     found, expected = counted(scene, solution), list(scene.truth.events or ())
     position, error = 0, 0.0
     for t, group in groupby(expected, key=lambda event: event[0]):
@@ -176,7 +176,7 @@ def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
 
 
 def compare_states(scene: Scene, solution: Any) -> float:
-    """Largest error of a state, relative to its largest true value in the scene, or of a quantity."""
+    """Return the largest relative error of the states and other quantities."""
     rows = scene.truth.states
     largest = [
         max((abs(value) for value in column if value is not None), default=1.0)

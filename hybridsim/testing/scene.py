@@ -1,4 +1,4 @@
-"""What a scene is: a model, a run, the truth about it, and the trouble that it makes."""
+"""Scenes: a model, a run, its known answer, and the class of trouble that it represents."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ END = math.inf  # as the time of a state: where the run ends
 
 
 def needs(*capabilities: str) -> frozenset[str]:
-    """Capabilities that a scene needs."""
+    """Return the capabilities that a scene needs."""
     return frozenset(capabilities)
 
 
@@ -52,7 +52,7 @@ Check = Callable[[Any], list[str]]  # a solution -> what is wrong with it
 
 @dataclass(frozen=True)
 class Truth:
-    """What must come out.
+    """The known answer of a scene.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Scene:
-    """A model, a run of it, and the truth about it.
+    """A model, a run of the model, and the known answer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The study of a scene with an integrator: runs from loose to tight, each held against the truth."""
+"""Study of a scene with an integrator: runs with decreasing tolerances, each compared with the truth."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ LONGEST = 60  # seconds of processor time for one run of a scene: the longest ta
 
 @dataclass(frozen=True)
 class Setting:
-    """One run of a study: its options, the error that counts as none at it, and the fall from the one before."""
+    """One run of a study: options, an error that counts as zero, and the required decrease of the error."""
 
     text: str
     options: Mapping[str, Any]
@@ -66,7 +66,7 @@ class Study:
     failure: tuple[str, Exception] | None = None
 
     def faults(self) -> list[str]:
-        """What was wrong, a sentence each; that errors do not fall is said only where nothing else is wrong."""
+        """Return all errors as sentences; slow convergence is reported only if nothing else is wrong."""
         wrong = [f"{setting.text}: {sentence}" for setting, run in self.done for sentence in run.wrong]
         if self.failure is not None:
             text, error = self.failure
@@ -75,28 +75,28 @@ class Study:
         return wrong or judge_errors(self.done, self.tolerances)
 
     def errors(self) -> tuple[tuple[str, float, float], ...]:
-        """Setting, error of times, error of states."""
+        """Return the setting, the error of event times and the error of states of each run."""
         return tuple((setting.text, run.time_error, run.state_error) for setting, run in self.done)
 
 
 def integrator(name: str) -> type[Integrator]:
-    """The registered integrator of that name."""
+    """Return the class of a registered integrator."""
     return next(one for one in hs.list_integrators() if one.name == name)
 
 
 def option_names(one: Any) -> set[str]:
-    """The options of an integrator: the fields of its dataclass."""
+    """Return the names of an integrator's options, the fields of its dataclass."""
     return {field.name for field in fields(one)}
 
 
 def lacking(one: type[Integrator]) -> dict[str, str]:
-    """What an integrator lacks at the options that its study uses."""
+    """Return the limitations of an integrator that remain with the options of its study."""
     lifted = {capability for option, (_, capability) in LIFTED.items() if option in option_names(one)}
     return {capability: reason for capability, reason in one.lacks.items() if capability not in lifted}
 
 
 def settings_for(one: type[Integrator], scene: Scene) -> tuple[Setting, ...]:
-    """The settings at which a scene is run, from loose to tight."""
+    """Return the settings for a scene, from loose to tight."""
     if "adaptive" not in one.lacks:
         is_long = abs(scene.span[1] - scene.span[0]) > LONG * scene.unit
         factor = LOW_ORDER if one.order == "3(2)" and is_long else 1.0
@@ -117,17 +117,17 @@ def settings_for(one: type[Integrator], scene: Scene) -> tuple[Setting, ...]:
 
 
 def adaptive(rtol: float, scene: Scene) -> Setting:
-    """The setting of one tolerance."""
+    """Return the setting for one tolerance."""
     return Setting(f"rtol {rtol:.0e}", {"rtol": rtol}, max(rtol, scene.floor), FALL)
 
 
 def fixed_step(steps: float, options: Mapping[str, Any], scene: Scene) -> Setting:
-    """The setting of one step."""
+    """Return the setting for one step size."""
     return Setting(f"unit/{steps:g}", options, max(scene.floor, FIXED_STEP_FLOOR), FIXED_STEP_FALL)
 
 
 def allowed_errors(one: type[Integrator], scene: Scene) -> tuple[float, float]:
-    """Errors of times and states that the tightest setting may have."""
+    """Return the errors of event times and states that are allowed at the tightest setting."""
     if "adaptive" not in one.lacks:
         return scene.tol_t, scene.tol_x
     least = LOCATED if "release" in option_names(one) else NOT_LOCATED
@@ -143,7 +143,7 @@ def carry_out(
     seconds: float = LONGEST,
     **options: Any,
 ) -> Study:
-    """Run a scene at all settings, as far as it is worth while; `seconds` of processor time bound each run."""
+    """Run a scene at all useful settings; `seconds` of processor time limit each run."""
     done: list[tuple[Setting, judge.Measured]] = []
     waiting = list(settings)
     while waiting:
@@ -171,20 +171,20 @@ def carry_out(
 
 
 def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, float]:
-    """What a study may show that ends with this setting."""
+    """Return the allowed errors of a study that ends with this setting."""
     allowed = CUT_SHORT * last.options.get("rtol", 0.0)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 
 
 def within(measured: judge.Measured, tolerances: tuple[float, float]) -> bool:
-    """Whether both errors are within their tolerances."""
+    """Return whether both errors are within their tolerances."""
     return measured.time_error <= tolerances[0] and measured.state_error <= tolerances[1]
 
 
 def judge_errors(
     done: tuple[tuple[Setting, judge.Measured], ...], tolerances: tuple[float, float]
 ) -> list[str]:
-    """Errors fall from setting to setting and end within the scene's tolerances."""
+    """Check that the errors decrease from setting to setting and end within the tolerances."""
     wrong = []
     for what, attribute, tolerance in zip(
         ("event times", "states"), ("time_error", "state_error"), tolerances, strict=True

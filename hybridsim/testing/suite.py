@@ -1,4 +1,4 @@
-"""Holds an integrator against the scenes: `conformance_failures(integrator)` returns what it got wrong.
+"""Test an integrator in all scenes: `conformance_failures(integrator)` returns its errors.
 
 A scene is judged as its facts ask. Events are counted and their modes compared at every setting. The largest
 errors of event times and of states fall with the tolerance, tenfold or more for each step of a thousand, where
@@ -28,7 +28,7 @@ from hybridsim.testing.verdict import LACKS, RIGHT, WRONG_ANSWER, verdict
 
 @dataclass(frozen=True)
 class Outcome:
-    """Verdict on one integrator in one scene.
+    """The verdict on one integrator in one scene.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether it is neither right nor lacking."""
+        """Whether the verdict is neither right nor lacking."""
         return self.verdict not in (RIGHT, LACKS)
 
 
 def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Outcome:
-    """Run one scene with one integrator (and its options) at all settings and judge it.
+    """Run one scene with one integrator at all settings, and return the verdict.
 
     Parameters
     ----------
@@ -72,6 +72,6 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
 
 
 def conformance_failures(method: str | type[Integrator], scenes: Iterable[Scene] = SCENES) -> list[str]:
-    """What an integrator got wrong, one sentence each; empty if nothing. What it lacks is no failure."""
+    """Return the errors of an integrator as sentences; stated limitations are not errors."""
     outcomes = [outcome(method, scene) for scene in scenes]
     return [f"{one.scene}: {reason}" for one in outcomes if one.failed for reason in one.reasons]

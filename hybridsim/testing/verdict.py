@@ -1,4 +1,4 @@
-"""From the runs of a study to one verdict, with the reason and the order that the errors show."""
+"""The verdict on a study, with its reason and the observed order of convergence."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WRONG = (WRONG_ANSWER, WRONG_SEQUENCE)
 
 
 def verdict(study: Study) -> tuple[str, str]:
-    """The verdict, and the sentence about the first thing that is not right."""
+    """Return the verdict, and a sentence about the first error."""
     for setting, run in study.done:
         found, sentence = of_run(run)
         if found != RIGHT:
@@ -49,7 +49,7 @@ def verdict(study: Study) -> tuple[str, str]:
 
 
 def of_run(run: Measured) -> tuple[str, str]:
-    """The verdict on one run, errors of numbers apart."""
+    """Return the verdict on one run, without numeric errors."""
     # what stops early and says why has misled nobody
     silent = WRONG_ANSWER if run.status in ENDED else REFUSED
     if run.ending:
@@ -62,19 +62,19 @@ def of_run(run: Measured) -> tuple[str, str]:
 
 
 def refusal(error: Exception) -> str:
-    """What an error says, with its remedy; what is none of the package's own is a fault of the package."""
+    """Return the text of an error with its remedy; an unexpected exception is an internal error."""
     if isinstance(error, HybridsimError):
         return "; ".join(part for part in (error.message, error.remedy) if part)
     return f"internal error, please report it: {type(error).__name__}: {error}"
 
 
 def one_line(text: str) -> str:
-    """A message without line breaks, and without the folders of files that it names."""
+    """Return a message on one line, without the folders of files."""
     return re.sub(r"\s+", " ", re.sub(r"\S*/([\w.-]+\.toml)", r"\1", text)).strip()
 
 
 def order(done: tuple[tuple[Setting, Measured], ...]) -> float | None:
-    """The order in the step that the errors of states show at the two finest settings; None if it cannot be seen."""
+    """Return the observed order of convergence at the two finest settings, or None if it is not visible."""
     if len(done) < 2 or "rtol" in done[-1][0].options:
         return None
     (before, coarse), (setting, fine) = done[-2:]

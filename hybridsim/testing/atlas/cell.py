@@ -1,4 +1,4 @@
-"""One field of the matrix: a scene run by a configuration within a budget."""
+"""One cell of the matrix: a scene run by one method within a time limit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONG = 20.0  # units of time from which on only compiled methods run
 
 @dataclass(frozen=True)
 class Row:
-    """One setting of a study: errors relative as in `Scene` (NaN where no more was compared), steps and seconds."""
+    """One setting of a study: relative errors as in `Scene` (NaN if not compared), steps and seconds."""
 
     setting: str
     time_error: float
@@ -36,7 +36,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Cell:
-    """The verdict on a configuration in a scene.
+    """The verdict on one method in one scene.
 
     Parameters
     ----------
@@ -54,18 +54,18 @@ class Cell:
 
     @property
     def error(self) -> float | None:
-        """The larger of both errors at the last setting that ran; None where none was measured."""
+        """The larger of both errors at the last completed setting, or None."""
         error = max(self.rows[-1].time_error, self.rows[-1].state_error) if self.rows else math.nan
         return error if math.isfinite(error) else None
 
     def to_plain(self) -> dict[str, Any]:
-        """Plain data; a row is a list of its values in order."""
+        """Return plain data; a row becomes a list of its values."""
         rows = [dataclasses.astuple(row) for row in self.rows]
         return dataclasses.asdict(self) | {"rows": rows, "error": self.error}
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Cell:
-        """What `to_plain` gave; errors that were no numbers are NaN."""
+        """Return the cell of `to_plain`; missing errors become NaN."""
         known = {name: value for name, value in plain.items() if name not in ("rows", "error")}
         rows = tuple(
             Row(setting, _number(of_times), _number(of_states), steps, seconds)
@@ -75,7 +75,7 @@ class Cell:
 
 
 def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) -> Cell:
-    """Run one field; `quick` runs the loosest setting of each study only."""
+    """Run one cell; `quick` runs only the loosest setting of the study."""
     reason = configuration.applies(scene)
     length = abs(scene.span[1] - scene.span[0]) / scene.unit
     if not reason and length > LONG and length < 1e6 and not configuration.is_compiled:
@@ -112,20 +112,20 @@ def _number(value: float | None) -> float:
 
 
 def row(setting: str, run: Measured) -> Row:
-    """A row of a cell; what ended or went otherwise than it should has no errors of numbers."""
+    """Return a row of a cell; a run with a wrong end or sequence has no numeric errors."""
     if run.ending or run.sequence:
         return Row(setting, math.nan, math.nan, run.steps, run.seconds)
     return Row(setting, run.time_error, run.state_error, run.steps, run.seconds)
 
 
 def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, float]:
-    """What one loose run may show."""
+    """Return the errors that are allowed in a single loose run."""
     allowed = 1e3 * setting.options.get("rtol", 1e-4)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 
 
 def seen_by(scene: Scene, configuration: Configuration) -> Scene:
-    """The scene as it can be asked of a configuration: regularised contacts have no modes to compare."""
+    """Return the scene for a method; with regularised contacts, modes are not compared."""
     if not configuration.form:
         return scene
     truth = scene.truth

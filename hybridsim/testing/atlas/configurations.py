@@ -1,4 +1,4 @@
-"""What the atlas runs: every integrator, and what else people use, each by a name and with a study of its own."""
+"""The methods of the atlas: every integrator, and other common methods, each with its own study."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ RIVALS: dict[str, type[Integrator]] = {CooldownRK45.name: CooldownRK45}  # which
 
 @dataclass(frozen=True)
 class Configuration:
-    """A way of running a scene that people use.
+    """A method of running a scene.
 
     Parameters
     ----------
@@ -54,21 +54,21 @@ class Configuration:
 
     @property
     def method(self) -> type[Integrator]:
-        """The integrator's class."""
+        """The class of the integrator."""
         return RIVALS.get(self.integrator) or integrator(self.integrator)
 
     @property
     def is_compiled(self) -> bool:
-        """Whether long runs are cheap: the loop over the steps is compiled."""
+        """Whether long runs are cheap, because the loop over the steps is compiled."""
         return self.method.leaps or self.method.start is Integrator.start
 
     @property
     def form(self) -> str:
-        """The regularised form, or nothing."""
+        """The name of the regularised form, or an empty string."""
         return self.kind if self.kind in ("tanh", "karnopp") else ""
 
     def settings(self, scene: Scene) -> tuple[Setting, ...]:
-        """The runs of its study, from loose to tight."""
+        """Return the runs of the study, from loose to tight."""
         if self.kind == "published":
             return tuple(
                 fixed_step(steps, {"steps_per_period": steps, "period": scene.unit}, scene) for steps in STEPS
@@ -96,7 +96,7 @@ class Configuration:
         return settings_for(self.method, scene)
 
     def tolerances(self, scene: Scene) -> tuple[float, float]:
-        """Errors of times and states that the tightest setting may have."""
+        """Return the errors of event times and states that are allowed at the tightest setting."""
         if self.kind == "cooldown":
             return max(scene.tol_t, CUT_SHORT * RTOL), max(scene.tol_x, CUT_SHORT * RTOL)
         if self.form:
@@ -104,7 +104,7 @@ class Configuration:
         return allowed_errors(self.method, scene)
 
     def applies(self, scene: Scene) -> str:
-        """Why there is nothing to run; empty if there is."""
+        """Return the reason why a scene is not run, or an empty string."""
         if self.form and not judge.load(scene).contacts:
             return "the model has no friction contact to regularise"
         if self.form and not scene.truth.states:
@@ -115,7 +115,7 @@ class Configuration:
 
 
 def configurations() -> tuple[Configuration, ...]:
-    """All: the registered integrators at their best, and what else people use."""
+    """Return all methods: the registered integrators at their best settings, and other common methods."""
     found: list[Configuration] = []
     for one in hs.list_integrators():
         if one.name == "rk4-dichotomy":
@@ -159,7 +159,7 @@ def configurations() -> tuple[Configuration, ...]:
 
 
 def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
-    """Those of a name, or of an integrator of that name with its variants; all without names.
+    """Return the methods with these names, or of these integrators; without names, all.
 
     The regularised forms of a model belong to no integrator: they are asked for by their own names.
     """

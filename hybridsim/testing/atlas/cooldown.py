@@ -1,4 +1,4 @@
-"""A rival that people write: after each event it looks at no guard for a while, so that none fires twice."""
+"""A common workaround: ignore all guards for a short time after each event, so that none fires twice."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridsim.integrators.scipy_solvers import ScipyRK45
 
 @dataclass(frozen=True)
 class CooldownRK45(ScipyRK45):
-    """SciPy's RK45 with the events of `solve_ivp`, called anew after each event and blind to guards for a while.
+    """SciPy's RK45 with the events of `solve_ivp`, restarted after each event, with guards ignored at first.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class _Blind(NativeStepper):
         return self._blinded(super()._monitor(number))
 
     def _blinded(self, event: Any) -> Callable[[float, np.ndarray], float]:
-        """An event function whose value in the cooldown is on the far side: to come back from there is no event."""
+        """Return an event function that has the far side's sign in the cooldown, so that it cannot fire."""
         far = 1.0 if event.direction > 0 else -1.0
 
         def blinded(s: float, x: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The example of a scene: how a typical method fails in it, beside a run that is right."""
+"""Examples for the pictures of the atlas: a typical failure in a scene, next to a correct run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CROWD, SOME = 100, 20  # more events than so many are a crowd, of which some are
 
 @dataclass(frozen=True)
 class Line:
-    """A run as a picture shows it: times (k,), one state (k,), and the times of its events."""
+    """A run in a picture: times (k,), one state (k,), and the times of its events."""
 
     name: str
     t: np.ndarray
@@ -42,7 +42,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Example:
-    """A right run and a failing one over a window of time.
+    """A correct and a failing run in a time window.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Example:
 
 
 def example(result: Atlas, scene: Scene) -> Example | None:
-    """The example of a scene; None where no trusted method is in the matrix, or there is nothing to draw."""
+    """Return the example of a scene, or None without a correct method or without a visible difference."""
     by_name = {one.name: one for one in result.configurations}
     trusted = [
         by_name[name]
@@ -83,7 +83,7 @@ def example(result: Atlas, scene: Scene) -> Example | None:
 
 
 def typical_failure(cells: list[Cell]) -> Cell | None:
-    """The cell to show: wrong before hanging, in the order of `TYPICAL`."""
+    """Return the cell to show: wrong runs before hanging ones, in the order of `TYPICAL`."""
     for verdicts in (WRONG, (HANG,)):
         found = [cell for cell in cells if cell.verdict in verdicts]
         found.sort(
@@ -95,13 +95,13 @@ def typical_failure(cells: list[Cell]) -> Cell | None:
 
 
 def first_wrong(cell: Cell) -> str:
-    """The setting that the verdict speaks of."""
+    """Return the setting to which the verdict refers."""
     text = cell.reason.partition(": ")[0]
     return text if text else cell.rows[0].setting
 
 
 def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
-    """The run of one setting again; None where it comes to no solution."""
+    """Return the run of one setting, or None if it has no solution."""
     options = next((s.options for s in configuration.settings(scene) if s.text == setting), None)
     if options is None:
         options = configuration.settings(scene)[-1].options
@@ -156,13 +156,13 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
 
 
 def _window(first: float, last: float, centre: float, width: float) -> tuple[float, float]:
-    """A window of this width with the centre in it, inside of the run."""
+    """Return a window of this width around the centre, inside the run."""
     low = min(max(first, centre - 0.4 * width), last - width)
     return low, low + width
 
 
 def _events(run: Any, window: tuple[float, float]) -> np.ndarray:
-    """Times of the events in a window; what only nearly happened is none."""
+    """Return the times of the events in a window, without near misses."""
     return np.array([e.t for e in run.events if e.kind != "near-grazing" and window[0] <= e.t <= window[1]])
 
 

@@ -1,4 +1,4 @@
-"""The matrix: scenes against configurations, run on several processors, as data."""
+"""The matrix of the atlas: all scenes with all methods, run on several processors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Atlas:
-    """What came of every scene with every configuration.
+    """The verdicts on all methods in all scenes.
 
     Parameters
     ----------
@@ -42,19 +42,19 @@ class Atlas:
     interrupted: bool = False
 
     def row(self, scene: Scene) -> list[Cell]:
-        """The cells of a scene, in the order of the configurations."""
+        """Return the cells of a scene, in the order of the methods."""
         return [self.cells[scene.name, one.name] for one in self.configurations]
 
     def column(self, configuration: Configuration) -> list[Cell]:
-        """The cells of a configuration, in the order of the scenes."""
+        """Return the cells of a method, in the order of the scenes."""
         return [self.cells[scene.name, configuration.name] for scene in self.scenes]
 
     def by_class(self) -> dict[str, list[Scene]]:
-        """The scenes of each class of trouble, in the order of the classes."""
+        """Return the scenes of each class, in the order of the classes."""
         return by_class(self.scenes)
 
     def table(self) -> str:
-        """How many scenes of each verdict every configuration has, as text."""
+        """Return the number of scenes with each verdict, for every method, as text."""
         width = max(len(one.name) for one in self.configurations)
         lines = [f"{'':{width}}  " + "  ".join(VERDICTS)]
         for one in self.configurations:
@@ -66,7 +66,7 @@ class Atlas:
         return "\n".join(lines)
 
     def to_plain(self) -> dict[str, Any]:
-        """Plain data: scenes, configurations, and a cell for each pair."""
+        """Return plain data: scenes, methods, and a cell for each pair."""
         return {
             "limits": {"seconds": SECONDS, "steps": STEPS},
             "scenes": [told(scene) for scene in self.scenes],
@@ -75,7 +75,7 @@ class Atlas:
         }
 
     def to_json(self) -> str:
-        """The same as text, a line for each cell; numbers that JSON does not have become null."""
+        """Return JSON text with a line for each cell; nan and inf become null."""
         plain = _finite(self.to_plain())
         parts = []
         for name, part in plain.items():
@@ -85,7 +85,7 @@ class Atlas:
 
     @classmethod
     def from_json(cls, text: str) -> Atlas:
-        """What `to_json` wrote, with the scenes of the package as they are told of now."""
+        """Return the atlas of `to_json`, with the current descriptions of the packaged scenes."""
         plain = json.loads(text)
         scenes = {scene.name: scene for scene in SCENES}
         found = [Cell.from_plain(cell) for cell in plain["cells"]]
@@ -104,7 +104,7 @@ def atlas(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Atlas:
-    """Run scenes with configurations and return the matrix of verdicts.
+    """Run scenes with methods and return the matrix of verdicts.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def atlas(
 
 
 def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
-    """The package's scenes of these names, or of a class of trouble; all without either."""
+    """Return the packaged scenes with these names, or of one class; without both, all scenes."""
     known = {scene.name: scene for scene in SCENES}
     if trouble and trouble not in TROUBLES:
         raise UsageError(
@@ -170,18 +170,18 @@ def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
 
 
 def by_class(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
-    """The scenes of each class of trouble, in the order of the classes."""
+    """Return the scenes of each class, in the order of the classes."""
     found = {trouble: [one for one in scenes if one.trouble == trouble] for trouble in (*TROUBLES, "")}
     return {trouble: those for trouble, those in found.items() if those}
 
 
 def told(scene: Scene) -> dict[str, str]:
-    """What a scene is, as plain data."""
+    """Return the description of a scene as plain data."""
     return {"name": scene.name, "class": scene.trouble, "title": scene.title, "cause": scene.cause}
 
 
 def listing(scenes: Sequence[Scene]) -> str:
-    """Names and titles of scenes by class, as text."""
+    """Return names and titles of scenes by class, as text."""
     width = max(len(scene.name) for scene in scenes)
     return "\n\n".join(
         "\n".join(
@@ -214,7 +214,7 @@ def _in_processes(
 
 @contextmanager
 def _signals_later() -> Iterator[None]:
-    """Ctrl-C waits, also in the processes that start meanwhile: a terminal sends it to all, for the parent to take."""
+    """Delay Ctrl-C while worker processes start, because a terminal sends it to all processes."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -226,7 +226,7 @@ def _signals_later() -> Iterator[None]:
 
 
 def _quiet_worker() -> None:
-    """A worker leaves Ctrl-C to its parent, and what a naive method warns of is part of the answer."""
+    """Ignore Ctrl-C and warnings in a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore")  # as in the other process: they are part of the answer
     os.environ.setdefault("OMP_NUM_THREADS", "1")

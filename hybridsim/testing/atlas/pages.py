@@ -1,4 +1,4 @@
-"""The pages of the atlas: an index with the matrix, and a page for each class with every scene's story and verdicts."""
+"""The pages of the atlas: an index with the matrix, and one page for each class of scenes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _RUBBING = "Friction at a hard stop: the scene `rubbing-stop`, and `hybridsim ru
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
-    """File name -> text in Markdown; `pictures` are the scenes that have one, at CLASS/SCENE.png."""
+    """Return the Markdown text of each file; `pictures` names the scenes with a picture, CLASS/SCENE.png."""
     groups = result.by_class()
     found = {"index.md": index(result, groups)}
     for trouble, scenes in groups.items():
@@ -69,7 +69,7 @@ def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
 
 
 def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
-    """The first page."""
+    """Return the text of the index page."""
     lines = [_INTRODUCTION, "| verdict | what it means |", "| --- | --- |"]
     lines += [f"| {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
     lines += ["", "## Classes of trouble", "", "| class | scenes | what it is about |", "| --- | --- | --- |"]
@@ -98,12 +98,12 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
 
 
 def anchor(title: str) -> str:
-    """What a heading is linked to by."""
+    """Return the anchor of a heading in links."""
     return re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
 
 
 def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[str] = ()) -> str:
-    """The page of one class."""
+    """Return the page of one class."""
     lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", "[The whole matrix](index.md)", ""]
     for scene in scenes:
         lines += [f"## {scene.title or scene.name}", "", f"`{scene.name}`: {scene.cause}.", ""]
@@ -115,7 +115,7 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
 
 
 def verdicts(cells: list[Cell], configurations: Sequence[Configuration] = ()) -> list[str]:
-    """The verdicts on one scene: who is right, and one line for each that is not."""
+    """Return the verdicts on one scene: the methods that are right, and a line for each other method."""
     lacks = {one.name: one.method.lacks for one in configurations}
     right = [cell for cell in cells if cell.verdict == RIGHT]
     lines = ["| | |", "| --- | --- |"]
@@ -144,7 +144,7 @@ def _by_reason(cells: list[Cell]) -> dict[str, list[str]]:
 
 
 def _with_error(cell: Cell) -> str:
-    """A name with its error and, where it is seen, the order in the step."""
+    """Return a name with its error and, if visible, its order of convergence."""
     known = []
     if cell.error is not None and cell.rows:
         known.append(f"{cell.error:.0e}")
@@ -154,11 +154,11 @@ def _with_error(cell: Cell) -> str:
 
 
 def _safe(reason: str) -> str:
-    """A reason that breaks no table, with numbers of no more digits than are read."""
+    """Return a reason that is safe in a table, with numbers shortened to a readable number of digits."""
     return _NUMBER.sub(lambda number: f"{float(number[0]):.{_DIGITS}g}", reason).replace("|", r"\|")
 
 
 def _own_words(reason: str, lacks: Mapping[str, str]) -> str:
-    """What a method that locates no events says of a stop that is none."""
+    """Return a note if a method stops falsely because, by design, it does not locate events."""
     is_stop = re.search(r"and is (\w+):stick at", reason) is not None
     return f" (by design: {lacks['located']})" if is_stop and "located" in lacks else ""

@@ -1,4 +1,4 @@
-"""The scenes that come with the package, by class of trouble."""
+"""The packaged scenes, by class of trouble."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of events that follow each other ever faster."""
+"""Scenes of events that accumulate in finite time."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return *_ball(), _twisting(), *_tanks()
 
 
 def _twisting() -> Scene:
-    """x'' = -2 sign(x) - sign(x'): a half turn is a third as wide as the one before, in 1/sqrt(3) of its time."""
+    """For x'' = -2 sign(x) - sign(x') each half turn has 1/3 of the width and 1/sqrt(3) of the duration before."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
@@ -48,7 +48,7 @@ def _twisting() -> Scene:
 
 
 def _tanks() -> tuple[Scene, ...]:
-    """The hose fills the tank that is low: each visit is half as long as the one before (w = 0.75, leaks of 0.5)."""
+    """The hose fills the lower tank; each visit lasts half as long as the one before (w = 0.75, leaks 0.5)."""
     t, x = 2.0, [0.5, 0.0]  # the second tank is low
     events, low, left = [(t, "hose:second")], 1, 1e-4
     states = [(1.0, (0.25, 0.5)), (3.0, (0.0, 0.25))]
@@ -93,7 +93,7 @@ def _tanks() -> tuple[Scene, ...]:
 
 
 def _ball() -> tuple[Scene, ...]:
-    """The bouncing ball, with its rule of rest and without."""
+    """Return the bouncing ball with and without a rule for rest."""
     p = CASES["FMI-ball"]["params"]
     g, e, v_min = p["g"], p["e"], p["v_min"]
     fall = math.sqrt(2 / g)

@@ -1,4 +1,4 @@
-"""Scenes of events at one instant: guards listed twice, two ulp apart, flat, and resets onto guards."""
+"""Scenes of simultaneous events: duplicate guards, guards two ulp apart, flat guards, resets onto guards."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Guards listed twice, at one instant, two ulp apart, zero at the start, flat, and resets onto guards."""
+    """Return scenes of guards that coincide, are zero at the start or flat, and of resets onto guards."""
     after = ("a:after", "b:after")
     return (
         Scene(
@@ -102,7 +102,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def left_once(solution: Any) -> list[str]:
-    """The flat guard: one transition, at t = 1, and at most one crossing of the monitor, there."""
+    """Check the flat guard: one transition and at most one monitor event, both at t = 1."""
     changes = [event.t for event in solution.events if event.kind == "transition"]
     wrong = [] if changes == [1.0] else [f"the mode changes {at_times(changes)} instead of once, at t = 1"]
     crossed = [event.t for event in solution.events if event.component == "down"]

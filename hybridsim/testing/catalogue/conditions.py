@@ -1,4 +1,4 @@
-"""Scenes whose conditions jump: combinations of comparisons, in time and of states, in rates, contacts and guards."""
+"""Scenes of conditions that jump: combined comparisons of time and states in rates, contacts and guards."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Pulses, a region, sliding along a part of a border, and jumps in a load, a belt and guards."""
+    """Return scenes of pulses, a region, partial sliding, and jumps of a load, a belt and guards."""
     return _pulses(), _region(), _held_in_part(), _load(), _belt(), _guards()
 
 
 def _pulses() -> Scene:
-    """Widths times heights."""
+    """The solution is the sum of widths times heights."""
     states = ((20.0, (0.0, 0.0, 0.0, 20.0, -10.0)), (100.0, (1000.0, 40.0, 10.0, 50.0, -80.0)))
     return Scene("conditions", "conditions", (0.0, 100.0), Truth((), states), unit=10.0)
 
 
 def _region() -> Scene:
-    """x = t - 1 and y = t - 2 are positive from t = 2 on, and their sum is below 8 up to t = 5.5."""
+    """The states x = t - 1 and y = t - 2 are positive after t = 2, and their sum is below 8 until t = 5.5."""
     states = ((4.0, (3.0, 2.0, 2.0, 2.0)), (10.0, (9.0, 8.0, 3.5, 6.5)))
     return Scene("region", "region", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _held_in_part() -> Scene:
-    """x comes to zero at t = 3 and stays, as y > 0 up to t = 5; then it grows."""
+    """The state x reaches zero at t = 3, stays there while y > 0 until t = 5, and then grows."""
     states = ((2.0, (-1.0, 1.0)), (4.0, (0.0, 1.0)), (5.0, (0.0, 0.0)), (10.0, (5.0, -5.0)))
     return Scene("held-in-part", "held-in-part", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _load() -> Scene:
-    """3 cos t without friction, then half a swing about x = 2, which ends where the spring no longer pulls."""
+    """The motion is 3 cos t without friction, then half an oscillation about x = 2, which ends in stick."""
     x, v = 3 * math.cos(0.4), -3 * math.sin(0.4)
     amplitude, angle = math.hypot(x - 2, v), math.atan2(-v, x - 2)
     stop = 0.4 + math.pi - angle
@@ -62,7 +62,7 @@ def _belt() -> Scene:
 
 
 def _guards() -> Scene:
-    """Filled from t = 3 to x = 5 at t = 6, emptied at twice the rate up to x = 7 at t = 8."""
+    """The tank fills from t = 3 to x = 5 at t = 6, and empties at twice the rate to x = 7 at t = 8."""
     states = ((3.0, (2.0, 0.0)), (6.0, (5.0, 3.0)), (10.0, (9.0, -1.0)))
     return Scene(
         "stepped-guard",

@@ -1,4 +1,4 @@
-"""Scenes of stick: other laws, a belt, and several contacts at once."""
+"""Scenes of stick with other laws, on a belt, and with several contacts at once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Contacts with other laws, on a belt, and several at once."""
+    """Return scenes of contacts with other laws, on a belt, and several at once."""
 
     def belt(name: str, delta: float) -> Scene:
         events, states = recomputed(name)
@@ -56,11 +56,11 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def tied() -> Scene:
-    """Coupled contacts at their limits together: a limit that another force's jump undoes is none."""
+    """Return the scene of coupled contacts at their limits together: one release keeps the other in stick."""
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:
-        """x2'' + 30 x2 = 7.5 sin(4 t) - 2.1 from rest at the release, the first body in stick."""
+        """Return the solution of x2'' + 30 x2 = 7.5 sin(4 t) - 2.1 from rest at the release of body 2."""
         x0 = -forced * math.sin(4 * release) + 0.07
         v0 = -4 * forced * math.cos(4 * release) / own
         c, s = math.cos(own * (t - release)), math.sin(own * (t - release))
@@ -80,7 +80,7 @@ def tied() -> Scene:
 
 
 def turning_belt() -> Scene:
-    """An input that jumps carries the surface away: what stuck to it slips."""
+    """Return the scene of an input that moves the surface away suddenly, so that the body slips."""
     turns = ["f:stick", "f:slip+", "f:slip-"]
     states = ((0.5, (0.5,)), (1.5, (1.0,)), (3.25, (-0.5,)), (4.5, (0.25,)))
     return Scene(
@@ -95,7 +95,7 @@ def turning_belt() -> Scene:
 
 
 def sequence(wanted: list[str]) -> Any:
-    """The changes of modes, in order; their times are looked at through the states."""
+    """Return a check of the mode sequence; the states test its times."""
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]

@@ -1,4 +1,4 @@
-"""Scenes whose flows have corners: no event is seen, and the motion is as accurate as if there were none."""
+"""Scenes of flows with corners: no event is reported, and the accuracy is that of a smooth flow."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Bilinear spring, backlash, saturation, drag, a hinge, the clipped elastogap, and sizes of sizes in guards."""
+    """Return scenes of a bilinear spring, backlash, saturation, drag, a hinge and an elastogap."""
     return _bilinear(), _backlash(), _saturation(), _drag(), _hinge(), _elastogap(), _sizes()
 
 
 def _bilinear() -> Scene:
-    """Frequency 2 on the right of x = 0, 1 on its left: half periods of pi/2 and pi."""
+    """The frequency is 2 for x > 0 and 1 for x < 0, with half periods of pi/2 and pi."""
     period = 1.5 * math.pi
     quarter, root = math.pi / 4, math.sqrt(0.5)
     states = (
@@ -28,7 +28,7 @@ def _bilinear() -> Scene:
 
 
 def _backlash() -> Scene:
-    """Free flights of length 2 at speed 1 between half periods of a spring of frequency 2, an amplitude of 1/2."""
+    """Free flights of length 2 at speed 1 alternate with half periods of a spring of frequency 2."""
     half = math.pi / 2
     states = (
         (0.5, (0.5, 1.0)),
@@ -41,7 +41,7 @@ def _backlash() -> Scene:
 
 
 def _saturation() -> Scene:
-    """2 sin(t) is clipped between pi/6 and 5 pi/6; the rest integrates to 2 (1 - cos)."""
+    """The input 2 sin(t) is clipped between pi/6 and 5 pi/6; the rest integrates to 2 (1 - cos)."""
     rise = 2 * (1 - math.cos(math.pi / 6))
     top = rise + 2 * math.pi / 3
     states = (
@@ -57,7 +57,7 @@ def _saturation() -> Scene:
 
 
 def _drag() -> Scene:
-    """Upward v = vt tan, downward -vt tanh, with vt the terminal speed."""
+    """Upward v = vt tan, downward v = -vt tanh, with the terminal speed vt."""
     g, c, v0 = 9.81, 0.3, 5.0
     terminal = math.sqrt(g / c)
     rate = math.sqrt(g * c)
@@ -77,7 +77,7 @@ def _hinge() -> Scene:
 
 
 def _elastogap() -> Scene:
-    """The motion of MSL-elastogap, whose modes are sides of corners here."""
+    """The motion is that of MSL-elastogap, whose modes are sides of corners here."""
     states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
     return Scene(
         "elastogap-clipped",
@@ -91,7 +91,7 @@ def _elastogap() -> Scene:
 
 
 def _sizes() -> Scene:
-    """The guards come to zero at x = 1.06, y = -0.86 and z = -1.75."""
+    """The guards reach zero at x = 1.06, y = -0.86 and z = -1.75."""
     events = ((0.04, "second:off"), (0.16, "first:off"), (0.25, "third:off"))
     return Scene(
         "sizes-of-sizes",

@@ -1,4 +1,4 @@
-"""Scenes of impacts whose gaps are curved: a round wall, two discs."""
+"""Scenes of impacts with curved gaps: a round wall, two discs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return _drum(), _discs()
 
 
 def _drum() -> Scene:
-    """Chords of the circle: each blow turns the velocity's part along the radius around."""
+    """The motion follows chords of the circle; each impact reverses the radial velocity."""
     x, y, vx, vy = 0.3, 0.0, 0.4, 0.9
     blows: list[tuple[float, str]] = []
     t, end = 0.0, 6.0
@@ -41,7 +41,7 @@ def _drum() -> Scene:
 
 
 def _discs() -> Scene:
-    """The blow is along the line of centres, and exchanges the parts of the velocities along it."""
+    """The impact is along the line of centres and exchanges the velocity components along it."""
     instant = 1.0 - math.sqrt(0.2**2 - 0.1**2)
     normal = ((1.0 - instant) / 0.2, 0.1 / 0.2)
     taken = (normal[0] ** 2, normal[0] * normal[1])

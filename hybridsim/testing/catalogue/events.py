@@ -1,4 +1,4 @@
-"""Scenes of events: crossings, twin roots, roots at a start or a step's end, and the output grid."""
+"""Scenes of events: crossings, double roots, roots at a start or at the end of a step, output grids."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return *corridor(), *modes(), *monitored(), *grazing()
 
 
 def grazing() -> tuple[Scene, ...]:
-    """sin(t) against 1 +- 1e-6: no event, or a visit of 2.8e-3 at the top of each swing."""
+    """Return scenes of sin(t) with thresholds 1 +- 1e-6: no event, or a visit of 2.8e-3 at each maximum."""
     gap = 1e-6
     half = math.acos(1 - gap)
     tops = [math.pi / 2 + 2 * math.pi * n for n in range(3)]
@@ -44,7 +44,7 @@ def grazing() -> tuple[Scene, ...]:
 
 
 def corridor() -> tuple[Scene, ...]:
-    """BALL2D with monitors and with guards."""
+    """Return the scene BALL2D with monitors and with guards."""
     expected = CASES["BALL2D"]["expected"]
     floor, walls = expected["floor"], expected["walls"]
     states = ((2.0, (50 - 4.9 * 4, -19.6, 4.0, 2.0)), (15.0, (*expected["y_end"], expected["x_end"], 1.62)))
@@ -65,7 +65,7 @@ def corridor() -> tuple[Scene, ...]:
 
 
 def modes() -> tuple[Scene, ...]:
-    """Automata with transversal crossings and with guards close to one another."""
+    """Return scenes of automata with transversal crossings and with guards close to each other."""
     gap_events, gap_states = recomputed("MSL-elastogap")
     relay_events, relay_states = recomputed("SIC-relayosc")
     circle = CASES["NOS-osc"]["expected"]
@@ -116,7 +116,7 @@ def modes() -> tuple[Scene, ...]:
 
 
 def monitored() -> tuple[Scene, ...]:
-    """Monitors: directed, several roots in a step, at t0, at step ends, in the wrong order, beside a grid."""
+    """Return scenes of monitors: directed, several roots per step, at t0, at step ends, with output grids."""
     zeros = ((-6.0, "zero"), (-2.0, "zero"), (2.0, "zero"))
     sides = ((-6.0, "mode:above"), (-2.0, "mode:below"), (2.0, "mode:above"))
     values = ((-7.0, (-45.0,)), (0.0, (-24.0,)), (4.0, (120.0,)))
@@ -239,7 +239,7 @@ def monitored() -> tuple[Scene, ...]:
 
 
 def emptied(solution: Any) -> list[str]:
-    """The tank: low water found once at 1.998; then empty at 2, in bounded work, however the run calls it."""
+    """Return the scene of a tank: low water once at t = 1.998, then empty at t = 2 with bounded work."""
     wrong = []
     low = [event.t for event in solution.events if event.component == "low"]
     if len(low) != 1 or abs(low[0] - 1.998) > 2e-3:

@@ -1,4 +1,4 @@
-"""Scenes of unilateral contacts with restitution: infinitely many bounces, two blows at once, a table that throws."""
+"""Scenes of impacts with restitution: infinitely many bounces, double impacts, a vibrating table."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ REST = FALL * (1 + E) / (1 - E)
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return _bounce(), _bar(), _table()
 
 
 def _height(t: float) -> tuple[float, float]:
-    """Height and speed of the bouncing ball before it rests."""
+    """Return height and velocity of the bouncing ball before it rests."""
     if t < FALL:
         return H0 - G * t**2 / 2, -G * t
     began, speed = FALL, E * G * FALL
@@ -30,12 +30,12 @@ def _height(t: float) -> tuple[float, float]:
 
 
 def closed(name: str, solution: Any) -> list[float]:
-    """When a contact closes."""
+    """Return the times at which a contact closes."""
     return [e.t for e in solution.events if e.component == name and e.target == "closed"]
 
 
 def closes(*names: str) -> Any:
-    """The contacts close once, for good."""
+    """Return a check that each contact closes exactly once."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
@@ -49,7 +49,7 @@ def closes(*names: str) -> Any:
 
 
 def rests(*names: str) -> Any:
-    """They close where the series of bounces ends, to the tolerance of the loosest run."""
+    """Return a check that the contacts close at the limit of the bounces, within 1e-6."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
@@ -63,7 +63,7 @@ def rests(*names: str) -> Any:
 
 
 def _bounce() -> Scene:
-    """Flights of E**n seconds from 0.5 on: rest at 1.5."""
+    """Flights last E**n seconds after t = 0.5, and the ball rests at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
     return Scene(
@@ -78,7 +78,7 @@ def _bounce() -> Scene:
 
 
 def _bar() -> Scene:
-    """Struck at both ends at once the bar keeps level, and bounces as a ball does."""
+    """The bar is hit at both ends at once, stays level, and bounces like a ball."""
     heights = ((t, _height(t)) for t in (0.3, 0.8, 1.1))
     states = (*((t, (h, h, w, w)) for t, (h, w) in heights), (END, (0.0,) * 4))
     checks = (
@@ -98,7 +98,7 @@ def _bar() -> Scene:
 
 
 def _table() -> Scene:
-    """Thrown, bouncing, at rest, thrown again: the flights after each throw are known, and the first landings."""
+    """The ball is thrown, bounces, rests and is thrown again; the flights after each throw are known."""
     truth = TRUTHS["vibrating-table"]
     end = 0.25  # a rest and a throw; later periods are the same
     states = tuple((float(row[0]), tuple(row[1:])) for row in truth["states"] if row[0] < end)

@@ -1,4 +1,4 @@
-"""Scenes of several changes at one instant: resets that add, zeros at ticks, touches, copies of located values."""
+"""Scenes of several changes at one instant: additive resets, zeros at ticks, touches, copied values."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Resets that add, zeros where a clock ticks, touches beside events, copies of located values, chains of zeros."""
+    """Return scenes of additive resets, zeros at clock ticks, touches, copied values and chains of zeros."""
     return _doses(), _counting_balls(), _guard_and_tick(), _carried_back(), _samples(), _copied(), _chain()
 
 
 def _doses() -> Scene:
-    """The amount follows from the doses before: each decays by exp(-1.2 t)."""
+    """The amount is the sum of the earlier doses, each decayed by exp(-1.2 t)."""
     doses = ((0.0, 100.0), (3.0, 50.0), (6.0, 200.0), (12.0, 100.0))
 
     def amount(t: float) -> tuple[float, ...]:
@@ -34,7 +34,7 @@ def _doses() -> Scene:
 
 
 def _counting_balls() -> Scene:
-    """Four bounces of each ball, of restitution 0.8, from 1 m: the k-th flight takes 2 (0.8)**k of the fall."""
+    """Each ball bounces four times with restitution 0.8 from 1 m; flight k lasts 2 (0.8)**k fall times."""
     fall = math.sqrt(2.0 / 9.81)
     times = [fall * (1.0 + 2.0 * sum(0.8**i for i in range(1, k + 1))) for k in range(4)]
     events = tuple((t, f"{ball}:flight") for t in times for ball in ("one", "two"))
@@ -49,7 +49,7 @@ def _counting_balls() -> Scene:
 
 
 def _guard_and_tick() -> Scene:
-    """Every 0.3 the ramp of 0.7 comes to 0.21; 0.7 and 0.21 as doubles make that differ by some roundings."""
+    """The ramp 0.7 t reaches 0.21 at t = 0.3; in doubles 0.7 * 0.3 and 0.21 differ by rounding."""
     times = [0.3 * k for k in range(1, 11)]
     return Scene(
         "guard-at-each-tick",
@@ -68,7 +68,7 @@ def _guard_and_tick() -> Scene:
 
 
 def _carried_back() -> Scene:
-    """The monitor touches zero and changes its side at no instant."""
+    """The monitor touches zero without changing its sign."""
     return Scene(
         "monitor-carried-back",
         "carried-back",
@@ -90,7 +90,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """A sine of 8 is sampled whenever it has moved by 2; at its ends it has, and turns.
+    """A sine of amplitude 8 is sampled whenever it has changed by 2, also at its extremes.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """
@@ -120,7 +120,7 @@ def _samples() -> Scene:
 
 
 def _copied() -> Scene:
-    """x = 10 - 11.3 cos(sqrt(3) t) comes to 0.7, and what is made of it falls at the rate one from then on."""
+    """The solution x = 10 - 11.3 cos(sqrt(3) t) reaches 0.7; its copy then decreases at rate one."""
     at, end = math.acos(9.3 / 11.3) / math.sqrt(3.0), 1.0
 
     def state(t: float) -> tuple[float, ...]:
@@ -139,7 +139,7 @@ def _copied() -> Scene:
 
 
 def _chain() -> Scene:
-    """Guards of two modes in a row are zero at 0.87/0.7 with the first, and those of the last mode leave zero there."""
+    """Guards of two successive modes are zero at 0.87/0.7 together with the first guard."""
     at = 0.87 / 0.7
     return Scene(
         "chain-of-zeros",

@@ -1,4 +1,4 @@
-"""Scenes of loads: one that touches zero, one that a reaction gives, and contacts in series, one of which lets go."""
+"""Scenes of loads: a load that touches zero, a load from a reaction, contacts in series."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return (
         _floor(),
         _touching(),
@@ -28,7 +28,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _floor() -> Scene:
-    """One bounce on a spring: the speed along the floor falls by mu times the impulse of the load."""
+    """A bounce on a spring decreases the speed along the floor by mu times the impulse of the load."""
     g, k, mu, end = 9.81, 1000.0, 0.3, 0.3
     own, down, start = math.sqrt(k), math.sqrt(2 * g * 0.1), math.sqrt(2 * 0.1 / g)
 
@@ -50,7 +50,7 @@ def _floor() -> Scene:
 
 
 def _touching() -> Scene:
-    """The impulse of the load is the area under it."""
+    """The impulse of the load is the area under its curve."""
     return Scene(
         "touching-load",
         "touching-load",
@@ -62,7 +62,7 @@ def _touching() -> Scene:
 
 
 def _waves() -> Scene:
-    """Two periods of mean load 25; in each the integral of that of the wave is that of 25/8."""
+    """The mean load is 25 in both periods; the load of the wave has the same integral as 25/8."""
     return Scene(
         "load-of-waves",
         "load-of-waves",
@@ -78,7 +78,7 @@ def _waves() -> Scene:
 
 
 def _ending() -> Scene:
-    """The areas under the ramps, and a force that grows from t = 2 on against no friction."""
+    """The truth uses the areas under the ramps, and a force that grows after t = 2 without friction."""
     return Scene(
         "load-that-ends",
         "load-that-ends",
@@ -94,7 +94,7 @@ def _ending() -> Scene:
 
 
 def _series() -> Scene:
-    """The lower contact lets go at t = 2, and both blocks move as one, x'' + x = (t - 1)/8, until t = 5."""
+    """The lower contact releases at t = 2; both blocks move together, x'' + x = (t - 1)/8, until t = 5."""
     tau = 3.0
     x = 0.125 * (tau + 1.0 - math.cos(tau) - math.sin(tau))
     v = 0.125 * (1.0 + math.sin(tau) - math.cos(tau))
@@ -109,7 +109,7 @@ def _series() -> Scene:
 
 
 def _painleve() -> Scene:
-    """Two motions are admissible, and the run names both."""
+    """Two motions are admissible, and the message of the run names both."""
     return Scene(
         "painleve-start",
         "painleve",
@@ -126,7 +126,7 @@ def _painleve() -> Scene:
 
 
 def _stop_off_zero() -> Scene:
-    """The gap opens at t = pi/6, where the force is zero, and grows with the cube of time."""
+    """The gap opens at t = pi/6 with zero force, and grows with the cube of time."""
     began, end = math.pi / 6, 3.0
     left = end - began
     v = math.cos(began) - math.cos(end) - 0.5 * left
@@ -142,7 +142,7 @@ def _stop_off_zero() -> Scene:
 
 
 def _moving_floor() -> Scene:
-    """The floor falls away where its acceleration is that of gravity; between, the body flies."""
+    """The contact opens when the acceleration of the floor reaches gravity; then the body flies."""
     g, size, turns, end = 9.81, 0.02, 30.0, 0.25
     phase = math.asin(g / (size * turns**2))
     first, again = phase / turns, (phase + 2 * math.pi) / turns
@@ -190,7 +190,7 @@ def _kinked_floors() -> Scene:
 
 
 def _own_speed() -> Scene:
-    """v' = 0.48 min(-v, 0.85) - 2 from v = -0.2: up to 0.85 an exponential, then a straight line."""
+    """v' = 0.48 min(-v, 0.85) - 2 from v = -0.2 has an exponential solution until -v = 0.85, then a line."""
     limit = 2.0 / 0.48
     reached = math.log((limit - 0.2) / (limit - 0.85)) / 0.48
 
@@ -210,7 +210,7 @@ def _own_speed() -> Scene:
 
 
 def _element() -> Scene:
-    """The spring stretches up to the limit; the slider stops where the spring would be no faster than the limit."""
+    """The spring extends up to the limit; the slider stops when the spring would be slower than the limit."""
     stiffness, mu, end = 20.0, 0.5, 7.0
 
     def place(t: float) -> float:

@@ -1,4 +1,4 @@
-"""Scenes of monitors at stops and bounces, of each action, and of guards of one mode at one instant."""
+"""Scenes of monitors at stops and bounces, of all actions, and of simultaneous guards of one mode."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return _stops(), _bounces(), _table(), _corner(), _rope()
 
 
 def _stops() -> Scene:
-    """A speed falls by 1 a second and stays at zero."""
+    """A speed decreases by 1 per second and stays at zero."""
     first = ((1.0, "f:stick"), (1.0, "stopped"), (1.0, "counted"))
     return Scene(
         "monitors-at-stops",
@@ -34,7 +34,7 @@ def _stops() -> Scene:
 
 
 def _bounces() -> Scene:
-    """Down from 1 at 2 a second squared: it strikes at 1 with 2, and the k-th flight takes 2 (1/2)**k; at rest at 3."""
+    """A ball falls from 1 at 2 per second squared, first hits at t = 1, and comes to rest at t = 3."""
     return Scene(
         "monitors-at-bounces",
         "bounces-watched",
@@ -59,7 +59,7 @@ def _fires_at_rest(solution: Any) -> list[str]:
 
 
 def _table() -> Scene:
-    """y is the integral of 50 |1 - t|."""
+    """The solution y is the integral of 50 |1 - t|."""
     return Scene(
         "monitors-of-a-turning-table",
         "turning-table",
@@ -70,7 +70,7 @@ def _table() -> Scene:
 
 
 def _corner() -> Scene:
-    """Two walls at each of the times 1, 3 and 5."""
+    """Two walls are hit at each of the times 1, 3 and 5."""
     return Scene(
         "corners-of-a-box",
         "box-corner",
@@ -86,7 +86,7 @@ def _corner() -> Scene:
 
 
 def _rope() -> Scene:
-    """x'' = a x - b from rest: x = b/a + (1/2 - b/a) cosh(sqrt(a) t)."""
+    """The solution of x'' = a x - b from rest is x = b/a + (1/2 - b/a) cosh(sqrt(a) t)."""
     a, b = 9.81 * 1.3 / 2.0, 9.81 * 0.3
     rest = b / a
     end = math.acosh((2.0 - rest) / (0.5 - rest)) / math.sqrt(a)

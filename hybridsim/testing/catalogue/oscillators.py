@@ -1,4 +1,4 @@
-"""Scenes of the dry friction oscillator, held against its closed form over the whole run."""
+"""Scenes of the dry friction oscillator, compared with its closed form over the whole run."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ STUCK = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
 
 
 def closed_form(p: Mapping[str, float]) -> ForcedCoulombOscillator:
-    """The oscillator of a case."""
+    """Return the closed-form motion of a case."""
     return ForcedCoulombOscillator(p["m"], p["c"], p["k"], p["Fk"], p["Fs"], p["F0"], p["w"])
 
 
 def at(motion: Motion, t: float) -> tuple[float, float]:
-    """Position and velocity at a time."""
+    """Return position and velocity at a time."""
     x, v = motion(t)
     return float(x), float(v)
 
 
 def events(motion: Motion, before: float = math.inf) -> tuple[tuple[float, str], ...]:
-    """The mode changes of a closed-form motion."""
+    """Return the mode changes of a closed-form motion."""
     return tuple((change.t, f"f:{change.target}") for change in motion.changes if change.t < before)
 
 
 def states(
     motion: Motion, span: tuple[float, float], count: int
 ) -> tuple[tuple[float, tuple[float, float]], ...]:
-    """Samples of a closed-form motion, at times that no event shares."""
+    """Return samples of a closed-form motion at times without events."""
     step = (span[1] - span[0]) / count
     times = [span[0] + (i + 0.37) * step for i in range(count)]
     return tuple((t, at(motion, t)) for t in times)
 
 
 def oscillator(case: str, **changes: Any) -> Scene:
-    """A case of the facts file with all its events and samples from the closed form."""
+    """Return the scene of a case of the facts file, with all events and samples from the closed form."""
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
     x0, v0 = fact["x0"]
@@ -76,7 +76,7 @@ def oscillator(case: str, **changes: Any) -> Scene:
 
 
 def den_hartog(case: str) -> Scene:
-    """A periodic orbit that reverses without a stop, over ten periods; it ends where it turns."""
+    """Return the scene of a periodic orbit without stops over ten periods, which ends at a reversal."""
     t0, t1 = CASES[case]["t_span"]
     return oscillator(
         case,
@@ -89,7 +89,7 @@ def den_hartog(case: str) -> Scene:
 
 
 def steady(case: str) -> Scene:
-    """A long transient to a steady motion without stops, whose amplitude has a closed form."""
+    """Return the scene of a long transient to a steady motion without stops, with known amplitude."""
     fact = CASES[case]
     end, period = fact["t_span"][1], 2 * math.pi / fact["params"]["w"]
     last = (amplitude("x", end - period, end), fact["expected"]["amplitude_last_cycle"])
@@ -100,7 +100,7 @@ def steady(case: str) -> Scene:
 
 
 def dfcs(name: str, F0: float, ratio: float) -> Scene:
-    """The packaged model `dfcs` over a hundred periods from rest."""
+    """Return the scene of the packaged model `dfcs` over a hundred periods from rest."""
     model = hs.load("dfcs").with_(F0=F0, omega=f"{ratio}*sqrt(k/m)")
     p = model.parameter_values()
     limit = p["mu"] * p["N"]
@@ -125,7 +125,7 @@ def dfcs(name: str, F0: float, ratio: float) -> Scene:
 
 
 def backward_orbit() -> Scene:
-    """A Den Hartog orbit run backward through a reversal, where the motion is unique."""
+    """Return the scene of a Den Hartog orbit that runs backward through a reversal, where it is unique."""
     case = "DH-r2-f0.2"
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
@@ -147,7 +147,7 @@ def backward_orbit() -> Scene:
 
 
 def backward_stick() -> Scene:
-    """A body at rest in friction, run backward: it may have come to rest from many motions."""
+    """Return the scene of a body at rest, run backward, where the earlier motion is not unique."""
     return oscillator(
         "FLAG-flag_a",
         name="backward-stick",
@@ -159,7 +159,7 @@ def backward_stick() -> Scene:
 
 
 def threshold() -> Scene:
-    """A force that reaches the limit and turns back: nothing may move."""
+    """Return the scene of a force that reaches the stick limit and decreases again, so that nothing moves."""
     end = CASES["THR-exact"]["t_span"][1]
     truth = Truth(
         (), tuple((t, (0.0, 0.0)) for t in (1.0, math.pi, 7.0, end)), checks=(("", no_transition), *STUCK)
@@ -168,7 +168,7 @@ def threshold() -> Scene:
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return (
         *(oscillator(f"FLAG-flag_{which}") for which in ("a", "b_mus", "d_nodamp")),
         *(den_hartog(f"DH-{which}") for which in ("r2-f0.2", "r0.75-f0.3", "r1.5-f0.5")),

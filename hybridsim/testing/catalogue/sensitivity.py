@@ -1,4 +1,4 @@
-"""Scenes that lose digits: chaos."""
+"""Scenes that amplify errors: chaotic motion and grazing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ GRAZING_START = (GRAZING_FORCE * (1 - _OMEGA**2) / _D, _DAMPING * _OMEGA**2 * GR
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return lifting(), grazing_stop()
 
 
 def grazing_stop() -> Scene:
-    """A swing that passes a rigid stop by a ten-thousandth: the slope of the map is infinite at the touch."""
+    """Return the scene of a swing that passes a rigid stop by 1e-4; the map has an infinite slope there."""
     events, states = recomputed("grazing-stop")
     return Scene(
         "grazing-stop",
@@ -40,7 +40,7 @@ def grazing_stop() -> Scene:
 
 
 def lifting() -> Scene:
-    """A contact that opens, in chaotic motion: what a fixed step does wrong grows."""
+    """Return the scene of an opening contact in chaotic motion, in which the error of a fixed step grows."""
     expected = CASES["FEENY"]["expected"]
 
     def turns(solution: Any) -> list[float]:

@@ -1,4 +1,4 @@
-"""Scenes of switching surfaces: crossed, slid along, left, met by others, and refused where many motions fit."""
+"""Scenes of switching surfaces: crossing, sliding, release, several surfaces, and nonunique motions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SLIDING = "sliding"
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return (
         *_published(),
         _circle(),
@@ -32,7 +32,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def stays(component: str, *terms: str, to_one: bool = False) -> Check:
-    """While it slides, a sum of outputs that is 1 or 0 there is so to rounding."""
+    """Return a check that a sum of outputs is 1 or 0, within rounding, during sliding."""
 
     def check(solution: Any) -> list[str]:
         for interval in solution.modes[component]:
@@ -53,7 +53,7 @@ def stays(component: str, *terms: str, to_one: bool = False) -> Check:
 
 
 def _published() -> tuple[Scene, ...]:
-    """Cases of other tools, and those that are also scenes with modes."""
+    """Return published cases of other tools, and cases that are also scenes with modes."""
     exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
     at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
     crossings = CASES["SIC-filippov"]["expected"]["first_crossings"]
@@ -124,7 +124,7 @@ def _published() -> tuple[Scene, ...]:
 
 
 def spirals_in(solution: Any) -> list[str]:
-    """|x1| + |x2| = 6 - 4t up to 1.5, where both surfaces are reached, by ever faster crossings until then."""
+    """The sum |x1| + |x2| is 6 - 4t until t = 1.5, where infinitely many crossings accumulate."""
     times = np.linspace(0.0, 1.5, 301)
     off = np.abs(np.abs(solution(times)).sum(axis=0) - (6 - 4 * times)).max()
     wrong = [f"|x1| + |x2| is off by {off:.2g}"] if off > 1e-8 else []  # the rates are constant in between
@@ -135,7 +135,7 @@ def spirals_in(solution: Any) -> list[str]:
 
 
 def _along_the_circle() -> Scene:
-    """The same up to t = 3.5, where it still slides."""
+    """The motion is the same until t = 3.5 and still slides then."""
     scene = _circle()
     events = (scene.truth.events or ())[:1]
     truth = replace(scene.truth, events=events, states=scene.truth.states[:2])
@@ -143,7 +143,7 @@ def _along_the_circle() -> Scene:
 
 
 def _circle() -> Scene:
-    """x + iy = r exp(it) with (ln r)' = t/4 - u: r = 1 from 4 - sqrt(16 - 8 ln 2) to 4, where u = t/4 reaches 1."""
+    """With x + iy = r exp(it), (ln r)' = t/4 - u: r = 1 from 4 - sqrt(16 - 8 ln 2) to 4, where u reaches 1."""
     onto, off = 4 - math.sqrt(16 - 8 * math.log(2)), 4.0
 
     def at(t: float, log_r: float) -> tuple[float, tuple[float, float]]:
@@ -162,7 +162,7 @@ def _circle() -> Scene:
 
 
 def _decay() -> Scene:
-    """v = -t and x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1, then both decay with exp(-t)."""
+    """The solution is v = -t, x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1; then both decay as exp(-t)."""
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
@@ -177,7 +177,7 @@ def _decay() -> Scene:
 
 
 def _rubbing_servo() -> Scene:
-    """v' = 1.7 + sin(3t)/2 until x - 1 + v = 0, then both decay with exp(-t): v is never zero, friction slips on."""
+    """v' = 1.7 + sin(3t)/2 until x - 1 + v = 0; then both decay as exp(-t), and the friction slips."""
 
     def speed(t: float) -> float:
         return 1.7 * t + (1.0 - math.cos(3.0 * t)) / 6.0
@@ -222,7 +222,7 @@ def _two_relays() -> Scene:
 
 
 def _chatter() -> Scene:
-    """Up with speed 1, down with 1.5, between +-1e-3: a change every 2e-3 and every 4/3e-3."""
+    """The state rises at 1 and falls at 1.5 between +-1e-3, with a change every 2e-3 and every 4/3e-3."""
     band, end = 1e-3, 0.3
     events, t, up = [], band, True
     while t < end:
@@ -242,7 +242,7 @@ def _chatter() -> Scene:
 
 
 def _refused() -> tuple[Scene, ...]:
-    """More than one motion is admissible: the run stops there and names the surfaces."""
+    """More than one motion is admissible, so the run stops and names the surfaces."""
     return (
         Scene(
             "ambiguous-meeting",

@@ -1,4 +1,4 @@
-"""Scenes of stability: steps beyond what a fast contact or a fast filter allows, and thousands of periods."""
+"""Scenes of stability: steps longer than a fast contact or filter allows, and thousands of periods."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return _walls(), _follower(), _long_swing()
 
 
 def _walls() -> Scene:
-    """Flights of length 2 (1 at first) at speed 1, and contacts of pi/sqrt(k) that turn it."""
+    """Flights have length 2 (at first 1) at speed 1, and contacts last pi/sqrt(k)."""
     contact = math.pi / 1e3
     events, t = [], 1.0
     for n in range(5):
@@ -37,7 +37,7 @@ def _walls() -> Scene:
 
 
 def _follower() -> Scene:
-    """x = sin(t) whatever the rate is."""
+    """The solution is x = sin(t) for every value of the rate."""
     return Scene(
         "step-limit",
         "follower",
@@ -50,7 +50,7 @@ def _follower() -> Scene:
 
 
 def _long_swing() -> Scene:
-    """cos(t) over two thousand periods."""
+    """The solution is cos(t) over two thousand periods."""
     end = 2000 * 2 * math.pi
     times = (end / 2 + 0.5, end - 1.0, end)
     return Scene(

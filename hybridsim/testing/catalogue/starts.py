@@ -1,4 +1,4 @@
-"""Scenes in which a start or a jump leaves corners, steps in time and loads on another side than the one before."""
+"""Scenes in which a start or a jump changes the sides of corners, steps in time and loads."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _SUMS = (
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Guards, contacts, a relay and a gap beside corners; a clock; the order of guards; a flat corner; zeros."""
+    """Return scenes with guards, contacts, a relay and a gap next to corners, and zeros at the start."""
     return _guards(), _contacts(), _relay(), _gap(), _sampled(), _order(), _flat(), _zeros(), _held()
 
 
 def _guards() -> Scene:
-    """All states move at constant rates, so that each guard is made of straight lines."""
+    """The guards are piecewise linear in time, since all states move at constant rates."""
     events = (
         (0.5, "nested:after"),
         (1.0, "largest:after"),
@@ -47,7 +47,7 @@ def _guards() -> Scene:
 
 
 def _contacts() -> Scene:
-    """The limits of rest are 0.8, 3.5, 3.6, 0.8 and 0: three bodies rest, one starts at t = 2, one slides freely."""
+    """The stick limits are 0.8, 3.5, 3.6, 0.8, 0: three bodies rest, one starts at t = 2, one slides freely."""
     events = ((0.0, "lifted_N:open"), (2.0, "step:slip+"))
     states = (
         (1.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.0, 0.5)),
@@ -87,7 +87,7 @@ def _gap() -> Scene:
 
 
 def _sampled() -> Scene:
-    """At t = 1 the ball is half a metre lower and the body rises from -0.7 to -0.2; f was -0.5 all the while."""
+    """At t = 1 the ball is half a metre lower and the body rises from -0.7 to -0.2; f was always -0.5."""
     read = tuple(
         (partial(_read, name, t), value)
         for t, values in (
@@ -122,7 +122,7 @@ def _order() -> Scene:
 
 
 def _flat() -> Scene:
-    """c = 9 + cos(t)."""
+    """The solution is c = 9 + cos(t)."""
     return Scene(
         "flat-corner",
         "flat-corner",
@@ -135,7 +135,7 @@ def _flat() -> Scene:
 
 
 def _zeros() -> Scene:
-    """Each state begins where something is zero, written as a sum, and leaves that at the rate one."""
+    """Each state starts at a zero, written as a sum, and leaves it at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
     return Scene(
         "starts-at-zeros",
@@ -147,7 +147,7 @@ def _zeros() -> Scene:
 
 
 def _held() -> Scene:
-    """Three bodies begin at the speed of their belts, and the force of 0.1 is less than friction holds."""
+    """Three bodies start at the speed of their belts, and the force 0.1 is below the friction limit."""
     starts = {f"v{k}": a + b for k, (a, b) in enumerate(_SUMS[:3])}
     return Scene(
         "starts-at-belt-speeds",

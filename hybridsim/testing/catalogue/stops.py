@@ -1,4 +1,4 @@
-"""A stop that a body meets in the direction of its friction: endless bounces, rest against it, and a pull off it."""
+"""Scenes of a stop in the direction of friction: infinitely many bounces, rest at the stop, and release."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ LAST = 6.0
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return (_stop(),)
 
 
 def _motion(t: float) -> tuple[float, float, float]:
-    """Place, speed and drive."""
+    """Return position, velocity and drive."""
     drive = -PUSH + RISE * max(t - 3.0, 0.0)
     if t >= OFF:
         return RISE * (t - OFF) ** 3 / 6, RISE * (t - OFF) ** 2 / 2, drive
@@ -42,7 +42,7 @@ def _motion(t: float) -> tuple[float, float, float]:
 
 
 def _pulled_off(solution: Any) -> list[str]:
-    """The friction gives way where the pull is at its limit, and the gap opens then."""
+    """The friction limit is reached by the pull, and at this instant the gap opens."""
     found = {
         name: [e.t for e in solution.events if e.component == name and e.source == mode and e.t > REST + 1e-3]
         for name, mode in (("f", "stick"), ("p", "closed"))

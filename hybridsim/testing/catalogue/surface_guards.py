@@ -1,4 +1,4 @@
-"""Scenes of guards that come to zero together with the velocity of a contact, or with a gap."""
+"""Scenes of guards that reach zero together with the velocity of a contact or with a gap."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Guards on speeds and at a release, and guards on gaps."""
+    """Return scenes of guards on speeds, at a release, and on gaps."""
     return _speeds(), _gaps()
 
 
@@ -43,7 +43,7 @@ def _speeds() -> Scene:
 
 
 def _gaps() -> Scene:
-    """h = 1 - t**2 until 1, then s - s**2; k = 2 - t**2 until the square root of 2, then rest."""
+    """The gap h is 1 - t**2 until t = 1, then s - s**2; k is 2 - t**2 until sqrt(2), then zero."""
     rest = math.sqrt(2.0)
     states = (
         (0.5, (0.75, -1.0, 1.75, -1.0, 0.0)),

@@ -1,4 +1,4 @@
-"""Scenes of stick at its limits: forces that hardly exceed it, loads that fade, speeds that are small, many stops."""
+"""Scenes of stick at its limits: forces just above it, fading loads, small speeds, many stops."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ STICK = needs("contacts", "exact-stick")
 
 
 def scenes() -> tuple[Scene, ...]:
-    """All of them."""
+    """Return all scenes of this file."""
     return _micro_slip(), _fading(), _many_stops(), _half(), _small(), _resting()
 
 
 def _swing(name: str, periods: float, **changes: Any) -> Scene:
-    """An oscillator from rest over some periods of its force, from the closed form."""
+    """Return the scene of an oscillator from rest over some periods of its force, from the closed form."""
     p = {"m": 1.0, "c": 0.0, "k": 1.0, "Fs": 0.3, "Fk": 0.3, "F0": 1.0, "w": 1.0, **changes}
     unit = 2 * math.pi / p["w"]
     span = (0.0, periods * unit)
@@ -40,7 +40,7 @@ def _swing(name: str, periods: float, **changes: Any) -> Scene:
 
 
 def _micro_slip() -> Scene:
-    """The force exceeds the limit by a ten-thousandth: slips of 1e-7 in a hundredth of a period."""
+    """The force exceeds the limit by 1e-4, which causes slips of 1e-7 in a hundredth of a period."""
     found, samples = recomputed("micro-slip")
     return Scene(
         "micro-slip",
@@ -59,7 +59,7 @@ def _micro_slip() -> Scene:
 
 
 def _fading() -> Scene:
-    """The limit 2 (1 - t/10) comes down to the push of 1 at t = 5; then v' = (t - 5)/5."""
+    """The limit 2 (1 - t/10) decreases to the push of 1 at t = 5; then v' = (t - 5)/5."""
     samples = tuple((t, ((t - 5) ** 3 / 30, (t - 5) ** 2 / 10)) for t in (5.5, 7.0, 9.0))
     checks = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
     return Scene(
@@ -75,24 +75,24 @@ def _fading() -> Scene:
 
 
 def _many_stops() -> Scene:
-    """Pulled slowly, it moves in jerks: many stops in each period."""
+    """The body is pulled slowly and stops many times in each period."""
     swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
     return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short beside the period
 
 
 def _half() -> Scene:
-    """Driven at half its frequency and undamped."""
+    """The oscillator is undamped and driven at half its frequency."""
     swing = _swing("half-frequency", 10, w=0.5)
     return replace(swing, floor=1e-9)  # undamped: the errors of ten periods add up
 
 
 def _small() -> Scene:
-    """All forces are a thousandth: so are the speeds, of the order of the published zero-velocity interval."""
+    """All forces are scaled by 1/1000; speeds are then of the order of the published velocity interval."""
     return _swing("small-speeds", 10, F0=1e-3, Fs=3e-4, Fk=3e-4, w=0.75, c=0.1)
 
 
 def _resting() -> Scene:
-    """A spring pulls with half of the limit: nothing may move."""
+    """A spring pulls with half of the limit, so nothing moves."""
     samples = tuple((t, (0.5, 0.0)) for t in (1.0, 30.0, 100.0))
     return Scene(
         "resting-load",

@@ -1,4 +1,4 @@
-"""What is told of the package's scenes: title, cause and a paragraph, from one file for each class of trouble."""
+"""Title, cause and description of the packaged scenes, in one TOML file for each class of trouble."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 
 
 def read() -> dict[str, dict[str, Any]]:
-    """Scene -> trouble, title, cause, story."""
+    """Read the files, and return class, title, cause and description of each scene."""
     found: dict[str, dict[str, Any]] = {}
     for trouble in TROUBLES:
         for name, told in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
@@ -24,7 +24,7 @@ def read() -> dict[str, dict[str, Any]]:
 
 
 def with_stories(scenes: tuple[Scene, ...]) -> tuple[Scene, ...]:
-    """The scenes with what is told of them, in the order of the classes."""
+    """Return the scenes with their titles, causes and descriptions, in the order of the classes."""
     told = read()
     known = [replace(scene, **told[scene.name]) if scene.name in told else scene for scene in scenes]
     return tuple(sorted(known, key=lambda scene: list(TROUBLES).index(scene.trouble or "events")))
