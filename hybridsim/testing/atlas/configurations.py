@@ -170,6 +170,6 @@ def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
     for name in names:
         if name not in known:
             raise UsageError(
-                f"the atlas has no integrator {name!r}", remedy=nearest(name, known, kind="integrators")
+                f"Unknown integrator {name!r} in the atlas", remedy=nearest(name, known, kind="integrators")
             )
     return tuple(one for one in every if one.name in names or (one.integrator in names and not one.form))

@@ -126,7 +126,9 @@ def atlas(
     """
     own = [one for one in integrators or () if not isinstance(one, str)]
     if len(own) > 1 or (own and len(integrators or ()) > 1):
-        raise UsageError("a class of your own runs alone", remedy="call atlas once for each")
+        raise UsageError(
+            "An integrator class cannot be combined with others", remedy="call atlas() once for each class"
+        )
     if own:
         with registered(own[0]) as name:
             return atlas(scenes, (name,), quick=quick, workers=1, progress=progress)
@@ -160,11 +162,11 @@ def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
     known = {scene.name: scene for scene in SCENES}
     if trouble and trouble not in TROUBLES:
         raise UsageError(
-            f"there is no class of trouble {trouble!r}", remedy=nearest(trouble, TROUBLES, kind="classes")
+            f"Unknown class of scenes {trouble!r}", remedy=nearest(trouble, TROUBLES, kind="classes")
         )
     for name in names:
         if name not in known:
-            raise UsageError(f"there is no scene {name!r}", remedy=nearest(name, known, kind="scenes"))
+            raise UsageError(f"Unknown scene {name!r}", remedy=nearest(name, known, kind="scenes"))
     of_class = [scene for scene in SCENES if not trouble or scene.trouble == trouble]
     return tuple(known[name] for name in names) or tuple(of_class)
 
