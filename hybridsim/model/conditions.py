@@ -1,8 +1,8 @@
-"""Conditions taken apart: a conditional of any Boolean combination as conditionals of single comparisons.
+"""Split conditionals with Boolean conditions into conditionals of single comparisons.
 
-`a if p and q else b` is `(a if q else b) if p else b`, and so for `or`, `not`, chains and conditions that depend on
-conditions. A comparison with a corner or a jump inside is one of what is smooth: `abs(u) < d` is `u < d and -u < d`. A
-conditional that is an absolute value or a maximum of what it compares becomes that: `u if u > 0 else -u` is `abs(u)`.
+`a if p and q else b` becomes `(a if q else b) if p else b`; `or`, `not`, chains and nested conditions are split too.
+A comparison with a corner or jump inside is replaced by comparisons of smooth expressions: `abs(u) < d` becomes
+`u < d and -u < d`. A conditional that equals abs or max is replaced by it: `u if u > 0 else -u` becomes `abs(u)`.
 """
 
 from __future__ import annotations
@@ -15,34 +15,34 @@ from hybridsim.expr.rebuild import exchanged
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.nonsmooth import Sides, sides_of
 
-# A conditional of more single comparisons is left as it stands: each of them may double what comes after it.
+# Largest number of single comparisons of one conditional; each may double the size of the following ones.
 _MOST_COMPARISONS = 64
 
 
 class TooManyConditions(Exception):
-    """A condition falls into more single comparisons than are taken apart."""
+    """A conditional would become too many single comparisons."""
 
 
 def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
-    """The same value by conditionals of single comparisons of smooth sides; the node itself where it is one.
+    """Return an equal expression of single smooth comparisons, or the node itself if it is one.
 
     Raises
     ------
     TooManyConditions
-        Where that would be too long.
+        If the result would be too long.
     """
     conditions = _Conditions(meanings)
     return conditions.corner(node) or conditions.chosen(node.test, node.body, node.orelse, node)
 
 
 class _Conditions:
-    """One condition on its way."""
+    """The conversion of one conditional."""
 
     def __init__(self, meanings: Meanings) -> None:
         self.meanings, self.count = meanings, 0
 
     def chosen(self, test: ast.expr, yes: ast.expr, no: ast.expr, whole: ast.IfExp | None = None) -> ast.expr:
-        """What has the value `yes` where a test holds, else `no`. whole: a tree that says so, if there is one."""
+        """Return an expression that is `yes` if the test is true, otherwise `no`; `whole` is reused."""
         match test:
             case ast.Constant(value=bool() as holds):
                 return yes if holds else no
@@ -75,7 +75,7 @@ class _Conditions:
         return whole if whole is not None and whole.test is test else ast.IfExp(test, yes, no)
 
     def _compared(self, apart: ast.expr, op: ast.cmpop, yes: ast.expr, no: ast.expr) -> ast.expr | None:
-        """The choice by a comparison of an expression with zero that is not smooth; None where it is smooth."""
+        """Split a comparison of a non-smooth expression with zero; return None if it is smooth."""
         tree = self.meanings.written_out(apart)
         match tree:
             case ast.BinOp(
@@ -83,7 +83,7 @@ class _Conditions:
                 right=ast.Constant(value=0 | 0.0),
             ) if self.meanings.moves(first) and self.meanings.moves(
                 second
-            ):  # of one sign, or of different ones
+            ):  # the sign of a product follows from the signs of both factors
                 zero = ast.Constant(0)
                 other = ast.Compare(zero, [op], [second])
                 one = ast.Compare(second, [op], [zero])
@@ -103,7 +103,7 @@ class _Conditions:
         argument, above, below, _ = parts
         if factor := self._factor(tree, node):
             is_largest = isinstance(node, ast.Call) and ast.unparse(node.func) != "min"
-            if is_largest == (factor > 0):  # the larger of two is above what one of the two is above
+            if is_largest == (factor > 0):  # max(a, b) > c is a > c or b > c
                 joined: ast.boolop = ast.Or() if isinstance(op, ast.Gt | ast.GtE) else ast.And()
             else:
                 joined = ast.And() if isinstance(op, ast.Gt | ast.GtE) else ast.Or()
@@ -113,7 +113,7 @@ class _Conditions:
         return self.chosen(test, first, second)
 
     def _rough(self, tree: ast.expr) -> tuple[ast.expr | None, Sides | None]:
-        """The first part of a tree that moves and is not smooth, and its sides."""
+        """Return the first varying non-smooth part of a tree, and its sides."""
         for part in ast.walk(tree):
             if isinstance(part, ast.Call | ast.IfExp) and self.meanings.moves(part):
                 if isinstance(part, ast.Call) and len(part.args) > 2:
@@ -125,9 +125,9 @@ class _Conditions:
         return None, None
 
     def corner(self, node: ast.IfExp) -> ast.expr | None:
-        """A conditional as abs or max of what it compares, where that is not smooth; None where it is neither.
+        """Return a conditional with a non-smooth comparison as abs or max, or None if it equals neither.
 
-        It is if its branches differ by a multiple of what it compares, which then is not taken apart.
+        The condition is that the branches differ by a multiple of the compared expression.
         """
         sides = sides_of(node)
         if sides is None:
@@ -148,7 +148,7 @@ class _Conditions:
         return ast.BinOp(below, ast.Add(), ast.BinOp(number_tree(factor), ast.Mult(), larger))
 
     def _factor(self, tree: ast.expr, node: ast.expr) -> float:
-        """The number by which a tree is a multiple of an abs, min or max, plus what does not contain it; else 0."""
+        """Return the factor of an abs, min or max in a tree that is linear in it, otherwise 0."""
         if not (isinstance(node, ast.Call) and ast.unparse(node.func) in ("abs", "min", "max")):
             return 0.0
         slopes = [

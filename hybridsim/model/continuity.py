@@ -1,4 +1,4 @@
-"""Whether what a conditional or a sign makes of an expression agrees where it changes, as far as its form shows."""
+"""Detection of conditionals and signs whose products are continuous, by comparison of polynomials."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _POWER_OF_ZERO = re.compile(r"\(0\)\*\*\((?!-)")
 
 
 def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: ast.expr) -> bool:
-    """Whether body = orelse wherever border = 0, as far as polynomials show.
+    """Return whether body = orelse wherever border = 0, as far as polynomials show.
 
-    They agree if their difference is zero where one name of the border is expressed by the others, or a multiple of the
-    border. A power of zero whose exponent is a parameter counts as zero.
+    They agree if their difference is a multiple of the border, or vanishes when the border is solved for one of its
+    names. A power of zero with a parameter as exponent counts as zero.
     """
     first, second = (meanings.written_out(node) for node in (body, orelse))
     written = meanings.written_out(border)
@@ -30,7 +30,7 @@ def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: 
 
 
 def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
-    """What the names in a border are where it is zero, of those in which it is linear with a number as coefficient."""
+    """Yield solutions of border = 0 for each name that is linear in it with a numeric coefficient."""
     p = difference(border, ast.Constant(0))
     for name in sorted({factor for monomial in p for factor, _ in monomial}):
         if not name.isidentifier():
@@ -44,9 +44,9 @@ def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
 
 
 def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = frozenset()) -> Sides | None:
-    """The sides of a product with a sign in it that vanishes where the sign changes, as sign(v)*v**2 does.
+    """Return the sides of a product with a sign that is continuous, such as sign(v)*v**2, or None.
 
-    left: borders of signs that are not looked at.
+    Signs with borders in `left` are ignored.
     """
     for part, u in _signs_in(meanings, node):
         if meanings.family(u)[0] not in left:
@@ -57,9 +57,9 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Borders of signs in a product that is continuous there, with a root or power that is zero there as well.
+    """Return the borders of signs in a continuous product with a root or power that is zero there.
 
-    Such as sign(d)*sqrt(abs(d)), which has no series at d = 0 on either side.
+    An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """
     found = set()
     bases = _bases_in(meanings, node)
@@ -73,7 +73,7 @@ def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
 
 
 def _signs_in(meanings: Meanings, node: ast.expr) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """The signs of what moves in a tree, each with what it is the sign of."""
+    """Yield the signs of varying expressions in a tree, each with its argument."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id="sign"), args=[u]) if meanings.moves(u):
@@ -81,7 +81,7 @@ def _signs_in(meanings: Meanings, node: ast.expr) -> Iterator[tuple[ast.expr, as
 
 
 def _bases_in(meanings: Meanings, node: ast.expr) -> list[ast.expr]:
-    """What the roots and the powers that are not whole are of."""
+    """Return the arguments of roots and the bases of fractional powers."""
     parts = list(ast.walk(meanings.written_out(node)))
     bases = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sqrt"]
     powers = [p for p in parts if isinstance(p, ast.BinOp) and isinstance(p.op, ast.Pow)]
@@ -89,7 +89,7 @@ def _bases_in(meanings: Meanings, node: ast.expr) -> list[ast.expr]:
 
 
 def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
-    """Whether a product with a sign has a root, or a power that is not whole, of what is zero where it jumps."""
+    """Return whether a product with a sign contains a root or fractional power that is zero at the jump."""
     parts = list(ast.walk(meanings.written_out(node)))
     borders = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sign"]
     if not borders:
@@ -99,6 +99,6 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
 
 
 def _depends(p: Polynomial, name: str) -> bool:
-    """Whether a name occurs in a polynomial, also inside of what counts as a thing of its own."""
+    """Return whether a name occurs in a polynomial, also inside factors that are not names."""
     factors = {factor for monomial in p for factor, _ in monomial}
     return any(name == factor or (not factor.isidentifier() and name in factor) for factor in factors)

@@ -1,7 +1,7 @@
-"""Jumps in a flow as components: surfaces that a motion crosses or slides along, instants where time alone switches.
+"""Jumps in a flow as components: switching surfaces, or switching at known times.
 
-What `sign(v)`, or a conditional whose branches differ, is in a rate, a switching surface is in a model, and the motion
-on it is that of A. F. Filippov (see `SwitchingSurface`).
+`sign(v)`, or a conditional whose branches differ, in a rate becomes a switching surface. The motion on the surface
+follows A. F. Filippov's convention (see `SwitchingSurface`).
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from hybridsim.model.switching import ABOVE, BELOW, SwitchingSurface
 if TYPE_CHECKING:
     from hybridsim.model.model import Model
 
-SIGN = "__sign_"  # begins the name of a sign; names of a model do not begin with two underscores
+SIGN = "__sign_"  # prefix of the name of a sign; declared names cannot start with two underscores
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass
 class Jump:
-    """A jump on its way: the name of its component, the variable that is the sign, what changes its sign.
+    """A jump: the name of its component, the variable of its sign, and the expression that changes sign.
 
-    values: variables with theirs above, below and on the border. blended: those of them that jump, and are between
-    their sides there. is_timed: time alone moves the border.
+    `values` contains variables with their values above, below and on the border. `blended` names the variables that
+    jump and are interpolated on the border. `is_timed` is True if the border depends on time alone.
     """
 
     name: str
@@ -49,12 +49,12 @@ class Jump:
     blended: set[str] = field(default_factory=set)
 
     def signed(self, sign: int) -> ast.expr:
-        """Its sign, or minus that, for an argument that is or is not of the sign of its own."""
+        """Return the sign variable, or its negative, for an argument with the given sign in its family."""
         unknown = ast.Name(self.unknown, ast.Load())
         return unknown if sign == self.sign else ast.UnaryOp(ast.USub(), unknown)
 
     def component(self) -> Component:
-        """Its automaton: the three modes of a surface, or two that follow each other in time, which runs keep quiet."""
+        """Return the automaton: three modes for a surface, or two modes that alternate in time."""
         argument = of_tree(self.argument)
         if self.is_timed:
             minus = of_tree(ast.UnaryOp(ast.USub(), self.argument))
@@ -71,7 +71,7 @@ class Jump:
 
 
 class Borders:
-    """Where a model may jump in a way that a component can stand for."""
+    """Tests whether a component can represent the jumps of a model."""
 
     def __init__(self, model: Model, meanings: Meanings) -> None:
         self._meanings = meanings
@@ -93,23 +93,23 @@ class Borders:
         self._of_gaps = positions.union(*speeds) & self._moving
 
     def refusal(self, argument: ast.expr) -> str:
-        """Why what jumps at the zeros of an argument is left as it stands; empty if it is not."""
+        """Return the reason why a jump at the zeros of an argument is kept, or an empty string."""
         tree = self._meanings.written_out(argument)
         names = names_of(tree)
         if names & self._switched:
-            return f"its border depends on {min(names & self._switched)}, which a mode sets"
+            return f"the condition depends on {min(names & self._switched)}, which a mode sets"
         if any(sides_of(part) or isinstance(part, ast.IfExp) for part in ast.walk(tree)):  # type: ignore[arg-type]  # others have no sides
-            return "its border is not smooth"
+            return "the compared expression is not smooth"
         if names & self._changed:
             return f"a mode changes the rate of {min(names & self._changed)}"
         if names & self._of_gaps:
-            return f"an impact holds {min(names & self._of_gaps)}, too"
+            return f"an impact also holds {min(names & self._of_gaps)}"
         if names & self._moving or (TIME in names and not names & self._held):
             return ""
-        return "its border may stay at zero, as neither time nor a state with a rate moves it"
+        return "the compared expression may stay at zero, since neither time nor a changing state moves it"
 
     def is_only_passed(self, argument: ast.expr) -> bool:
-        """Whether no motion can stay on a border, as neither a force nor a jump acts on the rate of its function."""
+        """Return whether a motion can only cross a border, since no force or jump acts on its rate."""
         names = names_of(self._meanings.written_out(argument)) & self._moving
         if names & self._changed:
             return False
@@ -117,7 +117,7 @@ class Borders:
         return not any(names_of(rate) & self._switched or _jumps(rate) for rate in rates)
 
     def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
-        """Why a border cannot be held beside those of a model's surfaces and of other jumps; empty if it can."""
+        """Return the reason why a border conflicts with other surfaces and jumps, or an empty string."""
         if self.is_timed(argument) or self.is_only_passed(argument):
             return ""
         others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
@@ -125,17 +125,21 @@ class Borders:
         rows = [self._slopes(other) for other in (*others, argument)]
         for other, row in zip(others, rows[:-1], strict=True):
             if row is not None and rows[-1] is not None and _rank([row, rows[-1]]) < 2:
-                return "" if apart_by(self._meanings, other, argument)[2] else "it may meet a border along it"
+                return (
+                    ""
+                    if apart_by(self._meanings, other, argument)[2]
+                    else "it may coincide with another surface"
+                )
         known = [row for row in rows if row is not None]
         distinct = [row for k, row in enumerate(known) if all(_rank([row, other]) > 1 for other in known[:k])]
         return (
-            "its border is crossed by others of which two hold all three"
+            "it is one of three surfaces of which one is determined by the other two"
             if _rank(distinct) < len(distinct)
             else ""
         )
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
-        """How a border depends on the states, for some values of all else; None where that is not linear."""
+        """Return the coefficients of the states in a border for generic values, or None if not linear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
             moved = [factor for factor in monomial if not self._moving.isdisjoint(_WORD.findall(factor[0]))]
@@ -149,17 +153,17 @@ class Borders:
         return list(slopes.values())
 
     def is_timed(self, argument: ast.expr) -> bool:
-        """Whether time alone moves a border."""
+        """Return whether a border depends on time alone."""
         return not names_of(self._meanings.written_out(argument)) & self._moving
 
 
 def _jumps(tree: ast.expr) -> bool:
-    """Whether anything in a tree may jump."""
+    """Return whether a tree may contain a jump."""
     return any(isinstance(part, ast.IfExp) or ast.unparse(part) == "sign" for part in ast.walk(tree))
 
 
 def _rank(rows: list[list[Fraction]]) -> int:
-    """How many rows are independent, by elimination."""
+    """Return the rank of rows, by elimination."""
     left, rank = [row for row in rows if any(row)], 0
     while left:
         first, *others = left
@@ -174,7 +178,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """n, d and g = n first - d second, constant and not zero, of parallel borders; all empty for others.
+    """Return n, d and g = n first - d second, constant and not zero, of parallel borders; else empty ones.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """
@@ -202,7 +206,7 @@ def apart_by(
 
 
 def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
-    """The product of a monomial with a power of another."""
+    """Return the product of a monomial with a power of another one."""
     powers = dict(one)
     for name, count in other:
         powers[name] = powers.get(name, 0) + power * count
@@ -210,7 +214,7 @@ def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
-    """sign(first)*sign(second) over u = sign(first) and w = sign(second); None where the two are not parallel.
+    """Return sign(first)*sign(second) as a linear function of both signs, or None if not parallel.
 
     With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
     the value 0, one border is constant, and has the sign that this gives it.
@@ -223,7 +227,7 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
 
 
 def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
-    """Which signs do not enter linearly for given values of all others: they stand in a function, or in a power.
+    """Return the signs that enter nonlinearly for given values of all others.
 
     trees: values of names, and rates, which have none. carried: signs and forces, by themselves, and what jumps with
     them.

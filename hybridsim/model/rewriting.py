@@ -1,4 +1,4 @@
-"""Trees of a model's expressions rewritten: corners become names that components set, implied sides are put in."""
+"""Rewrite the expressions of a model: replace corners by variables of components, and insert known sides."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ if TYPE_CHECKING:
 
 _EITHER = parse("p*a + (1 - p)*b").tree
 IN_VELOCITY = "it is part of a relative velocity"
-WATCHED = "a guard, a monitor or another corner hangs on it"
-VARIABLE = "__corner_"  # names of a model do not begin with two underscores
+WATCHED = "a guard, a monitor or another corner depends on it"
+VARIABLE = "__corner_"  # declared names cannot start with two underscores
 
 
 @dataclass(frozen=True)
 class Here:
-    """Where a tree stands: in words, the signs that its mode implies, why nothing is to be replaced (or empty).
+    """The context of a tree: its place in words, the signs known in its mode, and the allowed replacements.
 
-    jumps: why what jumps where a state comes to a border is left as it stands; empty in a rate, along whose jumps a
-    motion may slide. is_passing: whether borders that a motion only crosses are taken nevertheless. times: why what
-    jumps in time alone is a known signal, and no component; empty in a rate.
+    `untouched` is the reason why nothing may be replaced here, or empty. `jumps` is the reason why jumps of states are
+    kept; it is empty in a rate, where a motion may slide along a jump. `is_passing` allows jumps that a motion can only
+    cross. `times` is the reason why a jump in time becomes a signal and not a component; it is empty in a rate.
     """
 
     where: str
@@ -68,7 +68,7 @@ class Here:
 
 @dataclass
 class Found:
-    """A corner on its way: its component's name, its argument, its variables with their values above and below."""
+    """A corner: the name of its component, its argument, and its variables with their values per side."""
 
     name: str
     argument: ast.expr
@@ -77,14 +77,14 @@ class Found:
 
 
 class Rewriting:
-    """One pass over the expressions of one model; what it found is in `corners`, `jumps`, `implied` and `primitives`.
+    """One pass over the expressions of a model, with results in `corners`, `jumps`, `implied`, `primitives`.
 
     Parameters
     ----------
-    refusal : why no corner or jump is to become a component, if so.
-    refused : why those at some borders are not to.
-    shared : borders at which there are jumps and corners.
-    timed : borders in time that are known signals wherever they stand, as they stand in a contact or a guard.
+    refusal : reason why no corner or jump may become a component, or empty.
+    refused : reasons for single borders.
+    shared : borders with jumps and corners.
+    timed : borders in time that must be signals everywhere, because they occur in a contact or a guard.
     """
 
     def __init__(
@@ -112,9 +112,7 @@ class Rewriting:
         self.jumps: dict[Family, Jump] = {}
         self.faults: list[ModelError] = []
         self._single: dict[int, tuple[ast.expr, ast.expr]] = {}
-        self.steps: dict[
-            Family, tuple[TimeStep, int]
-        ] = {}  # with the sign of what is above zero in its family
+        self.steps: dict[Family, tuple[TimeStep, int]] = {}  # with the sign of the expression in its family
         self._known_signs: dict[frozenset[tuple[Family, int]], Mapping[Family, int]] = {}
         self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
         self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
@@ -123,12 +121,12 @@ class Rewriting:
         self._walked: dict[tuple[object, ...], tuple[ast.expr, Here, ast.expr]] = {}
 
     def primitives(self) -> tuple[Primitive, ...]:
-        """What became of each primitive, in the order in which they were met."""
+        """Return the treatment of each primitive, in order of appearance."""
         found = self._accounts.items()
         return tuple(Primitive(*key[:1], tuple(where), *key[1:], place) for key, (where, place) in found)
 
     def single_signs(self, tree: ast.expr) -> ast.expr:
-        """A tree with signs of products taken apart, the same one for the same tree."""
+        """Return a tree with signs of products split; equal calls return the same tree."""
         if not self._has_sign:
             return tree
         if id(tree) not in self._single:
@@ -136,15 +134,20 @@ class Rewriting:
         return self._single[id(tree)][1]
 
     def walk(self, node: ast.expr, here: Here) -> ast.expr:
-        """The tree with what is not smooth replaced; the very same tree where nothing is.
+        """Return the tree with non-smooth parts replaced, or the same tree if there are none.
 
-        Both sides of a corner hold its argument, so that what is nested is met twice at each level: it is done once.
+        Results are cached, because both sides of a corner contain its argument and nested corners would be visited
+        twice per level.
         """
         if not self.meanings.moves(node):
             return node
         key = (id(node), id(here.signs), here.where, here.untouched, here.jumps, here.times, here.rooted)
         if key not in self._walked:
-            self._walked[key] = node, here, self._walk(node, here)  # kept alive, as their numbers are the key
+            self._walked[key] = (
+                node,
+                here,
+                self._walk(node, here),
+            )  # keep both alive, since the key uses their ids
         return self._walked[key][-1]
 
     def _walk(self, node: ast.expr, here: Here) -> ast.expr:
@@ -159,7 +162,8 @@ class Rewriting:
                 here = self._note_power(node, argument, here)
             case ast.Call(func=ast.Name(id="log" | "asin" | "acos" as name)):
                 here = replace(
-                    here, untouched=here.untouched or f"it stands in {name}, which ends where it does"
+                    here,
+                    untouched=here.untouched or f"it is the argument of {name}, which has a limited domain",
                 )
             case ast.BinOp(left=base, op=ast.Pow(), right=exponent) if not is_whole(exponent, self.meanings):
                 here = self._note_power(node, base, here, exponent)
@@ -175,7 +179,7 @@ class Rewriting:
                 if rooted := rooted_in(self.meanings, node):
                     here = replace(here, rooted=here.rooted | rooted)
                 elif has_root_beside_sign(self.meanings, node) and not here.rooted:
-                    here = replace(here, jumps=here.jumps or "the root beside it is zero there")
+                    here = replace(here, jumps=here.jumps or "it is multiplied by a root that is zero there")
                 if product := sides_of_product(self.meanings, node, here.rooted):
                     return self._side(node, product, here)
         parts = sides_of(node)
@@ -194,7 +198,7 @@ class Rewriting:
         return new if any(changed) else node
 
     def _taken_apart(self, node: ast.IfExp, here: Here) -> ast.expr:
-        """What a conditional becomes whose condition is no single comparison; the node itself where it is one."""
+        """Return the replacement of a conditional with several comparisons, or the node itself."""
         try:
             single = single_comparisons(self.meanings, node)
         except TooManyConditions:
@@ -202,7 +206,7 @@ class Rewriting:
         return node if single is node else self.walk(single, here)
 
     def _sign_taken_apart(self, argument: ast.expr, here: Here) -> ast.expr | None:
-        """What the sign of something that is not smooth becomes; None for one that is smooth."""
+        """Return the replacement of the sign of a non-smooth expression, or None if it is smooth."""
         minus = ast.UnaryOp(ast.USub(), ast.Constant(1))
         node = ast.IfExp(ast.Compare(argument, [ast.Gt()], [ast.Constant(0)]), ast.Constant(1), minus)
         if self.never_negative(argument) or self._owner(self.meanings.family(argument)[0]) is not None:
@@ -211,18 +215,18 @@ class Rewriting:
         return None if found is node else found
 
     def _hoisted(self, node: ast.expr, border: ast.expr, here: Here) -> ast.expr:
-        """An expression that a jump does not enter linearly, as the jump between its values on the sides."""
+        """Return a jump between the two values of an expression that depends nonlinearly on a jump."""
         whole = self.meanings.written_out(node)
         made = ast.IfExp(ast.Compare(border, [ast.Gt()], [ast.Constant(0)]), whole, whole)
         return self._side(made, (border, whole, whole, whole), here)
 
     def is_smooth(self, argument: ast.expr) -> bool:
-        """Whether a border has neither corners nor jumps, as far as its form shows."""
+        """Return whether an expression has neither corners nor jumps, by its form."""
         parts = ast.walk(self.meanings.written_out(argument))
         return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
 
     def is_open(self, family: Family, argument: ast.expr, here: Here) -> bool:
-        """Whether a surface may stand for what jumps at a border, where a tree stands."""
+        """Return whether a switching surface may represent a jump at this place."""
         return bool(
             family
             and not self.never_negative(argument)
@@ -233,14 +237,14 @@ class Rewriting:
         )
 
     def _left(self, family: Family, argument: ast.expr, here: Here) -> str:
-        """Why what jumps at a border is left as it stands; empty if it is not."""
+        """Return the reason why a jump is kept, or an empty string."""
         reason = here.jumps
         if here.is_passing and self.borders.is_only_passed(argument):
             reason = ""
         return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
-        """The signs known beside that of a family."""
+        """Return the known signs together with that of a family."""
         known = {**here.signs, family: sign}
         return self._known_signs.setdefault(frozenset(known.items()), known)
 
@@ -254,10 +258,10 @@ class Rewriting:
         is_fraction = power is None or power != round(power)
         if is_fraction and not is_clear_of_zero(base, numbers, self.meanings):
             self.note(node, POWER, f"it has no series where {write(base)} = 0", here)
-        return replace(here, untouched=here.untouched or "it stands in a root or a fractional power")
+        return replace(here, untouched=here.untouched or "it is in a root or a fractional power")
 
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
-        """What a primitive becomes: one of its sides, or a variable that is set to the one that holds."""
+        """Return the replacement of a primitive: one of its sides, or a variable with the active side."""
         argument, above, below, at_zero = parts
         if here.signs and not self.is_smooth(argument):
             argument = resolved(self.meanings, argument, here.signs)
@@ -270,7 +274,7 @@ class Rewriting:
         if family in here.signs and not agrees:
             return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
         if family in here.rooted and not agrees:
-            return self._kept(node, "it is continuous with the root or the power beside it", here)
+            return self._kept(node, "its product with a root or power is continuous", here)
         if self._is_step(family, argument, here, agrees) and (step := self._step(family, argument)):
             return self._stepped(node, step, parts, family, sign, here)
         if here.untouched == IN_VELOCITY and here.where and (not agrees or self.borders.is_timed(argument)):
@@ -281,7 +285,7 @@ class Rewriting:
             self._is_limited(side, argument, family, s)
             for side, s in zip(branches, (sign, -sign), strict=False)
         ):
-            reason = "one of its sides has no value beyond its border"
+            reason = "one of its sides is undefined on the other side"
             return self._kept(node, reason if agrees else f"{JUMPS}: {reason}", here)
         if family in here.signs:
             return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
@@ -297,11 +301,11 @@ class Rewriting:
             return self._jump(node, (argument, above, below, at_zero), family, sign, here)
         if forced:
             return self._kept(
-                node, f"it depends on {', '.join(sorted(forced))}, which a mode solves for", here
+                node, f"it depends on {', '.join(sorted(forced))}, which the solver computes in a mode", here
             )
         if self.refusal:
             return self._kept(node, self.refusal, here)
-        inside = replace(here, signs=self._signs(here, family, sign))  # beyond the node's own border
+        inside = replace(here, signs=self._signs(here, family, sign))  # on one side of the node
         if isinstance(node, ast.IfExp) and (border := jump_inside(self, node, inside)):
             return self._hoisted(node, border, here)
         here = replace(here, jumps=WATCHED, is_passing=False)
@@ -318,17 +322,19 @@ class Rewriting:
         return self._variable(found.values, pair if sign == found.sign else pair[::-1])
 
     def _fault_in_velocity(self, node: ast.expr, argument: ast.expr, here: Here) -> ModelError:
-        """What jumps and cannot be part of what a contact, a gap or a surface holds at zero."""
+        """Return the error for a jump in an expression that a contact, gap or surface holds at zero."""
         border = write(argument)
         if self.borders.is_timed(argument):
-            remedy = f"the zeros of {border} are not known beforehand: give it as an input, whose knots are"
+            remedy = (
+                f"declare it as an input (table or wave), since the zeros of {border} in time are unknown"
+            )
         else:
             remedy = (
-                f"hold it in a discrete state that a monitor of '{border}' resets, or a transition where that "
-                "changes its sign"
+                f"use a discrete state instead, which a monitor of '{border}' or a transition at its sign change "
+                "resets"
             )
         return ModelError(
-            f"'{write(node)}' jumps in {here.where}, which a mode holds at zero",
+            f"'{write(node)}' jumps in {here.where}, but a mode must hold this expression at zero",
             place=here.place,
             remedy=remedy,
         )
@@ -336,9 +342,10 @@ class Rewriting:
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
     ) -> tuple[ast.expr, ast.expr]:
-        """Both sides rewritten, each where the sign of the border is known, as far as that says anything.
+        """Return both sides rewritten, each with the sign of the border known.
 
-        A sign that says nothing is not carried along: nested corners, twenty deep, would be met a million times.
+        Signs without influence are dropped, because corners nested twenty times would otherwise be visited a million
+        times.
         """
         first, second = (
             self.walk(
@@ -350,11 +357,11 @@ class Rewriting:
         return first, second
 
     def _is_met(self, family: Family, node: ast.expr) -> bool:
-        """Whether a tree holds a corner at a border, or a jump at any."""
+        """Return whether a tree contains a corner at a border, or any jump."""
         return None in (met := self._borders_in(node)) or family in met
 
     def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
-        """The borders of the corners in a tree; None among them stands for those of jumps, which are not told apart."""
+        """Return the borders of the corners in a tree; None stands for all jumps."""
         if id(node) not in self._met:
             found: set[Family | None] = set()
             is_jump = isinstance(node, ast.IfExp | ast.Compare | ast.BoolOp)
@@ -371,18 +378,18 @@ class Rewriting:
         return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
-        """Whether a side may have no value beyond the border: a root of something that the border depends on, too."""
+        """Return whether a side may be undefined beyond the border, such as a root."""
         border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
         side = resolved(self.meanings, branch, {family: sign})
         return any(names_of(base) & border for base in limited(side, self.meanings))
 
     def _is_step(self, family: Family, argument: ast.expr, here: Here, agrees: bool) -> bool:
-        """Whether a known signal stands for a condition on time alone here."""
+        """Return whether a signal represents a condition on time alone at this place."""
         wanted = here.untouched or (here.times and not agrees) or family in self.timed
         return bool(wanted) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
     def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
-        """The signal of a border in time; None where its zeros are not known beforehand."""
+        """Return the signal of a border in time, or None if its zeros cannot be computed."""
         if family not in self.steps:
             tree = self.meanings.written_out(argument)
             found = step_of(f"{STEP}{len(self.steps) + 1}", tree, self._parameters, write(argument))
@@ -393,7 +400,7 @@ class Rewriting:
         return self.steps[family][0]
 
     def timed_by_form(self) -> set[Family]:
-        """The borders of jumps and corners in time alone for which signals can stand."""
+        """Return the borders of jumps and corners in time that signals can represent."""
         found = {family: one.argument for family, one in self.jumps.items()}
         found |= {family: one.argument for family, one in self.corners.items()}
         return {f for f, border in found.items() if self.borders.is_timed(border) and self._step(f, border)}
@@ -401,7 +408,7 @@ class Rewriting:
     def _stepped(
         self, node: ast.expr, step: TimeStep, parts: Sides, family: Family, sign: int, here: Here
     ) -> ast.expr:
-        """What a condition on time alone becomes: its sides, each times the signal that is 1 while it holds."""
+        """Return a condition on time as a sum of its sides, weighted by the signal."""
         self.note(node, TIMED, step.title, here)
         pair = self._pair(parts[1], parts[2], family, sign, here)
         pair = pair if sign == self.steps[family][1] else pair[::-1]
@@ -409,7 +416,7 @@ class Rewriting:
         return with_names(_EITHER, names)
 
     def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
-        """What a primitive becomes whose sides differ."""
+        """Return the replacement of a primitive whose sides differ."""
         argument, above, below, _ = parts
         if self.borders.is_timed(argument):
             reason = (
@@ -420,7 +427,7 @@ class Rewriting:
         if reason:
             return self._kept(node, f"{JUMPS}: {reason}", here)
         jump = self._jump_at(family, argument, sign)
-        is_whole = isinstance(node, ast.IfExp) and node.body is node.orelse  # made of what jumps inside
+        is_whole = isinstance(node, ast.IfExp) and node.body is node.orelse  # made by _hoisted
         self.note(above if is_whole else node, SURFACE, jump.name, here)
         if isinstance(node, ast.Call):
             return jump.signed(sign)
@@ -436,9 +443,9 @@ class Rewriting:
     def _stairs(
         self, jump: Jump, argument: ast.expr, nested: ast.expr, other: ast.expr, way: int, here: Here
     ) -> ast.expr | None:
-        """A jump between constants, one of which jumps at a parallel border: as a sum of both signs.
+        """Return nested jumps between constants at parallel borders as a sum of both signs, or None.
 
-        way: 1 or -1, on which side of the first border the second is.
+        `way` is the side (1 or -1) of the first border on which the second border is.
         """
         inner = sides_of(nested)
         if inner is None or any(map(self.meanings.moves, (*inner[1:], other))):
@@ -456,7 +463,7 @@ class Rewriting:
         return with_names(parse(text).tree, {**parts, "uw": with_names(product, parts)})
 
     def _border(self, family: Family, argument: ast.expr) -> str:
-        """Why a border is none of a surface; empty if it is."""
+        """Return the reason why a border cannot be a surface, or an empty string."""
         if family in self.jumps:
             return ""
         return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
@@ -470,7 +477,7 @@ class Rewriting:
         return self.jumps[family]
 
     def agrees(self, node: ast.expr, parts: Sides) -> bool:
-        """Whether the sides of a primitive have one value on its border, as far as its form shows."""
+        """Return whether the sides of a primitive have equal values at its border, by their form."""
         argument, above, below, _ = parts
         if isinstance(node, ast.IfExp):
             family, sign = self.meanings.family(argument)
@@ -480,7 +487,7 @@ class Rewriting:
         return not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "sign")
 
     def _owner(self, family: Family) -> int | None:
-        """A component whose every mode implies the side of an expression."""
+        """Return a component in which every mode implies the side of an expression, or None."""
         for c, modes in enumerate(self.signs):
             if modes and all(family in signs for signs in modes):
                 return c
@@ -521,5 +528,5 @@ class Rewriting:
             where.append(here.where)
 
     def never_negative(self, node: ast.expr) -> bool:
-        """Whether the form of a tree shows that it is never negative, whatever the parameters are."""
+        """Return whether a tree is never negative by its form, for all parameters."""
         return never_negative(node, {}, self.meanings.lookup) is not None

@@ -125,7 +125,7 @@ def test_what_waits_for_a_force_is_kept() -> None:
     states = [hs.State("v", 1, der="1 - f"), hs.State("heat", 0, der="abs(f)")]
     account = accounts(hs.Model("m", states=states, contacts=[contact]))["abs(f)"]
     assert account.became == KEPT
-    assert "f, which a mode solves for" in account.remark
+    assert "f, which the solver computes in a mode" in account.remark
 
 
 def test_more_corners_than_are_worth_it_are_kept() -> None:
