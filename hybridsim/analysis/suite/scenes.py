@@ -53,7 +53,7 @@ SCENES: tuple[Scene, ...] = (
         "No stop: velocity crosses zero",
         "dfcs",
         "Forced hard above resonance, the body turns round without a stop: each zero of the velocity is a crossing, "
-        "and nothing erases an error of the past.",
+        "and no stick erases earlier errors.",
         {"F0": 60, "N": 40, "omega": "1.4*sqrt(k/m)"},
         periods=8,
     ),
@@ -62,10 +62,10 @@ SCENES: tuple[Scene, ...] = (
         "Near grazing: stops that barely happen",
         "dfcs",
         "At 0.2 of resonance the body swings within each half period, and its velocity comes back to almost zero. In "
-        "the closed form it would go on to -5.2e-4, -1.0e-4 and -1.2e-5 of its largest value in the first three "
+        "the closed form it would reach -5.2e-4, -1.0e-4 and -1.2e-5 of its largest value in the first three "
         "half periods after the first, which makes short stops, and turns above +7e-6 in the later ones, which makes "
-        "none. So the modes are right only where the velocity is right to some 1e-5 and both zeros of a pair are "
-        "seen.",
+        "none. The modes are right only if the velocity is accurate to about 1e-5 and both zeros of a pair are "
+        "found.",
         {"F0": 62.035, "N": 40, "omega": "0.2*sqrt(k/m)"},
         periods=3,
         needs=("multiple-roots",),
@@ -74,7 +74,7 @@ SCENES: tuple[Scene, ...] = (
         "belt",
         "Belt: friction falls with speed",
         "belt",
-        "A limit cycle without any forcing, of a force that is not linear: one stick and one slip in each cycle.",
+        "A limit cycle without forcing and with a nonlinear force: one stick and one slip in each cycle.",
         t_end=40.0,
     ),
     Scene(
@@ -104,7 +104,7 @@ SCENES: tuple[Scene, ...] = (
         "base-isolation",
         "Base-isolated storey, ground motion",
         "base-isolation",
-        "Four states under an input with a thousand knots: each knot ends a step, so a long one is worth nothing.",
+        "Four states under an input with a thousand knots: each knot ends a step, so that long steps are not possible.",
         t_end=3.0,
     ),
 )
