@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.at_end import may_be_at_zero_of_linear
 from hybridsim.engine.event_work import LEAP, ROW, called_by
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
@@ -224,6 +225,10 @@ def exact_leap(
             put(y1, y)
         for i in range(n):
             if not abs(y[i]) < math.inf:
+                return stopped(hints, k, former)
+        if fired < 0 and until == bound:
+            time = max(abs(target[0]), abs(clock[0]))
+            if may_be_at_zero_of_linear(lin, tapes, k, s, time, v, room.sizes, room.terms[0]):
                 return stopped(hints, k, former)
         ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
         rows[n_segments], fires[n_segments] = k, fired

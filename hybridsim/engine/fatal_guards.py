@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.system import System
+
+if TYPE_CHECKING:
+    from hybridsim.engine.located import Located
+    from hybridsim.engine.outcome import Outcome
 
 
 def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray) -> str | None:
@@ -17,6 +23,19 @@ def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides
             if message and sides[guard] < 0:
                 return message
     return None
+
+
+def without_fatal(system: System, found: Located) -> Located:
+    """What is located at the end of a run, where nothing has to go on: without guards that would only end it there."""
+    modes = zip(system.automata, found.at.z.tolist(), strict=True)
+    fatal = {g for a, m in modes if m >= 0 for g, message in zip(a.guards[m], a.fatal[m]) if message}
+    return replace(found, fired={g: place for g, place in found.fired.items() if g not in fatal})
+
+
+def is_only_fatal(system: System, outcome: Outcome) -> bool:
+    """Whether an instant could not be settled because of such a guard alone."""
+    messages = (message for a in system.automata for row in a.fatal for message in row)
+    return bool(outcome.status) and any(message and message == outcome.message for message in messages)
 
 
 def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.at_end import is_clear, may_be_at_zero
 from hybridsim.engine.faint_terms import KINDS, may_end, power_of, register_of, where_it_ends
-from hybridsim.engine.few import put
+from hybridsim.engine.few import fill, put
 from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit
 from hybridsim.engine.jets import UNIT
 from hybridsim.engine.jit import call, call_apart, call_series, inlined, kernel
@@ -48,7 +49,8 @@ LEAST = 64  # steps of a piece of a segment that there is no room for: with less
 
 class Room(NamedTuple):
     """Scratch arrays: series of all registers (registers, order + 1), of active guards and of what may fade, what is
-    ahead of them, powers of a step and sizes of guards over it, a polynomial, its Bernstein forms, a state, guards."""
+    ahead of them, powers of a step and sizes of guards over it, a polynomial, its Bernstein forms, a state, guards,
+    their largest values."""
 
     V: np.ndarray
     W: np.ndarray
@@ -66,6 +68,7 @@ class Room(NamedTuple):
     watched: np.ndarray
     everyone: np.ndarray
     pace: np.ndarray
+    largest: np.ndarray
 
 
 class Record(NamedTuple):
@@ -254,6 +257,7 @@ def leap(
         s, fired, short, lands, holds = 0.0, -1, 0, landing(automata, z), holding(automata, z)
         for i in range(n):
             scale[i] = abs(x[i])
+        fill(room.largest, 0.0)
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
                 if n_segments > 0 or n_steps < LEAST:
@@ -278,6 +282,8 @@ def leap(
                 guard_series,
                 coefficients,
             )
+            for i in range(count):
+                room.largest[i] = max(room.largest[i], abs(guard_series[i, 0]))
             left = bound - s
             h = reach(
                 sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
@@ -366,6 +372,15 @@ def leap(
         if holds:
             call(functions.project, s, y, p, z, work.x_after)
             put(work.x_after, y)
+        latest = max(abs(target[0]), abs(clock[0]))
+        is_over = fired < 0 and s >= bound
+        if is_over and not is_clear(values, room.largest, s, latest):
+            taken = n_steps - first_step
+            if call_apart(
+                may_be_at_zero,
+                (automata, tapes, inputs, lin, k, s, latest, taken, scale, rates_now, state, work),
+            ):
+                return STOPPED, first_step, n_segments
         segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
         fires[n_segments] = fired
         put(z, modes[n_segments])

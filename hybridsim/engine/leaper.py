@@ -347,6 +347,7 @@ class TaylorLeaper(Leaper):
                 stack=np.empty((64, order + 3)),
                 floors=np.empty(guards),
                 pace=np.empty(3),
+                largest=np.empty(guards),
                 scale=np.empty(n),
                 **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "watched")},
             )

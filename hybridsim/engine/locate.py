@@ -17,6 +17,8 @@ _WIDER = 6  # doublings of a bracket whose end is on the wrong side, by the erro
 # Pieces that are halved no further are narrower than this; ends of wider brackets are certain, and what changes sign
 # beyond them is another zero.
 _NARROW = 2.0**-24
+_FAR = 2.0**-10  # of the values on a step: a function that is nearer to zero at its end may be zero there
+_SHORT = 2.0**-13  # of a run's time: on shorter steps it may have been that near all along
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,7 @@ class Locator:
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
+        self.samples: list[np.ndarray] = []  # of guards and of monitors, on the step that was searched last
 
     def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
         """All that happens in a step; rounding: of the states, on the segment so far."""
@@ -111,8 +114,10 @@ class Locator:
         states = step.dense(times)
         exits, crossings, grazings, guard_gaps, monitor_gaps = [], [], [], [], []
         guard_ends = np.ones_like(self.sides)
+        self.samples = []
         if len(self.numbers):
             values = flow.guards(times, states)
+            self.samples.append(values)
             still = quiet(values, self.numbers, self.sides, self.orders, self.floors)
             for g in self.numbers[~still]:
                 sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
@@ -140,6 +145,7 @@ class Locator:
         monitor_ends = self.monitor_sides.copy()
         if len(self.monitor_sides):
             values = flow.monitors(times, states)
+            self.samples.append(values)
             still = quiet(
                 values, self.monitor_numbers, self.monitor_sides, self.monitor_orders, self.monitor_floors
             )
@@ -172,6 +178,16 @@ class Locator:
             tuple(guard_gaps),
             tuple(monitor_gaps),
         )
+
+    def is_clear(self, length: float, time: float) -> bool:
+        """Whether no function comes near zero where a step of this length ends, at such a time."""
+        found = len(self.samples) == (len(self.numbers) > 0) + (len(self.monitor_numbers) > 0)
+        clear = found and (length > _SHORT * time or not self.samples)
+        for values in self.samples:
+            first, middle, last = values[0].tolist(), values[len(values) // 2].tolist(), values[-1].tolist()
+            for a, b, c in zip(first, middle, last):
+                clear = clear and (abs(c) > _FAR * max(abs(a), abs(b)) or a == b == c == 0.0)
+        return clear
 
     def exit(self, step: Step, guard: int) -> Hit:
         """The zero of a guard that is positive where a step begins and negative where it ends."""

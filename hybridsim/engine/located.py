@@ -129,10 +129,13 @@ def located(
         late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
         known_at = math.ulp(float(origin.plus(target)))  # it is a number in doubles
         is_met = abs(target - arrival.s) <= at.s_error + late + known_at
-        if is_met:  # so far from the time that is known
-            wide.s_error += abs(target - arrival.s)
-            at, series = wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
-            at, series = _as_due(system, origin, at, series, arrival, known_at)
+        if is_met:
+            if arrival.s != target:  # by as much as rounding may have moved it
+                shift, arrival = abs(target - arrival.s), segment.carry_on(arrival, target)
+                at = situation(system, arrival, segment)
+                at.s_error += shift
+                wide, known = as_stepped(system, at, arrival, segment)
+            at, series = _as_due(system, origin, wide, known, arrival, known_at)
     share = spread(len(segment.knots), segment.method.rounding)
     if not is_met and others_near(system, at, series, arrival, share):
         wide, known = as_stepped(system, at, arrival, segment)
@@ -222,21 +225,19 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
     return Located(at, fired, monitors, True)
 
 
-def before_appointment(
+def errors_when_due(
     system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
-) -> dict[int, int]:
-    """Guards that are zero and leave at a time known beforehand, which a compiled loop has reached: they come first.
+) -> np.ndarray:
+    """Errors of the states at a time known beforehand that a compiled loop has reached, by so many steps.
 
-    It took so many steps of a method that rounds like this, from these states; the errors in `at` are completed by
-    their rounding.
+    rounding: of the method; before: the states where the loop began.
     """
     way = np.abs(at.x - before)
     scale = np.maximum(np.abs(before), np.abs(at.x)) + way
-    at.s_error = math.ulp(float(target))
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
-    at.x_error = at.x_error + 4.0 * UNIT * scale + at.s_error * slopes
+    at.x_error = at.x_error + 4.0 * UNIT * scale + math.ulp(float(target)) * slopes
     add_steps(system, at, scale, steps, rounding * way)
-    return coincident(system, target, at, ())
+    return at.x_error
 
 
 def with_evaluated(

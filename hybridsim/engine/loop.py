@@ -12,18 +12,13 @@ from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulat
 from hybridsim.engine.backward import cross_backward, has_no_past, held, said_of_direction
 from hybridsim.engine.checkpoint import Checkpoint, damaged
 from hybridsim.engine.diagnosis import advice_on_sizes, in_the_way
+from hybridsim.engine.fatal_guards import is_only_fatal, without_fatal
 from hybridsim.engine.gathering import behind, closed_now, holds_several
 from hybridsim.engine.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.input_jumps import surfaces_jump
 from hybridsim.engine.limits import UNLIMITED, Gauge, LimitReached
-from hybridsim.engine.located import (
-    Located,
-    before_appointment,
-    located,
-    located_backward,
-    with_evaluated,
-)
+from hybridsim.engine.located import Located, errors_when_due, located, located_backward, with_evaluated
 from hybridsim.engine.monitor_sides import MonitorSides
 from hybridsim.engine.new_pieces import on_new_pieces
 from hybridsim.engine.notices import Notices
@@ -39,6 +34,8 @@ from hybridsim.engine.system import System
 from hybridsim.engine.timepair import Instant
 from hybridsim.engine.timetable import Appointment, Timetable
 from hybridsim.engine.trajectory import Task, Trajectory
+
+_NEAR = 1e-6  # of a time
 
 
 class ModeLoop:
@@ -180,10 +177,17 @@ class ModeLoop:
                     bound, target = arrival.s, self.origin.plus(arrival.s)
                     appointment = Appointment(target, (), is_renewal=True)
                 at_target = arrival.s == bound
-                is_due = appointment is not None and not appointment.is_renewal
-                if self.forward and (arrival.fired or arrival.stopping or (at_target and appointment)):
+                # the end is a known time as well; far from it nothing is that rounding may put there
+                is_over = appointment is None and bound - arrival.s <= _NEAR * max(bound, abs(float(target)))
+                is_due = is_over or (appointment is not None and not appointment.is_renewal)
+                if self.forward and not (
+                    arrival.is_bare and is_over and segment.is_clear_at_end(float(target))
+                ):
                     found = located(self.system, self.origin, arrival, segment, bound, is_due)
                     at_target = at_target or found.is_met
+                    if at_target and appointment is None:
+                        found = without_fatal(self.system, found)
+                        found = found if self._is_event(found) else None
             finally:
                 self._keep(segment)
                 self.notices.look()
@@ -282,19 +286,12 @@ class ModeLoop:
         if appointment is None:
             self._tell(self.origin)
             return True, True
-        error = self.outcome.x_error
+        x, error = self.outcome.x, self.outcome.x_error
         if not appointment.is_renewal:
             self.timetable.kept(target)
             at, steps = self._at_target(target), self.record.counters.steps - steps
-            if fired := before_appointment(self.system, target, at, steps, self.method.rounding, x_before):
-                monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
-                found = Located(at, fired, monitors, True)
-                found, x = on_new_pieces(self.system, target, found, appointment.schedules, True), at.x.copy()
-                fired = found.fired
-                if fired and self._adopt(target, self._settle_located(target, found, fired, []), x, ()):
-                    return True, True
-                error = self.outcome.x_error if found.fired else np.maximum(error, at.x_error)
-        x = self.outcome.x
+            errors = errors_when_due(self.system, target, at, steps, self.method.rounding, x_before)
+            error = np.maximum(error, errors)
         settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
 
@@ -303,6 +300,11 @@ class ModeLoop:
         outcome = self.outcome
         p = self.system.vector(target, self.system.discrete(outcome.p), not self.forward)
         return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
+
+    def _is_event(self, found: Located) -> bool:
+        """Whether something happens at the end of the run: corners alone decide nothing there."""
+        owners = set(self.system.owner[list(found.fired)].tolist())
+        return bool(owners - self._led) or bool(found.monitors.leads.any())
 
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
@@ -363,7 +365,7 @@ class ModeLoop:
                 f"at t = {float(instant)!r}: {arrival.entered} is zero: the mode may have begun here"
             )
             return True
-        if not (arrival.fired or arrival.stopping or appointment):
+        if found is None and appointment is None and (self.forward or arrival.is_bare):
             self.origin = instant
             return True
         if found is None:
@@ -373,7 +375,7 @@ class ModeLoop:
                 self.record.status, self.record.message = "backward-nonunique", refused
                 return True
             found = located_backward(self.system, self.origin, arrival, segment)
-        monitors, x_minus, error, s_error = found.monitors, arrival.x, segment.rounding(), 0.0
+        monitors, x_minus, error, s_error = found.monitors, found.at.x.copy(), segment.rounding(), 0.0
         if appointment and not appointment.is_renewal and (found.fired or monitors.leads.any()):
             found = on_new_pieces(self.system, instant, found, schedules, self.forward)
             monitors, s_error = found.monitors, math.ulp(float(instant))
@@ -392,7 +394,7 @@ class ModeLoop:
             if stop is not None:
                 return stop
             if appointment is None:
-                outcome = self._apply_crossed(outcome, arrival.s, monitors)
+                outcome = self._apply_crossed(outcome, found.at.s, monitors)
             if self._adopt(instant, outcome, x_minus, (), monitors, appointment is None):
                 return True
             x_minus, error = outcome.x, outcome.x_error
@@ -403,7 +405,7 @@ class ModeLoop:
             outcome = self._settle_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
             outcome = self._apply_crossed(outcome, 0.0, monitors)
             return self._adopt(instant, outcome, x_minus, schedules, monitors)
-        return self._accumulated(instant, arrival.x, arrival.fired)
+        return self._accumulated(instant, found.at.x, arrival.fired)
 
     def _resets_of_monitors(
         self,
@@ -576,8 +578,9 @@ class ModeLoop:
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
         ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
-        # a run that a monitor ends here needs no modes that hold behind it
-        if outcome.status and not ended:
+        # a run that is ended here needs no modes that hold behind it
+        is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
+        if outcome.status and not (ended or terminated or is_over):
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
             return True
         if terminated or ended:

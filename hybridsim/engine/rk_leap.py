@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.at_end import may_be_at_zero
 from hybridsim.engine.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.few import put
 from hybridsim.engine.first_exit import FOUND, OPEN
@@ -424,6 +425,13 @@ def rk_leap(
         if is_holding:
             call(functions.project, s, y, p, z, y1)
             put(y1, y)
+        if fired < 0 and s >= bound:
+            latest = max(abs(target[0]), abs(clock[0]))
+            call(functions.flow, s, y, p, z, slopes)
+            if may_be_at_zero(
+                automata, tapes, inputs, lin, k, s, latest, n_steps - first_step, scale, slopes, state, work
+            ):
+                return STOPPED, first_step, n_segments
         segments[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = n_steps, clock[0], clock[1]
         fires[n_segments] = fired
         put(z, modes[n_segments])

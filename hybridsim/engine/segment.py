@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
@@ -210,6 +210,20 @@ class SegmentRun:
             f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {found}",
             remedy="step.dense(times) takes an array of k local times to states of shape (k, n), a row for each time",
         )
+
+    def carry_on(self, arrival: Arrival, s: float) -> Arrival:
+        """The end moved on to a time so near that rounding alone is between."""
+        if not self.interpolants:
+            return arrival
+        before, after = self.interpolants[-1](np.array([arrival.s, s]))
+        self.knots[-1], self.states[-1] = s, self.states[-1] + (after - before)
+        x = self.flow.project(np.array([s]), (arrival.x + (after - before))[None, :])[0]
+        return replace(arrival, s=s, x=x)
+
+    def is_clear_at_end(self, t: float) -> bool:
+        """Whether guards and monitors are far from zero where the last step ends, at time t, by samples of it."""
+        s = self.knots[-1]
+        return len(self.knots) > 1 and self.locator.is_clear(s - self.knots[-2], max(s, abs(t)))
 
     def rounding(self) -> np.ndarray:
         """How well the states are known on the segment: its own rounding and what the last event left over."""

@@ -17,7 +17,7 @@ from hybridsim.engine.timepair import two_sum
 _STEADY = 1e-3  # of the ratio of intervals between events: what it may change by in a series that accumulates
 _SHALLOW = 2.0**-18  # of a guard's values on the last step: how far below zero it goes, times four, at least
 _HIDDEN = 16.0  # four times its rounding, at least
-_STAGES = 200.0  # the largest `rounding` of a method with a compiled loop
+STAGES = 200.0  # the largest `rounding` of a method with a compiled loop
 _ULPS = 64.0  # events closer than this are for the general way to tell apart
 
 
@@ -169,7 +169,7 @@ def settle_and_move_on(
     empty for others. state: `State`, moved on with the clock.
     """
     work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
-    work.real[SPREAD] = spread(steps, _STAGES)
+    work.real[SPREAD] = spread(steps, STAGES)
     if call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work)) == 0:
         return False
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)

@@ -12,7 +12,6 @@ a change exactly.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -43,7 +42,7 @@ from hybridsim.analysis.variations.rounds import (
 from hybridsim.analysis.variations.seeds import rate_slopes, seeds
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
-from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of
+from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of, time_rounding
 from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.tangents import TangentTape
 from hybridsim.errors import UsageError
@@ -120,7 +119,7 @@ class Carrier:
     def _is_end(self, segment: Segment) -> bool:
         """Return whether a segment begins at the end of the run, to rounding."""
         end = self.solution._segments[-1].end
-        return bool(segment.start.minus(end) >= -4.0 * math.ulp(float(end)))
+        return bool(segment.start.minus(end) >= -time_rounding(self.solution))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
         """Return a mask (M,) of the directions that move a time, given its derivatives."""

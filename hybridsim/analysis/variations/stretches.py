@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from hybridsim.engine.jets import UNIT
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -51,6 +53,13 @@ def stretches_of(solution: Solution) -> Iterator[Stretch]:
         while at < len(waiting) and waiting[at].instant.minus(until) <= rounding:
             at += 1
         yield Stretch(segment, tuple(recorded), tuple(waiting[first:at]))
+
+
+def time_rounding(solution: Solution) -> float:
+    """How far from its time an event may be located by what the steps of a run round away: see `add_steps`."""
+    steps, length = solution.stats["steps"], abs(solution.t_end - solution.t_start)
+    rounding = UNIT * (16.0 * steps + solution._run.method.rounding) * length
+    return rounding + 4.0 * math.ulp(max(abs(solution.t_end), abs(solution.t_start)))
 
 
 def at_start(solution: Solution) -> list[Occurrence]:

@@ -1,11 +1,11 @@
-"""Scenes of simultaneous events: duplicate guards, guards two ulp apart, flat guards, resets onto guards."""
+"""Scenes of events at one instant: guards listed twice, two ulp apart, flat, resets onto guards, a run's end."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from hybridsim.testing.checks import at_times, equals, says
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -18,6 +18,19 @@ def scenes() -> tuple[Scene, ...]:
             (0.0, 3.0),
             Truth(((1.0, "one"), (1.0, "two"), *((2.0, name) for name in after)), ((3.0, (3.0,)),)),
             needs("monitors", "transitions"),
+            tol_t=1e-12,
+        ),
+        Scene(
+            "events-at-the-end",
+            "end-of-run",
+            (0.0, 1.1),
+            Truth(
+                ((1.1, "ramp:down"), (1.1, "stop:stick")),
+                ((END, (0.5, 0.0, 5.0 - 0.4 * 0.33 * 1.1 / 2.0, 0.0)),),
+                end=1.1,
+                checks=(("", equals(1.1, n=1.0)),),
+            ),
+            needs("transitions", "contacts", "adaptive"),
             tol_t=1e-12,
         ),
         Scene(
