@@ -14,7 +14,7 @@ from types import FrameType
 
 from hybridsim.engine.limits import LimitReached
 
-# times as long by the clock on the wall: for what sleeps or waits, and takes no processor time
+# limit of the elapsed time in units of the processor time, for runs that wait
 BACKSTOP = 10.0
 _LATER = 1e-3  # seconds
 
@@ -50,7 +50,7 @@ def bounded_work(seconds: float) -> Iterator[None]:
 
 def _giving_up(message: str) -> Callable[[int, FrameType | None], None]:
     def give_up(number: int, frame: FrameType | None) -> None:
-        if _is_passed_over(frame):  # a little later
+        if _is_passed_over(frame):  # try again a little later
             signal.setitimer(signal.ITIMER_REAL if number == signal.SIGALRM else signal.ITIMER_PROF, _LATER)
             return
         raise Endless(message)

@@ -16,11 +16,9 @@ from hybridsim.engine.recent import system_of
 from hybridsim.testing.clock import ProcessorTime
 from hybridsim.testing.scene import END, Scene
 
-ENDED = ("finished", "terminated")  # statuses of a run that ended as it was asked to
+ENDED = ("finished", "terminated")  # statuses of a run that ended as requested
 SCENES = Path(__file__).with_name("scenes")
-START = (
-    1e-12  # in units of time: where a motion starts on a guard, finding its mode may take an event, not time
-)
+START = 1e-12  # in units of time; selecting the mode of a start on a guard may take an event at this time
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ TROUBLES = {
     "sensitivity": "Sensitivity: where digits are lost",
 }
 
-END = math.inf  # as the time of a state: where the run ends
+END = math.inf  # as the time of a state: the end of the run
 
 
 def needs(*capabilities: str) -> frozenset[str]:
@@ -47,7 +47,7 @@ def needs(*capabilities: str) -> frozenset[str]:
     return frozenset(capabilities)
 
 
-Check = Callable[[Any], list[str]]  # a solution -> what is wrong with it
+Check = Callable[[Any], list[str]]  # a solution -> its errors as sentences
 
 
 @dataclass(frozen=True)

@@ -14,30 +14,30 @@ from hybridsim.testing import judge
 from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import Scene
 
-# Fixed-step study: steps for each unit of time, and the zero-velocity interval in units of the scene's speed.
+# Fixed-step study: steps per unit of time, and the zero-velocity interval in units of the scene's speed.
 STEPS = (300, 1200, 4800)
 INTERVALS = (1e-5, 1e-7, 1e-9)
-FINER = 16  # times as many steps for a method of first order
-# A fourth-order method that locates its events stays below this with the finest step; one that takes events where
-# its steps find them is off by a step.
+FINER = 16  # factor on the number of steps for a first-order method
+# Largest errors at the finest step: of a fourth-order method that locates events, and of a method that places events
+# at the ends of steps.
 LOCATED, NOT_LOCATED = 1e-5, 2 / STEPS[-1]
-FIXED_STEP_FLOOR = 1e-7  # sixteen halvings, the published number, of a step of unit/300 leave 5e-8 units
-# Least fall of an error for a tolerance a thousand times tighter (a method of order 2 does better), and for a step
-# a fourth as long (first order gives 4).
+FIXED_STEP_FLOOR = 1e-7  # the published 16 halvings of a step of unit/300 leave 5e-8 units
+# Required decrease of an error for a tolerance that is 1000 times tighter (a method of order 2 exceeds it), and for a
+# step of a quarter of the length (first order gives 4).
 FALL, FIXED_STEP_FALL = 10.0, 2.0
 LAST_RESORT = 1e-13  # for a method of low order whose error at 1e-12 is still above the scene's tolerance
-# Error in units of rtol that a study cut short may show: a low-order method makes ten to a hundred times its
-# tolerance in a period, and a lightly damped motion remembers tens of periods.
+# Allowed error, in units of rtol, of a study that ends early. A low-order method has an error of 10 to 100 times its
+# tolerance per period, and in a lightly damped motion tens of periods add up.
 CUT_SHORT = 1000.0
-# A method of order 3 would take a hundred thousand steps for 1e-9 over more than fifty periods: there its tolerances
-# are this much looser.
+# Factor on the tolerances of methods of order 3 in long scenes, where 1e-9 would need 100 000 steps, and the length in
+# units of time of a long scene.
 LOW_ORDER, LONG = 100.0, 50.0
-# A method with this option has the capability when it is set so.
+# Options whose value gives a method a capability: option -> (value, capability).
 LIFTED = {"stick_velocity": ("zero", "exact-stick")}
-# A run stopped by its limits with more than this times the steps of the setting before, whose tolerance was a thousand
-# times looser, does not come to an end: a method of order 2 needs 32 times as many.
+# A stopped run with more than this factor times the steps of the previous setting, whose tolerance was 1000 times
+# looser, counts as endless. A method of order 2 needs a factor of 32.
 RUNAWAY = 100
-LONGEST = 60  # seconds of processor time for one run of a scene: the longest takes ten on a slow machine
+LONGEST = 60  # seconds of processor time per run of a scene; the longest run takes ten on a slow machine
 
 
 @dataclass(frozen=True)
@@ -153,11 +153,11 @@ def carry_out(
             with bounded_work(seconds):
                 run = judge.run(scene, name, **setting.options, **options)
                 measured = judge.measure(scene, run, lacks)
-        except Exception as error:  # whatever it is, it is what a user would see
+        except Exception as error:  # a user would see the same exception
             return Study(tuple(done), tolerances, (setting.text, error))
         if measured.status == "limit" and done and measured.steps < RUNAWAY * done[-1][1].steps:
             tolerances = cut_short(tolerances, done[-1][0])
-            break  # no runaway, only more work than there is time for
+            break  # the run is too long, but not endless
         done.append((setting, measured))
         if "rtol" not in setting.options or "cooldown" in setting.options:
             continue

@@ -67,7 +67,7 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
     faults = study.faults()
     found = verdict(study)[0] if faults else RIGHT
     if faults and found == RIGHT:
-        found = WRONG_ANSWER  # errors that are small enough, and do not fall
+        found = WRONG_ANSWER  # the errors are small enough, but do not decrease
     return Outcome(name, scene.name, found, tuple(faults), study.errors())
 
 

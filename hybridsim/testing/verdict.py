@@ -17,7 +17,7 @@ HANG = "hang (bounded)"
 REFUSED = "refused"
 ERROR = "error"
 NOT_RUN = "not run"
-LACKS = "lacks"  # of `outcome`, which does not run what an integrator says that it lacks; the atlas does
+LACKS = "lacks"  # only used by `outcome`, which skips scenes beyond an integrator's stated limits; the atlas runs them
 VERDICTS = {
     RIGHT: "every event found and none invented, and at the tightest setting errors within the scene's tolerance",
     WRONG_ANSWER: "the run ends as if all were well, and its numbers are wrong or do not become right",
@@ -50,7 +50,7 @@ def verdict(study: Study) -> tuple[str, str]:
 
 def of_run(run: Measured) -> tuple[str, str]:
     """Return the verdict on one run, without numeric errors."""
-    # what stops early and says why has misled nobody
+    # a run that stops early and states the reason does not mislead the user
     silent = WRONG_ANSWER if run.status in ENDED else REFUSED
     if run.ending:
         return (HANG if run.status == "limit" else silent), one_line(run.ending[0])

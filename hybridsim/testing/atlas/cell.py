@@ -16,11 +16,11 @@ from hybridsim.testing.scene import Scene, Truth
 from hybridsim.testing.study import Setting, carry_out
 from hybridsim.testing.verdict import NOT_RUN, order, verdict
 
-# What one run may take, in processor time: the longest run of a right method takes five seconds, and 2e6 steps where
-# it is compiled.
+# Limits of one run in processor time and steps. The longest run of a correct method takes five seconds, or 2e6 steps
+# if it is compiled.
 SECONDS = 10.0
 STEPS = 5e6
-LONG = 20.0  # units of time from which on only compiled methods run
+LONG = 20.0  # units of time; longer scenes are run only by compiled methods
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,10 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
             settings,
             tolerances,
             lacks={"located"}
-            & set(configuration.method.lacks),  # a method of steps is not asked for instants
-            seconds=2 * SECONDS,  # for what does not look at its limits
+            & set(
+                configuration.method.lacks
+            ),  # event times of methods that do not locate events are not checked
+            seconds=2 * SECONDS,  # for methods that do not check their limits
             processor_seconds=SECONDS,
             limits={"steps": STEPS},
             form=configuration.form,

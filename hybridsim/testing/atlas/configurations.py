@@ -23,14 +23,16 @@ from hybridsim.testing.study import (
     settings_for,
 )
 
-# Regularised forms: their width in units of the scene's speed and the steps in its unit of time. Both fall together,
-# so that an explicit method stays stable where the friction force is of the order of mass * speed / unit.
+# Regularised forms: widths in units of the scene's speed, and steps per unit of time. Both decrease together, so that
+# an explicit method stays stable if the friction force is of the order of mass * speed / unit.
 WIDTHS = (1e-2, 1e-3, 1e-4)
 FINE_STEPS = (1200, 12_000, 120_000)
-MOST_STEPS = 2e6  # in one run of these
-# How long a restart is blind, in units of the scene's time, at a tolerance at which nothing else is seen.
+MOST_STEPS = 2e6  # largest number of steps per run of these forms
+# Length of the cooldown in units of the scene's time, at a tolerance at which other errors are negligible.
 COOLDOWNS, RTOL = (1e-2, 1e-3, 1e-4), 1e-9
-RIVALS: dict[str, type[Integrator]] = {CooldownRK45.name: CooldownRK45}  # which nobody should choose
+RIVALS: dict[str, type[Integrator]] = {
+    CooldownRK45.name: CooldownRK45
+}  # methods that are not registered as integrators
 
 
 @dataclass(frozen=True)

@@ -19,15 +19,15 @@ from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import END, Scene
 from hybridsim.testing.verdict import HANG, RIGHT, WRONG
 
-# Who is shown, first of all: what people use and what fails in a way that one can see.
+# Methods to show, in order of preference: common methods with visible failures.
 TYPICAL = (
     "scipy-rk45 native", "scipy-dop853 native", "rk4-dichotomy", "scipy-rk45 cooldown", "rk4 tanh", "rk4-sign",
     "cvode-adams", "scipy-radau native", "scipy-lsoda native", "rk4 karnopp", "moreau",
 )  # fmt: skip
 TRUSTED = ("exact", "taylor", "dop853", "rodas5p", "cvode-bdf")
-WIDTH = 8.0  # units of time that a picture shows
+WIDTH = 8.0  # width of a picture in units of time
 POINTS = 1500
-CROWD, SOME = 100, 20  # more events than so many are a crowd, of which some are shown
+CROWD, SOME = 100, 20  # with more than CROWD events, a picture shows only SOME of them
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
         rival = RIVALS.get(configuration.integrator, configuration.integrator)
         settings = {"form": configuration.form, **options, **configuration.options}
         with warnings.catch_warnings(), registered(rival) as name:
-            warnings.simplefilter("ignore")  # what a naive method provokes is shown by its result
+            warnings.simplefilter("ignore")  # warnings of naive methods are expected
             judge.prepare(scene, name, **settings)
             with bounded_work(2 * SECONDS):
                 return judge.run(scene, name, processor_seconds=SECONDS, limits={"steps": STEPS}, **settings)
@@ -130,12 +130,12 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
         off = np.abs(a - b) / (np.ptp(a, axis=1, keepdims=True) + 1e-300)
         off[~np.isfinite(off)] = 0.0
         row = int(off.max(axis=1).argmax()) if off.max() > 1e-6 else 0
-        # where it is first seen beside the true motion, not where it has left the picture
+        # the first visible difference from the true motion
         seen = off[row] > 0.3 * min(off[row].max(), 1.0)
         centre = float(t[seen.argmax()]) if seen.any() and off.max() > 0 else first
     window = _window(first, last, centre, min(WIDTH * scene.unit, last - first))
     inside = _events(right, window)
-    if len(inside) > CROWD:  # as much as shows single events
+    if len(inside) > CROWD:  # shorten the window so that single events are visible
         window = _window(first, last, centre, (window[1] - window[0]) * SOME / len(inside))
     state = right.model.states[row]
     points = tuple(

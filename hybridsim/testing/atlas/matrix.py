@@ -138,7 +138,7 @@ def atlas(
     cells: dict[tuple[str, str], Cell] = {}
 
     def keep(cell: Cell) -> None:
-        # first of all: where Ctrl-C hit compiled code, the cell may be an error of that
+        # first, because the cell may contain an error that Ctrl-C caused in compiled code
         if progress is not None:
             progress((len(cells) + 1) / len(jobs), cell.scene)
         cells[cell.scene, cell.configuration] = cell
@@ -148,7 +148,7 @@ def atlas(
             _in_processes(jobs, quick, min(workers, len(jobs)), keep)
         else:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # what a naive method provokes is part of the answer
+                warnings.simplefilter("ignore")  # warnings of naive methods are expected
                 for scene, one in jobs:
                     keep(run_cell(scene, one, quick))
     except KeyboardInterrupt:
@@ -202,11 +202,11 @@ def _in_processes(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker
     )
     try:
-        with _signals_later():  # the workers start here
+        with _signals_later():  # starts the workers
             futures = [pool.submit(_by_name, scene.name, one, quick) for scene, one in jobs]
         for future in as_completed(futures):
             keep(future.result())
-    except BaseException:  # Ctrl-C above all: the workers are ended, and it is raised again
+    except BaseException:  # mainly Ctrl-C: end the workers, then raise it again
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - others:
             worker.terminate()  # a cell may take a minute
@@ -230,7 +230,7 @@ def _signals_later() -> Iterator[None]:
 def _quiet_worker() -> None:
     """Ignore Ctrl-C and warnings in a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    warnings.simplefilter("ignore")  # as in the other process: they are part of the answer
+    warnings.simplefilter("ignore")  # as in the parent process
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 

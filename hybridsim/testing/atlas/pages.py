@@ -53,9 +53,9 @@ right, dashed the failing method that the legend names, at the setting of which 
 tick for each event in that part, and at its right edge their number, in the colour of each run. Circles are values
 that are known; an error below 4 % of the motion has a panel of its own.
 """
-_LEAST_ORDER = 0.5  # of what can be called falling with the step
+_LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
-_DIGITS = 9  # of a number in a reason
+_DIGITS = 9  # digits of numbers in reasons
 _RUBBING = "Friction at a hard stop: the scene `rubbing-stop`, and `hybridsim run thrown-block`."
 
 

@@ -22,7 +22,7 @@ def _twisting() -> Scene:
 
     def rests(solution: Any) -> list[str]:
         if solution.t_end < 5.0:
-            return []  # stopping by name misleads nobody, but does not go on
+            return []  # a stop with a stated reason is not misleading, but the run does not continue
         x, v = solution(5.0)
         rest = abs(x) + abs(v) < 1e-6
         return [] if rest else [f"x is {x:.3g} and v is {v:.3g} at t = 5, where all has come to rest"]

@@ -73,7 +73,7 @@ def tied() -> Scene:
         "tied-limits",
         (0.0, 0.2),
         Truth(((release, "b:slip+"),), states),
-        needs("contacts", "exact-stick", "adaptive"),  # a fixed step finds both limits passed
+        needs("contacts", "exact-stick", "adaptive"),  # with a fixed step both limits are exceeded at once
         start_is_event=False,
         unit=0.2,
     )

@@ -71,7 +71,7 @@ def _bounce() -> Scene:
         "bounce",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation", "located"),  # on a grid, luck decides how late a bounce is
+        needs("impacts", "accumulation", "located"),  # on a fixed grid the delay of a bounce is arbitrary
         speed=5.0,
         tol_x=1e-9,
     )
@@ -91,7 +91,7 @@ def _bar() -> Scene:
         "bar",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation", "located"),  # on a grid, luck decides how late a bounce is
+        needs("impacts", "accumulation", "located"),  # on a fixed grid the delay of a bounce is arbitrary
         speed=5.0,
         tol_x=1e-9,
     )

@@ -77,13 +77,13 @@ def _fading() -> Scene:
 def _many_stops() -> Scene:
     """The body is pulled slowly and stops many times in each period."""
     swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
-    return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short beside the period
+    return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short compared with the period
 
 
 def _half() -> Scene:
     """The oscillator is undamped and driven at half its frequency."""
     swing = _swing("half-frequency", 10, w=0.5)
-    return replace(swing, floor=1e-9)  # undamped: the errors of ten periods add up
+    return replace(swing, floor=1e-9)  # undamped, so the errors of ten periods add up
 
 
 def _small() -> Scene:
