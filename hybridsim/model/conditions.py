@@ -31,8 +31,7 @@ def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
     TooManyConditions
         If the result would be too long.
     """
-    conditions = _Conditions(meanings)
-    return conditions.corner(node) or conditions.chosen(node.test, node.body, node.orelse, node)
+    return _Conditions(meanings).chosen(node.test, node.body, node.orelse, node)
 
 
 class _Conditions:
@@ -63,8 +62,10 @@ class _Conditions:
             case ast.Compare(left=left, ops=[op], comparators=[right]) if isinstance(
                 op, ast.Gt | ast.GtE | ast.Lt | ast.LtE
             ):
-                return self._compared(ast.BinOp(left, ast.Sub(), right), op, yes, no) or self._one(
-                    test, yes, no, whole
+                return (
+                    self.corner(ast.IfExp(test, yes, no))
+                    or self._compared(ast.BinOp(left, ast.Sub(), right), op, yes, no)
+                    or self._one(test, yes, no, whole)
                 )
         return self._one(test, yes, no, whole)
 

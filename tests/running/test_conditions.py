@@ -301,3 +301,28 @@ def test_corners_that_are_differentiated(where: str, expr: str) -> None:
         assert hs.simulate(built, (0.0, 0.2), integrator="dop853").success
     except hs.HybridsimError as refused:
         assert expr in str(refused)
+
+
+@pytest.mark.parametrize(
+    "belt",
+    [
+        "abs(x) if not abs(x) > c else c",
+        "c if not abs(x) <= c else abs(x)",
+        "abs(x) if not not abs(x) < c else c",
+        "abs(x) if (abs(x) < c if k > 0 else False) else c",
+    ],
+)
+def test_a_smaller_of_two_however_its_condition_is_written(belt: str) -> None:
+    """A body goes with a belt at the smaller of |x| and a discrete c, whose rate of one friction can follow."""
+    built = hs.Model(
+        "belt",
+        parameters={"k": 1},
+        states=[hs.State("x", -1, 1), hs.State("w", 0.5, "-f")],
+        discrete=[hs.Discrete("c", 0.5)],
+        contacts=[hs.Contact("f", velocity=f"w - ({belt})", normal=1, law="coulomb", arguments={"mu": 2})],
+    )
+    sol = hs.simulate(built, (0.0, 2.0), integrator="dop853")
+    assert sol.success, sol.message
+    assert [interval.mode for interval in sol.modes["f"]] == ["stick"]
+    for t in (0.2, 0.6, 0.9, 1.2, 1.4, 1.8):
+        assert sol(t)[1] == pytest.approx(min(abs(t - 1.0), 0.5), abs=1e-12)
