@@ -6,6 +6,7 @@ import math
 from importlib import import_module
 
 import pytest
+from scipy.special import ellipk
 
 import hybridsim as hs
 
@@ -72,3 +73,13 @@ def test_a_smaller_settle_is_a_remedy(most_steps: list[int]) -> None:
     found = hs.steady_state(model, integrator="tsit5", settle=4)
     assert found.kind == "periodic" and found.period == pytest.approx(2.0 * math.pi, rel=1e-12)
     assert found.amplitude["x"] == pytest.approx(2**-0.5 + 1e-3, abs=2e-5)
+
+
+@pytest.mark.parametrize(("amplitude", "modulus"), [(3.1, 1.55), (3.12, 1.56)])
+def test_a_closed_orbit_beside_a_separatrix(amplitude: float, modulus: float) -> None:
+    """A pendulum let go near the top swings with period 4 K(sin(amplitude/2)); a turn loses some roundings."""
+    pendulum = hs.Model("pendulum", states=[hs.State("x", amplitude, "y"), hs.State("y", 0, "-sin(x)")])
+    steady = hs.steady_state(pendulum, integrator="dop853")
+    assert steady.kind == "periodic"
+    assert steady.period == pytest.approx(4.0 * ellipk(math.sin(modulus) ** 2), rel=1e-8)
+    assert steady.amplitude["x"] == pytest.approx(amplitude, rel=1e-9)

@@ -135,13 +135,13 @@ class Motion:
         p = system.vector(Instant(point.at), point.discrete)
         return stands_still(system, point.x, p, point.numbers, self.rtol)
 
-    def _tolerances(self, start: Point) -> dict[str, Any]:
+    def _tolerances(self, start: Point, rtol: float) -> dict[str, Any]:
         """Return the absolute tolerances of a run; a state near zero gets that of the motion's size."""
         if "atol" in self.options or all(state.nominal for state in self.model.states):
             return {}
         found = np.maximum(self.coupled_sizes(start), self.sizes)
         sizes = [s.nominal or size or 1.0 for s, size in zip(self.model.states, found.tolist(), strict=True)]
-        return {"atol": [1e-3 * self.rtol * size for size in sizes]}
+        return {"atol": [1e-3 * rtol * size for size in sizes]}
 
     def on_constraints(self, point: Point) -> Point:
         """Return the point with held states evaluated from their constraints at the model's parameters."""
@@ -156,7 +156,7 @@ class Motion:
         """
         given: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
-            given |= self._tolerances(start)
+            given |= self._tolerances(start, options.get("rtol", self.rtol))
             given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
             given["z0"] = start.z or None
         begin = 0.0 if start is None else start.at

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit
     from hybridsim.solution import Solution
 
-_CLOSER = 1e-2  # multiple of the tolerance: below it, a change that no longer shrinks has converged
+CLOSER = 1e-2  # multiple of the tolerance: below it, a change that no longer shrinks has converged
 LONGEST_WORD = 12  # largest number of periods after which a motion may repeat
 
 
@@ -63,7 +63,7 @@ class Passings:
     def repeats_after(self, tolerance: float) -> int | None:
         """Return the least number of passages after which the motion repeats, if it has converged to its limit."""
         found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
-        return next((m for m in found if self._error(m, _CLOSER * tolerance) <= tolerance), None)
+        return next((m for m in found if self._error(m, CLOSER * tolerance) <= tolerance), None)
 
     def _error(self, multiple: int, rounding: float) -> float:
         """Return the distance of the last passage from the limit, from the change and its rate of decrease."""

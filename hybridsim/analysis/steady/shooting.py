@@ -11,6 +11,7 @@ from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
+from hybridsim.arguments import SMALLEST_RTOL
 from hybridsim.errors import HybridsimError
 
 if TYPE_CHECKING:
@@ -84,6 +85,28 @@ def shoot(
         if not orbit.period > 0.0:
             break
     return replace(best, converged=False)
+
+
+def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:
+    """An orbit with the residual that is left with the tightest tolerance, and the period where that is_free.
+
+    Orbits that lie among others, such as those of what conserves energy, change by what a run loses, and no further.
+    """
+    try:
+        solution = motion.run(start.start, start.period, rtol=SMALLEST_RTOL)
+    except HybridsimError:
+        return replace(start, residual=np.inf)
+    end = point_at_end(solution)
+    if end.z != start.start.z:
+        return replace(start, residual=np.inf)
+    change, period = end.values - start.start.values, start.period
+    rates = rates_at_end(solution) if is_free else np.zeros(0)
+    if rates.any():
+        unit = np.where(scale > 0.0, scale, 1.0)
+        way = np.append(rates, np.zeros(len(change) - len(rates))) / unit
+        late = float((change / unit) @ way / (way @ way))
+        change, period = change - late * way * unit, period - late
+    return replace(start, period=period, residual=relative(change, scale))
 
 
 def _newton(

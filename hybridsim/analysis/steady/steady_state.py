@@ -23,8 +23,15 @@ from hybridsim.analysis.steady.motion import (
 )
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
-from hybridsim.analysis.steady.settling import Passings, died_out, forced_passings, free_passings, relative
-from hybridsim.analysis.steady.shooting import Orbit, shoot
+from hybridsim.analysis.steady.settling import (
+    CLOSER,
+    Passings,
+    died_out,
+    forced_passings,
+    free_passings,
+    relative,
+)
+from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
 from hybridsim.analysis.sweep.given import refuse_unknown
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
@@ -299,6 +306,11 @@ class _Search:
         if len(passings.values) < 2:
             return None
         multiple = passings.nearest()
+        if passings.more(multiple, self.tol) > self.max_periods:  # it does not come closer
+            orbit = self._orbit(passings, multiple)
+            found = followed_closely(self.motion, orbit, passings.scale, self.period is None)
+            if found.residual <= CLOSER * self.tol:
+                return found
         self.expected = (
             math.ceil(min(_MARGIN * passings.more(multiple, self.tol), _MOST_AT_ONCE)) + 2 * multiple
         )
