@@ -21,24 +21,25 @@ from hybridsim.engine.timepair import Instant
 def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situation:
     """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
-    zero = np.zeros(system.n)
+    zero, asked = np.zeros(system.n), segment.tolerances
+    slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     located: list[Any] = []
-    faint = float(segment.tolerances.atol.min(initial=math.inf))
     if arrival.fired or arrival.stopping:
         series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-        # within the bound of a corner either side will do, and the instant is one of them; unless it dies away
+        # of a corner either side will do within its bound: its instant does not make the states worse than asked for
+        fine = asked.atol + asked.rtol * np.abs(arrival.x)
         fired = [
             g
             for g in arrival.fired
-            if not system.is_corner[system.owner[g]] or np.abs(series.guards[g]).max() <= faint
+            if not system.is_corner[system.owner[g]]
+            or (distance_of_zero(series.guards[g]) * slopes <= fine).all()
         ]
         located = [*series.guards[fired], *series.monitors[list(arrival.stopping)]]
     # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
-    least = UNIT * faint
+    least = UNIT * float(asked.atol.min(initial=math.inf))
     for series_of_zero in located:
         if np.abs(series_of_zero[:2]).max() > least:
             s_error = max(s_error, distance_of_zero(series_of_zero))
-    slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     x_error = segment.rounding() + s_error * slopes
     holding = system.evaluated(flow.z)
     x_error[holding] = UNIT * np.abs(arrival.x[holding])
